@@ -1,0 +1,223 @@
+#include "host/config/sensor_config.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <filesystem>
+
+#include "host/config/calibration_file.h"
+#include "host/config/yaml_reader.h"
+#include "host/wrench/spring_model.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr double kMm = 1e-3;
+
+Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
+
+Eigen::Matrix3d rotation(const Eigen::Vector3d& r) {
+  const double angle = r.norm();
+  if (angle == 0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
+}
+
+/// position_mm and rotation_rad, both or neither.
+std::optional<Eigen::Isometry3d> optional_pose(YamlReader& node) {
+  const bool position = node.has("position_mm");
+  if (node.has("rotation_rad") != position) {
+    node.fail(position ? "position_mm" : "rotation_rad",
+              "position_mm and rotation_rad belong together; give both or neither");
+  }
+  if (!position) return std::nullopt;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = vector3(node.numbers("position_mm", 3)) * kMm;
+  pose.linear() = rotation(vector3(node.numbers("rotation_rad", 3)));
+  return pose;
+}
+
+CameraModel read_camera(YamlReader node) {
+  CameraModel camera;
+  camera.width_px = node.integer("width", 16, 16384);
+  camera.height_px = node.integer("height", 16, 16384);
+  camera.fx_px = node.positive("fx");
+  camera.fy_px = node.positive("fy");
+  camera.cx_px = node.number("cx");
+  camera.cy_px = node.number("cy");
+  const std::vector<double> distortion = node.numbers_or("distortion", std::vector<double>(5, 0.0));
+  std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
+  camera.mirrored = node.boolean_or("mirrored", false);
+  node.finish();
+  return camera;
+}
+
+TargetDescription read_target(YamlReader node) {
+  TargetDescription target;
+  std::vector<std::string_view> families;
+  for (int i = 0; i < kTagFamilies; ++i) families.push_back(name(static_cast<TagFamily>(i)));
+  target.family = static_cast<TagFamily>(node.one_of("family", families));
+  target.tag_size = node.positive("tag_size_mm") * kMm;
+  target.border = node.non_negative_or("border_mm", 0.35) * kMm;
+  target.tags.clear();
+  for (YamlReader& entry : node.children("tags")) {
+    Tag tag;
+    tag.id = entry.integer("id", 0, id_count(target.family) - 1);
+    for (const Tag& other : target.tags) {
+      if (other.id == tag.id)
+        entry.fail("id", fmt::format("tag {} is listed twice; every tag needs its own id", tag.id));
+    }
+    tag.platform_T_tag = optional_pose(entry);
+    entry.finish();
+    target.tags.push_back(tag);
+  }
+  if (target.tags.size() > static_cast<std::size_t>(kMaxTags))
+    node.fail("tags", fmt::format("at most {} tags are tracked", kMaxTags));
+  node.finish();
+  return target;
+}
+
+RestOptions read_rest(YamlReader node) {
+  RestOptions rest;
+  rest.frames = node.integer_or("frames", 1, 1000, rest.frames);
+  rest.camera_T_platform = optional_pose(node);
+  node.finish();
+  return rest;
+}
+
+Springs read_springs(YamlReader node) {
+  Springs springs;
+  const std::vector<std::vector<double>> centres = node.points("centres_mm", 3);
+  for (const std::vector<double>& p : centres) springs.centres.push_back(vector3(p) * kMm);
+  springs.axial = node.positive("axial_n_per_mm") / kMm;
+  springs.lateral = node.positive("lateral_n_per_mm") / kMm;
+  springs.bending = node.non_negative_or("bending_nm_per_rad", 0);
+  springs.torsion = node.non_negative_or("torsion_nm_per_rad", 0);
+  node.finish();
+  return springs;
+}
+
+Vector6 force_and_torque(YamlReader& node, const std::string& force_key,
+                         const std::string& torque_key, Vector6 value) {
+  const auto read = [&](const std::string& key, int first) {
+    if (!node.has(key)) return;
+    const std::vector<double> v = node.numbers(key, 3);
+    for (int i = 0; i < 3; ++i) {
+      if (v[i] <= 0)
+        node.fail(key, fmt::format("must be greater than 0 on every axis, is {} on axis {}", v[i],
+                                   i + 1));
+      value[first + i] = v[i];
+    }
+  };
+  read(force_key, 0);
+  read(torque_key, 3);
+  return value;
+}
+
+WrenchModel read_wrench(YamlReader node, const SensorConfig& sensor) {
+  WrenchModel model;
+  const bool calibrated = node.has("calibration");
+  if (node.has("springs") == calibrated) {
+    node.fail(
+        calibrated ? "springs" : "calibration",
+        "give either calibration: FILE or springs: {...}, so that displacement becomes newtons");
+  }
+  if (calibrated) {
+    const std::filesystem::path file = node.text("calibration");
+    const std::filesystem::path folder = std::filesystem::path(node.file()).parent_path();
+    load_calibration(file.is_absolute() ? file : folder / file, sensor.camera, sensor.target,
+                     model);
+  } else {
+    model.K = stiffness(read_springs(node.child("springs")));
+  }
+  model.range = force_and_torque(node, "range_n", "range_nm", model.range);
+  model.wrench_origin = vector3(node.numbers_or("origin_mm", {0, 0, 0})) * kMm;
+  model.camera_R_wrench_frame = rotation(vector3(node.numbers_or("frame_rotation_rad", {0, 0, 0})));
+  node.finish();
+  return model;
+}
+
+/// "-y" -> the row (0 -1 0).
+Eigen::RowVector3d signed_axis(YamlReader& node, const std::string& key) {
+  const std::vector<std::string_view> names = {"+x", "+y", "+z", "-x", "-y", "-z"};
+  const std::size_t i = node.one_of(key, names);
+  Eigen::RowVector3d row = Eigen::RowVector3d::Zero();
+  row[static_cast<int>(i % 3)] = i < 3 ? 1 : -1;
+  return row;
+}
+
+Eigen::Matrix3d read_mounting(YamlReader node) {
+  Eigen::Matrix3d hid_R_camera;
+  hid_R_camera.row(0) = signed_axis(node, "right");
+  hid_R_camera.row(1) = signed_axis(node, "toward_user");
+  hid_R_camera.row(2) = signed_axis(node, "down");
+  if (std::abs(hid_R_camera.determinant() - 1) > 1e-9) {
+    node.fail("right",
+              "right, toward_user and down must be three different camera axes that form a "
+              "right-handed frame");
+  }
+  node.finish();
+  return hid_R_camera;
+}
+
+ShapingOptions read_shaping(YamlReader node, ShapingOptions shaping) {
+  shaping.full_scale = force_and_torque(node, "full_scale_n", "full_scale_nm", shaping.full_scale);
+  shaping.dead_zone = force_and_torque(node, "dead_zone_n", "dead_zone_nm", shaping.dead_zone);
+  for (int i = 0; i < 6; ++i) {
+    if (shaping.dead_zone[i] >= shaping.full_scale[i]) {
+      node.fail(i < 3 ? "dead_zone_n" : "dead_zone_nm",
+                "must be smaller than the full scale of its axis");
+    }
+  }
+  node.finish();
+  return shaping;
+}
+
+/// "256f:c62e"
+HidIdentity read_identity(YamlReader node) {
+  HidIdentity identity;
+  const std::string text = node.text("id");
+  const auto hex = [](std::string_view s, std::uint16_t& out) {
+    const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), out, 16);
+    return s.size() == 4 && error == std::errc() && end == s.data() + s.size();
+  };
+  if (text.size() != 9 || text[4] != ':' ||
+      !hex(std::string_view(text).substr(0, 4), identity.vendor) ||
+      !hex(std::string_view(text).substr(5), identity.product)) {
+    node.fail("id", fmt::format("'{}' is not vendor:product in hexadecimal, such as \"256f:c62e\"",
+                                text));
+  }
+  if (identity.vendor == 0x046d && (identity.product == 0xc626 || identity.product == 0xc623)) {
+    node.fail("id",
+              "the kernel's hid-logitech driver takes this id and refuses virtual devices; use "
+              "256f:c62e");
+  }
+  node.finish();
+  return identity;
+}
+
+SensorConfig read_sensor(YamlReader root) {
+  SensorConfig sensor;
+  sensor.camera = read_camera(root.child("camera"));
+  sensor.target = read_target(root.child("target"));
+  if (root.has("rest")) sensor.rest = read_rest(root.child("rest"));
+  sensor.wrench = read_wrench(root.child("wrench"), sensor);
+  if (root.has("mounting")) sensor.shaping.hid_R_camera = read_mounting(root.child("mounting"));
+  if (root.has("shaping")) sensor.shaping = read_shaping(root.child("shaping"), sensor.shaping);
+  if (root.has("spacemouse")) sensor.spacemouse = read_identity(root.child("spacemouse"));
+  root.finish();
+  return sensor;
+}
+
+}  // namespace
+
+SensorConfig load_sensor(const std::string& path) {
+  return read_sensor(YamlReader::from_file(path));
+}
+
+SensorConfig parse_sensor(const std::string& text, const std::string& name) {
+  return read_sensor(YamlReader::from_text(text, name));
+}
+
+}  // namespace tagwrench

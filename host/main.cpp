@@ -1,0 +1,91 @@
+// The verbs. Exit status: 0 done, 1 failed while running, 2 wrong usage or a configuration that cannot be used.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+#include <opencv2/core/utility.hpp>
+
+#include "host/config/scenario_config.h"
+#include "host/config_error.h"
+#include "host/doctor.h"
+#include "host/run_command.h"
+#include "host/source/simulator/folder_export.h"
+
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kUnusable = 2;
+
+constexpr const char* kSources =
+    "where frames come from:\n"
+    "  sim | sim:SCENARIO.yaml       the simulated sensor\n"
+    "  v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]\n"
+    "  images:DIR                    PNG, PGM or JPEG in name order, times from DIR/frames.csv\n"
+    "  recording:FILE                a recording\n"
+    "Without it: a camera that sees the tags, else sim";
+constexpr const char* kOutputs =
+    "where samples go (repeat it for more than one):\n"
+    "  terminal                      live view\n"
+    "  jsonl:FILE, csv:FILE          one line per frame, - is standard output\n"
+    "  spacemouse                    virtual 6-DOF puck for CAD programs\n"
+    "  wrench                        calibrated HID sensor in N and N m\n"
+    "  joystick                      six-axis joystick for games\n"
+    "Without it: terminal, and every device that this machine allows";
+
+int dispatch(int argc, char** argv) {
+  CLI::App app{"tagwrench: a camera under a spring platform as a 6-axis force-torque sensor and 6-DOF input device"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", TAGWRENCH_VERSION);
+
+  tagwrench::RunOptions run_options;
+  CLI::App* run = app.add_subcommand("run", "track the tags, compute the wrench, feed the outputs");
+  run->add_option("--sensor", run_options.sensor, "sensor.yaml of this sensor");
+  run->add_option("--source", run_options.source, kSources);
+  run->add_option("--output", run_options.outputs, kOutputs);
+  run->add_option("--frames", run_options.frames, "end after N frames")->check(CLI::PositiveNumber);
+  run->add_option("--seconds", run_options.seconds, "end after S seconds")->check(CLI::PositiveNumber);
+  run->add_flag("--fast", run_options.fast, "sources that are not live run as fast as they can, no frame dropped");
+
+  std::string scenario;
+  std::string folder;
+  int frames = 0;
+  CLI::App* sim = app.add_subcommand("sim", "render the simulated sensor to a folder: frames, truth, sensor.yaml");
+  sim->add_option("--scenario", scenario, "scenario YAML; without it the default scenario");
+  sim->add_option("--out", folder, "folder to write")->required();
+  sim->add_option("--frames", frames, "number of frames")->required()->check(CLI::Range(1, 10'000'000));
+
+  CLI::App* doctor = app.add_subcommand("doctor", "say line by line what works here and what to do about the rest");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "tagwrench: {}; `tagwrench --help` lists what there is\n", e.what());
+    return kUnusable;
+  }
+  if (run->parsed()) return tagwrench::run(run_options);
+  if (doctor->parsed()) return tagwrench::run_doctor(std::cout);
+  if (sim->parsed()) {
+    const tagwrench::sim::Scenario described =
+        scenario.empty() ? tagwrench::sim::Scenario{} : tagwrench::load_scenario(scenario);
+    tagwrench::sim::export_folder(described, folder, frames);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  cv::setNumThreads(1);  // one thread, one poll loop; and a fork must find a single-threaded process
+  try {
+    return dispatch(argc, argv);
+  } catch (const tagwrench::ConfigError& e) {
+    fmt::print(stderr, "tagwrench: {}\n", e.what());
+    return kUnusable;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "tagwrench: failed: {}\n", e.what());
+    return kFailed;
+  }
+}

@@ -1,0 +1,185 @@
+#include "host/pipeline.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <array>
+
+namespace tagwrench {
+namespace {
+
+using std::chrono::milliseconds;
+
+// A frame is missing when it is this late. With the guardian's delay both stay below 80 ms, the
+// time after which robot teleoperation programs take a silent device for gone.
+constexpr Duration kGrace = milliseconds(40);
+constexpr Duration kGuardianGrace = milliseconds(60);
+// A camera that slows down in dim light is late, not lost; slower than this it is lost.
+constexpr Duration kSlowestInterval = milliseconds(250);
+constexpr std::size_t kMostOutputs = 14;
+
+const char* text(Hint hint) {
+  switch (hint) {
+    case Hint::image_looks_mirrored:
+      return "the image looks mirrored (tags decode only when it is flipped left to right); set "
+             "camera.mirrored: true in "
+             "sensor.yaml";
+    case Hint::image_looks_unmirrored:
+      return "the image does not look mirrored, but sensor.yaml says so; set camera.mirrored: "
+             "false in sensor.yaml";
+    case Hint::rest_learned:
+      return "rest pose learned; the wrench counts from here";
+    case Hint::moved_while_learning:
+      return "the platform moved while its rest pose was learned; let it rest for a moment";
+    case Hint::none:
+      break;
+  }
+  return "";
+}
+
+}  // namespace
+
+Pipeline::Pipeline(FrameSource& source, Tracker& tracker, const WrenchEstimator& wrench,
+                   const Shaping& shaping, std::vector<std::unique_ptr<Output>>& outputs,
+                   DeadMan& dead_man, int stop_fd)
+    : source_(source),
+      tracker_(tracker),
+      wrench_(wrench),
+      shaping_(shaping),
+      outputs_(outputs),
+      dead_man_(dead_man),
+      stop_fd_(stop_fd),
+      interval_(source.format().period) {}
+
+/// The life of a frame.
+void Pipeline::step(const Frame& frame) noexcept {
+  const Track track = tracker_.track(frame);  // pixels -> displacement of the platform
+  Sample sample{.sequence = frame.sequence,
+                .capture_time = frame.capture_time,
+                .latency_origin = frame.latency_origin,
+                .dropped = frame.dropped};
+  wrench_.estimate(track, sample);  // displacement -> newtons
+  shaping_.shape(sample);           // newtons -> motion of an input device
+  send(sample);                     // to every output
+  ++report_.frames;
+  report_.dropped += sample.dropped;
+  if (carries_numbers(sample.status)) ++report_.with_numbers;
+  say_hint(track.hint);
+}
+
+RunReport Pipeline::run(const RunLimits& limits) {
+  start_ = last_arrival_ = std::chrono::steady_clock::now();
+  while (!end_) {
+    if (limits.frames && report_.frames >= *limits.frames) break;
+    if (limits.time && std::chrono::steady_clock::now() - start_ >= *limits.time) break;
+    wait(wake_time(limits));
+    if (source_ready_) read_source();
+    if (!neutral_ && std::chrono::steady_clock::now() >= last_arrival_ + interval_ + kGrace)
+      send_neutral();
+  }
+  dead_man_.stand_down();
+  report_.end = end_.value_or(RunReport::End::limit);
+  report_.elapsed = std::chrono::steady_clock::now() - start_;
+  return report_;
+}
+
+TimePoint Pipeline::wake_time(const RunLimits& limits) const noexcept {
+  TimePoint wake = TimePoint::max();
+  if (!neutral_) wake = last_arrival_ + interval_ + kGrace;
+  if (limits.time) wake = std::min(wake, start_ + *limits.time);
+  return wake;
+}
+
+/// Blocks until the source, an output's client or a stop wants attention, or the time has come.
+void Pipeline::wait(TimePoint until) noexcept {
+  std::array<pollfd, kMostOutputs + 2> fds{};
+  const int source_fd = source_.poll_fd();
+  fds[0] = {source_fd, POLLIN, 0};
+  fds[1] = {stop_fd_, POLLIN, 0};
+  const std::size_t outputs = std::min(outputs_.size(), kMostOutputs);
+  for (std::size_t i = 0; i < outputs; ++i) fds[i + 2] = {outputs_[i]->poll_fd(), POLLIN, 0};
+
+  timespec timeout{};
+  const bool endless = until == TimePoint::max() && source_fd >= 0;
+  if (source_fd >= 0 && !endless) {
+    const Duration left = std::max(Duration::zero(), until - std::chrono::steady_clock::now());
+    timeout.tv_sec = left.count() / 1'000'000'000;
+    timeout.tv_nsec = left.count() % 1'000'000'000;
+  }
+  const int ready = ::ppoll(fds.data(), outputs + 2, endless ? nullptr : &timeout, nullptr);
+  source_ready_ = source_fd < 0 || (ready > 0 && fds[0].revents != 0);
+  if (ready <= 0) return;
+  if (fds[1].revents != 0) end_ = RunReport::End::interrupted;
+  for (std::size_t i = 0; i < outputs; ++i) {
+    if (fds[i + 2].revents != 0) outputs_[i]->service();
+  }
+}
+
+void Pipeline::read_source() noexcept {
+  Frame frame;
+  switch (source_.read(frame)) {
+    case ReadStatus::frame: {
+      const TimePoint now = std::chrono::steady_clock::now();
+      const Duration since = now - last_arrival_;
+      interval_ = std::clamp(interval_ + (since - interval_) / 8, source_.format().period,
+                             std::max<Duration>(source_.format().period, kSlowestInterval));
+      last_arrival_ = now;
+      step(frame);
+      return;
+    }
+    case ReadStatus::nothing:
+      return;
+    case ReadStatus::disconnected:
+      send_neutral();
+      say(source_.detail());
+      return;
+    case ReadStatus::reconnected:
+      say(source_.detail());
+      return;
+    case ReadStatus::end:
+      end_ = RunReport::End::source_ended;
+      return;
+  }
+}
+
+void Pipeline::send(const Sample& sample) noexcept {
+  for (const std::unique_ptr<Output>& output : outputs_) {
+    const SendStatus status = output->send(sample);
+    if (status == SendStatus::skipped) ++report_.skipped;
+    if (status == SendStatus::failed && !end_) {
+      report_.failure = output->failure();
+      end_ = RunReport::End::output_failed;
+    }
+  }
+  last_sample_ = sample;
+  neutral_ = !carries_numbers(sample.status);
+  if (neutral_) {
+    dead_man_.stand_down();
+  } else {
+    dead_man_.expect_by(last_arrival_ + interval_ + kGuardianGrace);
+  }
+}
+
+/// The frame that should have come did not: one sample that says so, with zeros.
+void Pipeline::send_neutral() noexcept {
+  if (neutral_) return;
+  send({.sequence = last_sample_.sequence,
+        .capture_time = last_sample_.capture_time,
+        .latency_origin = last_sample_.latency_origin,
+        .status = Status::lost});
+}
+
+void Pipeline::say_hint(Hint hint) noexcept {
+  if (hint == Hint::none || hint == last_hint_) return;
+  last_hint_ = hint;
+  say(text(hint));
+}
+
+void Pipeline::say(std::string_view line) noexcept {
+  bool shown = false;
+  for (const std::unique_ptr<Output>& output : outputs_) shown = output->notice(line) || shown;
+  if (!shown) fmt::print(stderr, "tagwrench: {}\n", line);
+}
+
+}  // namespace tagwrench

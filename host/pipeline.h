@@ -1,0 +1,78 @@
+// THE data path, on one screen: frame -> pose -> wrench -> motion -> outputs, and the one poll loop
+// that drives it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/output/dead_man.h"
+#include "host/output/output.h"
+#include "host/source/frame_source.h"
+#include "host/tracker/tracker.h"
+#include "host/wrench/estimate.h"
+#include "host/wrench/shaping.h"
+
+namespace tagwrench {
+
+struct RunLimits {
+  std::optional<std::uint64_t> frames;
+  std::optional<Duration> time;
+};
+
+struct RunReport {
+  enum class End : std::uint8_t { limit, source_ended, interrupted, output_failed };
+  End end = End::limit;
+  std::string failure;             ///< one line, when an output failed
+  std::uint64_t frames = 0;        ///< processed
+  std::uint64_t with_numbers = 0;  ///< of these, ok or saturated
+  std::uint64_t dropped = 0;       ///< lost by the source
+  std::uint64_t skipped = 0;       ///< samples that a slow reader lost
+  Duration elapsed{};
+};
+
+class Pipeline {
+ public:
+  /// Borrows everything; `stop_fd` becomes readable when the run shall end (a signalfd), -1 for
+  /// never.
+  Pipeline(FrameSource& source, Tracker& tracker, const WrenchEstimator& wrench,
+           const Shaping& shaping, std::vector<std::unique_ptr<Output>>& outputs, DeadMan& dead_man,
+           int stop_fd);
+
+  /// Runs until a limit, the source's end, a stop or a failed output. Does not throw on account of
+  /// the outside world.
+  RunReport run(const RunLimits& limits);
+
+ private:
+  void step(const Frame& frame) noexcept;
+  void send(const Sample& sample) noexcept;
+  void send_neutral() noexcept;
+  void read_source() noexcept;
+  void wait(TimePoint until) noexcept;
+  void say(std::string_view line) noexcept;
+  void say_hint(Hint hint) noexcept;
+  TimePoint wake_time(const RunLimits& limits) const noexcept;
+
+  FrameSource& source_;
+  Tracker& tracker_;
+  const WrenchEstimator& wrench_;
+  const Shaping& shaping_;
+  std::vector<std::unique_ptr<Output>>& outputs_;
+  DeadMan& dead_man_;
+  int stop_fd_;
+
+  TimePoint start_{};
+  TimePoint last_arrival_{};
+  Duration interval_;  ///< between frames as they really come, at least the announced period
+  bool neutral_ = true;
+  bool source_ready_ = false;
+  Hint last_hint_ = Hint::none;
+  Sample last_sample_;
+  RunReport report_;
+  std::optional<RunReport::End> end_;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,49 @@
+// Where frames come from. A camera, a folder, a recording and the simulator are equals behind this
+// interface.
+#pragma once
+
+#include <string>
+
+#include "host/types.h"
+
+namespace tagwrench {
+
+struct SourceFormat {
+  int width = 0;
+  int height = 0;
+  Duration period{};        ///< between frames, as the source announces it
+  std::string description;  ///< one line for people: device, mode, rate, pixel format
+};
+
+enum class ReadStatus : std::uint8_t {
+  frame,         ///< the Frame argument is filled
+  nothing,       ///< woken for nothing (a corrupt or stale frame was skipped); poll again
+  disconnected,  ///< the device went away or stalled; detail() says so. Reported once; keep polling
+  reconnected,   ///< it is back; detail() says so
+  end,           ///< no more frames will come
+};
+
+/// Setup (the constructors of implementations) throws ConfigError; the running loop gets statuses.
+class FrameSource {
+ public:
+  FrameSource() = default;
+  FrameSource(const FrameSource&) = delete;
+  FrameSource& operator=(const FrameSource&) = delete;
+  virtual ~FrameSource() = default;
+
+  /// Fixed for the source's lifetime, reconnections included.
+  virtual const SourceFormat& format() const noexcept = 0;
+
+  /// Readable when read() is worth calling; -1 when it always is (a source that runs as fast as it
+  /// can). May change after any read(), so ask again before every poll.
+  virtual int poll_fd() const noexcept = 0;
+
+  /// Takes the newest frame, never a stale one. Never blocks, never throws. The frame is valid
+  /// until the next read().
+  virtual ReadStatus read(Frame& frame) noexcept = 0;
+
+  /// One line about the last disconnected or reconnected status.
+  virtual std::string detail() const { return {}; }
+};
+
+}  // namespace tagwrench

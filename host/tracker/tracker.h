@@ -1,0 +1,31 @@
+// Frame -> displacement of the platform from rest.
+//
+// acquire   image -> tag corners. OpenCV lives there; runs only while the target is not held.
+// refine    predicted pose + pixels -> pose with covariance, jointly over all tags as one rigid target.
+// rest      learns the rest pose and the tags' placement from the first frames.
+#pragma once
+
+#include <memory>
+
+#include "host/tracker/camera_model.h"
+#include "host/tracker/target.h"
+#include "host/types.h"
+
+namespace tagwrench {
+
+class Tracker {
+ public:
+  Tracker(const CameraModel& camera, const TargetDescription& target, const RestOptions& rest);
+  ~Tracker();
+  Tracker(const Tracker&) = delete;
+  Tracker& operator=(const Tracker&) = delete;
+
+  /// Never throws. Allocates only while the target is not held.
+  Track track(const Frame& frame) noexcept;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,115 @@
+// The words of the house: frames, poses, wrenches and samples, with their units and axes, stated
+// once.
+//
+// Units     SI. A number that is not SI carries its unit in its name (_px, _mm, _us, _counts).
+// Time      std::chrono on the kernel's CLOCK_MONOTONIC (libstdc++'s steady_clock reads it).
+// Camera    x right, y down, z away from the lens; pixel centres at integer coordinates.
+// Platform  origin at the midpoint of the tag centres, axes parallel to the camera's at rest.
+// Tag       origin at the tag's centre, x right, y down, z into the paper, as printed.
+// HID       X right, Y toward the user, Z down (HID usage tables, section 4.2), right-handed.
+// Poses     camera_T_platform maps platform coordinates to camera coordinates:
+//           p_camera = camera_T_platform * p_platform.
+// Order     six-vectors are translation before rotation, force before torque: (x y z rx ry rz), (Fx
+// Fy Fz Mx My Mz).
+#pragma once
+
+#include <Eigen/Core>
+#include <chrono>
+#include <cstdint>
+
+namespace tagwrench {
+
+using TimePoint = std::chrono::steady_clock::time_point;
+using Duration = std::chrono::nanoseconds;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+/// 8-bit luminance, borrowed from its owner (a kernel buffer, a decoder, a renderer). Row r starts
+/// at pixels + r * stride.
+struct ImageView {
+  const std::uint8_t* pixels = nullptr;
+  int width = 0;
+  int height = 0;
+  int stride = 0;
+};
+
+/// One picture as its source delivered it; valid until the source's next read().
+struct Frame {
+  ImageView image;
+  TimePoint
+      capture_time{};  ///< the kernel's capture time, or the recording's or simulator's own clock
+  TimePoint
+      latency_origin{};  ///< where latency counts from, always CLOCK_MONOTONIC: equal to
+                         ///< capture_time for live sources, the hand-over time for replayed ones
+  std::uint64_t sequence = 0;  ///< counts the frames that the source captured, lost ones included
+  std::uint32_t dropped = 0;   ///< frames lost since the previous Frame
+};
+
+enum class Status : std::uint8_t {
+  ok,
+  acquiring,  ///< no target yet
+  lost,       ///< had the target (or the camera), has it no more
+  doubtful,   ///< tracked, but the fit says do not trust it
+  saturated,  ///< outside the calibrated range
+};
+
+/// Only these two carry numbers to outputs; every other status is a neutral output.
+constexpr bool carries_numbers(Status status) {
+  return status == Status::ok || status == Status::saturated;
+}
+
+constexpr const char* name(Status status) {
+  switch (status) {
+    case Status::ok:
+      return "ok";
+    case Status::acquiring:
+      return "acquiring";
+    case Status::lost:
+      return "lost";
+    case Status::doubtful:
+      return "doubtful";
+    case Status::saturated:
+      return "saturated";
+  }
+  return "?";
+}
+
+/// What the tracker noticed that a person should be told; said once by whoever runs the loop.
+enum class Hint : std::uint8_t {
+  none,
+  image_looks_mirrored,    ///< tags decode only after a horizontal flip, and the sensor says
+                           ///< mirrored: false
+  image_looks_unmirrored,  ///< the reverse: the sensor says mirrored: true
+  rest_learned,            ///< this frame completed the rest pose
+  moved_while_learning,    ///< the platform moved during the rest frames; learning starts again
+};
+
+/// The platform's displacement from rest, as the tracker sees it. Numbers are zero unless status is
+/// ok.
+struct Track {
+  Status status = Status::acquiring;
+  Hint hint = Hint::none;
+  Vector6 displacement = Vector6::Zero();  ///< translation (m), rotation vector r with R_now =
+                                           ///< exp(r) R_rest (rad), both along camera axes
+  Matrix6 covariance = Matrix6::Zero();    ///< of displacement, m^2, m rad, rad^2
+  double residual_px = 0;                  ///< RMS of the fit
+  std::uint8_t tags_held = 0;              ///< number of tags that carried the fit
+};
+
+/// One line of output: all that the instrument knows about one frame.
+struct Sample {
+  std::uint64_t sequence = 0;
+  TimePoint capture_time{};
+  TimePoint latency_origin{};
+  Status status = Status::acquiring;
+  Vector6 displacement = Vector6::Zero();        ///< m, rad
+  Vector6 displacement_sigma = Vector6::Zero();  ///< one standard deviation, m, rad
+  Vector6 wrench = Vector6::Zero();        ///< N, N m: what the user applies TO the platform, about
+                                           ///< wrench_origin, along wrench_frame
+  Vector6 wrench_sigma = Vector6::Zero();  ///< one standard deviation, N, N m
+  Vector6 motion = Vector6::Zero();  ///< -1..1 per axis in the HID frame, dead zone and full scale
+                                     ///< applied; exactly zero at rest
+  std::uint32_t dropped = 0;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,180 @@
+#include "host/config/sensor_config.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "host/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+// Line numbers in the expectations below count from the first line here.
+const char* const kGood =
+    "camera:  {width: 640, height: 480, fx: 805.0, fy: 806.0, cx: 319.5, cy: 239.5}\n"  // 1
+    "target:\n"                                                                         // 2
+    "  family: aruco_original\n"                                                        // 3
+    "  tag_size_mm: 3.8\n"                                                              // 4
+    "  tags:\n"                                                                         // 5
+    "    - {id: 5}\n"                                                                   // 6
+    "    - {id: 2}\n"                                                                   // 7
+    "rest:    {frames: 30}\n"                                                           // 8
+    "wrench:\n"                                                                         // 9
+    "  springs:\n"                                                                      // 10
+    "    centres_mm: [[11, 8, -10], [-11, 8, -10], [11, -8, -10], [-11, -8, -10]]\n"    // 11
+    "    axial_n_per_mm: 0.7\n"                                                         // 12
+    "    lateral_n_per_mm: 0.07\n";                                                     // 13
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::logic_error("test text lacks " + from);
+  return text.replace(at, from.size(), to);
+}
+
+std::string complaint(const std::string& text) {
+  try {
+    parse_sensor(text, "sensor.yaml");
+  } catch (const ConfigError& e) {
+    return e.what();
+  }
+  return "(accepted)";
+}
+
+TEST(SensorConfig, ReadsAFreshlyBuiltSensor) {
+  const SensorConfig s = parse_sensor(kGood, "sensor.yaml");
+  EXPECT_EQ(s.camera.width_px, 640);
+  EXPECT_EQ(s.camera.fy_px, 806.0);
+  EXPECT_FALSE(s.camera.mirrored);
+  EXPECT_DOUBLE_EQ(s.target.tag_size, 3.8e-3);  // m
+  ASSERT_EQ(s.target.tags.size(), 2u);
+  EXPECT_EQ(s.target.tags[1].id, 2);
+  EXPECT_FALSE(s.target.tags[1].platform_T_tag);
+  EXPECT_EQ(s.rest.frames, 30);
+  EXPECT_NEAR(s.wrench.K(2, 2), 2800.0, 1e-9);  // N/m, four springs of 0.7 N/mm
+  EXPECT_EQ(s.spacemouse.vendor, 0x256f);
+}
+
+TEST(SensorConfig, ReadsEveryOptionalKey) {
+  const SensorConfig s = parse_sensor(
+      replaced(
+          replaced(kGood, "{id: 5}",
+                   "{id: 5, position_mm: [1, 2, 3], rotation_rad: [0, 0, 1.5707963267948966]}"),
+          "fy: 806.0,", "fy: 806.0, distortion: [1, 2, 3, 4, 5], mirrored: true,") +
+          "  range_n: [1, 2, 3]\n"
+          "  range_nm: [0.01, 0.02, 0.03]\n"
+          "  origin_mm: [0, 0, 20]\n"
+          "  frame_rotation_rad: [0, 0, 1.5707963267948966]\n"
+          "mounting: {right: +y, toward_user: +x, down: -z}\n"
+          "shaping: {full_scale_n: [2, 2, 4], dead_zone_nm: [0.001, 0.001, 0.001]}\n"
+          "spacemouse: {id: '1209:00aB'}\n",
+      "sensor.yaml");
+  EXPECT_TRUE(s.camera.mirrored);
+  EXPECT_EQ(s.camera.distortion[4], 5.0);
+  ASSERT_TRUE(s.target.tags[0].platform_T_tag);
+  // The tag's x axis lies along platform y.
+  EXPECT_TRUE((*s.target.tags[0].platform_T_tag * Eigen::Vector3d(1e-3, 0, 0))
+                  .isApprox(Eigen::Vector3d(1e-3, 3e-3, 3e-3)));
+  EXPECT_EQ(s.wrench.range[5], 0.03);
+  EXPECT_DOUBLE_EQ(s.wrench.wrench_origin.z(), 0.02);
+  EXPECT_TRUE(s.wrench.camera_R_wrench_frame.col(0).isApprox(Eigen::Vector3d::UnitY()));
+  EXPECT_EQ(s.shaping.hid_R_camera(0, 1), 1.0);
+  EXPECT_EQ(s.shaping.full_scale[2], 4.0);
+  EXPECT_EQ(s.spacemouse.vendor, 0x1209);
+  EXPECT_EQ(s.spacemouse.product, 0x00ab);
+}
+
+struct BadCase {
+  const char* name;
+  const char* from;
+  const char* to;
+  const char* starts_with;
+  const char* contains;
+};
+
+class SensorConfigRefuses : public testing::TestWithParam<BadCase> {};
+
+TEST_P(SensorConfigRefuses, NamingKeyAndLine) {
+  const BadCase& bad = GetParam();
+  const std::string line = complaint(replaced(kGood, bad.from, bad.to));
+  EXPECT_EQ(line.rfind(bad.starts_with, 0), 0u) << line;
+  EXPECT_NE(line.find(bad.contains), std::string::npos) << line;
+  EXPECT_EQ(line.find('\n'), std::string::npos) << "one line: " << line;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, SensorConfigRefuses,
+    testing::Values(
+        BadCase{"UnknownKey", "fy: 806.0", "fy: 806.0, fz: 1",
+                "sensor.yaml:1: camera.fz:", "unknown key"},
+        BadCase{"UnknownTopLevelKey", "rest: ", "rets: ", "sensor.yaml:8: rets:", "unknown key"},
+        BadCase{"UnknownKeyInATag", "{id: 2}", "{id: 2, size: 3}",
+                "sensor.yaml:7: target.tags[1].size:", "unknown key"},
+        BadCase{"KeyTwice", "  tag_size_mm: 3.8", "  tag_size_mm: 3.8\n  tag_size_mm: 4",
+                "sensor.yaml:5: target.tag_size_mm:", "twice"},
+        BadCase{"WrongType", "width: 640", "width: wide",
+                "sensor.yaml:1: camera.width:", "whole number"},
+        BadCase{"WrongTypeMapping",
+                "{width: 640, height: 480, fx: 805.0, fy: 806.0, cx: 319.5, cy: 239.5}", "7",
+                "sensor.yaml:1: camera:", "mapping"},
+        BadCase{"MissingKey", "fx: 805.0, ", "", "sensor.yaml:1: camera.fx:", "missing"},
+        BadCase{"NoTags", "  tags:\n    - {id: 5}\n    - {id: 2}\n", "  tags: []\n",
+                "sensor.yaml:5: target.tags:", "at least one"},
+        BadCase{"MissingTags", "  tags:\n    - {id: 5}\n    - {id: 2}\n", "",
+                "sensor.yaml:3: target.tags:", "missing"},
+        BadCase{"TagTwice", "{id: 2}", "{id: 5}", "sensor.yaml:7: target.tags[1].id:", "twice"},
+        BadCase{"TagOutOfItsFamily", "{id: 2}", "{id: 1024}",
+                "sensor.yaml:7: target.tags[1].id:", "0 to 1023"},
+        BadCase{"HalfAPose", "{id: 2}", "{id: 2, position_mm: [0, 0, 0]}",
+                "sensor.yaml:7: target.tags[1].position_mm:", "together"},
+        BadCase{"UnknownFamily", "aruco_original", "aruco_9x9",
+                "sensor.yaml:3: target.family:", "use one of"},
+        BadCase{"NonPositiveSize", "tag_size_mm: 3.8", "tag_size_mm: 0",
+                "sensor.yaml:4: target.tag_size_mm:", "greater than 0"},
+        BadCase{"NaN", "tag_size_mm: 3.8", "tag_size_mm: .nan",
+                "sensor.yaml:4: target.tag_size_mm:", "finite"},
+        BadCase{"Infinity", "axial_n_per_mm: 0.7", "axial_n_per_mm: .inf",
+                "sensor.yaml:12: wrench.springs.axial_n_per_mm:", "finite"},
+        BadCase{"WrongShape", "[11, 8, -10], [-11, 8, -10]", "[11, 8], [-11, 8, -10]",
+                "sensor.yaml:11: wrench.springs.centres_mm:", "entry 1 must have 3"},
+        BadCase{"WrongDistortion", "cx: 319.5", "cx: 319.5, distortion: [0, 0]",
+                "sensor.yaml:1: camera.distortion:", "5 numbers, has 2"},
+        BadCase{"NoSpringsNoCalibration", "  springs:\n", "  strings:\n",
+                "sensor.yaml:10: wrench.calibration:", "either"},
+        BadCase{"NoSuchCalibration", "  springs:\n",
+                "  calibration: /nonexistent/c.json\n  strings:\n",
+                "/nonexistent/c.json:", "cannot be read"},
+        BadCase{"NotYaml", "{id: 2}", "{id: 2", "sensor.yaml:", "not YAML"},
+        BadCase{"EmptyWrench", "rest:    {frames: 30}", "rest:    {frames: 0}",
+                "sensor.yaml:8: rest.frames:", "1 to 1000"}),
+    [](const auto& param) { return std::string(param.param.name); });
+
+TEST(SensorConfig, RefusesALeftHandedMounting) {
+  const std::string line =
+      complaint(std::string(kGood) + "mounting: {right: +x, toward_user: +y, down: -z}\n");
+  EXPECT_EQ(line.rfind("sensor.yaml:14: mounting.right:", 0), 0u) << line;
+}
+
+TEST(SensorConfig, RefusesADeadZoneBeyondFullScale) {
+  const std::string line = complaint(std::string(kGood) + "shaping: {dead_zone_n: [5, 5, 5]}\n");
+  EXPECT_NE(line.find("shaping.dead_zone_n: must be smaller"), std::string::npos) << line;
+}
+
+TEST(SensorConfig, RefusesTheIdThatTheKernelKeepsForRealDevices) {
+  EXPECT_NE(complaint(std::string(kGood) + "spacemouse: {id: '046d:c626'}\n").find("hid-logitech"),
+            std::string::npos);
+  EXPECT_NE(complaint(std::string(kGood) + "spacemouse: {id: '46d:c626'}\n").find("hexadecimal"),
+            std::string::npos);
+}
+
+TEST(SensorConfig, NamesAFileThatCannotBeRead) {
+  try {
+    load_sensor("/nonexistent/sensor.yaml");
+    FAIL();
+  } catch (const ConfigError& e) {
+    EXPECT_EQ(std::string(e.what()).rfind("/nonexistent/sensor.yaml: cannot be read", 0), 0u)
+        << e.what();
+  }
+}
+
+}  // namespace
+}  // namespace tagwrench

@@ -1,0 +1,94 @@
+#include "host/wrench/estimate.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <limits>
+
+namespace tagwrench {
+namespace {
+
+Vector6 v6(double a, double b, double c, double d, double e, double f) {
+  return (Vector6() << a, b, c, d, e, f).finished();
+}
+
+Track ok_track(const Vector6& displacement) {
+  Track t;
+  t.status = Status::ok;
+  t.displacement = displacement;
+  t.covariance = v6(1e-12, 1e-12, 16e-12, 1e-8, 1e-8, 1e-8).asDiagonal();
+  return t;
+}
+
+WrenchModel diagonal_model() {
+  WrenchModel m;
+  m.K = v6(280, 280, 2800, 0.2, 0.3, 0.05).asDiagonal();
+  m.B = v6(0.01, 0, 0, 0, 0, 0);
+  m.range = v6(1, 1, 5, 0.05, 0.05, 0.05);
+  return m;
+}
+
+TEST(WrenchEstimate, IsAffineInTheDisplacement) {
+  Sample s;
+  WrenchEstimator(diagonal_model()).estimate(ok_track(v6(1e-3, 0, -1e-3, 0.01, 0, 0.02)), s);
+  EXPECT_EQ(s.status, Status::ok);
+  EXPECT_TRUE(s.wrench.isApprox(v6(0.29, 0, -2.8, 0.002, 0, 0.001), 1e-12));
+}
+
+TEST(WrenchEstimate, SigmaIsTheDisplacementSigmaTimesStiffness) {
+  Sample s;
+  WrenchEstimator(diagonal_model()).estimate(ok_track(Vector6::Zero()), s);
+  EXPECT_NEAR(s.wrench_sigma[2], 2800 * 4e-6, 1e-12);  // N
+  EXPECT_NEAR(s.displacement_sigma[2], 4e-6, 1e-15);   // m
+}
+
+TEST(WrenchEstimate, BeyondTheRangeIsSaturatedAndStillCarriesNumbers) {
+  Sample s;
+  WrenchEstimator(diagonal_model()).estimate(ok_track(v6(4e-3, 0, 0, 0, 0, 0)), s);
+  EXPECT_EQ(s.status, Status::saturated);
+  EXPECT_NEAR(s.wrench[0], 1.13, 1e-12);
+}
+
+TEST(WrenchEstimate, OnlyOkTracksCarryNumbers) {
+  for (Status status : {Status::acquiring, Status::lost, Status::doubtful}) {
+    Track t = ok_track(v6(1e-3, 1e-3, 1e-3, 0.1, 0.1, 0.1));
+    t.status = status;
+    Sample s;
+    WrenchEstimator(diagonal_model()).estimate(t, s);
+    EXPECT_EQ(s.status, status);
+    EXPECT_EQ(s.wrench, Vector6::Zero().eval());
+    EXPECT_EQ(s.displacement, Vector6::Zero().eval());
+  }
+}
+
+TEST(WrenchEstimate, ANumberThatIsNotFiniteIsDoubtfulAndZero) {
+  Sample s;
+  WrenchEstimator(diagonal_model())
+      .estimate(ok_track(v6(std::numeric_limits<double>::quiet_NaN(), 0, 0, 0, 0, 0)), s);
+  EXPECT_EQ(s.status, Status::doubtful);
+  EXPECT_EQ(s.wrench, Vector6::Zero().eval());
+}
+
+TEST(WrenchEstimate, MovingTheOriginToWhereAForceActsRemovesItsMoment) {
+  // A force along x acting 20 mm below (camera +z) the origin has the moment z * Fx about y.
+  WrenchModel m;
+  m.K.setIdentity();
+  m.wrench_origin = {0, 0, 0.020};
+  Sample s;
+  WrenchEstimator(m).estimate(ok_track(v6(1, 0, 0, 0, 0.020, 0)), s);
+  EXPECT_TRUE(s.wrench.isApprox(v6(1, 0, 0, 0, 0, 0), 1e-12));
+}
+
+TEST(WrenchEstimate, TurningTheFrameTurnsForceAndTorqueAlike) {
+  WrenchModel m;
+  m.K.setIdentity();
+  m.camera_R_wrench_frame =
+      Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  Sample s;
+  // The frame's x axis is the camera's y axis, so a push along camera y is a push along frame x.
+  WrenchEstimator(m).estimate(ok_track(v6(0, 1, 0, 0, 2, 0)), s);
+  EXPECT_TRUE(s.wrench.isApprox(v6(1, 0, 0, 2, 0, 0), 1e-12));
+}
+
+}  // namespace
+}  // namespace tagwrench
