@@ -1,4 +1,5 @@
-// The verbs. Exit status: 0 done, 1 failed while running, 2 wrong usage or a configuration that cannot be used.
+// The verbs. Exit status: 0 done, 1 failed while running, 2 wrong usage or a configuration that
+// cannot be used.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -34,7 +35,9 @@ constexpr const char* kOutputs =
     "Without it: terminal, and every device that this machine allows";
 
 int dispatch(int argc, char** argv) {
-  CLI::App app{"tagwrench: a camera under a spring platform as a 6-axis force-torque sensor and 6-DOF input device"};
+  CLI::App app{
+      "tagwrench: a camera under a spring platform as a 6-axis force-torque sensor and 6-DOF input "
+      "device"};
   app.require_subcommand(1);
   app.set_version_flag("--version", TAGWRENCH_VERSION);
 
@@ -44,18 +47,24 @@ int dispatch(int argc, char** argv) {
   run->add_option("--source", run_options.source, kSources);
   run->add_option("--output", run_options.outputs, kOutputs);
   run->add_option("--frames", run_options.frames, "end after N frames")->check(CLI::PositiveNumber);
-  run->add_option("--seconds", run_options.seconds, "end after S seconds")->check(CLI::PositiveNumber);
-  run->add_flag("--fast", run_options.fast, "sources that are not live run as fast as they can, no frame dropped");
+  run->add_option("--seconds", run_options.seconds, "end after S seconds")
+      ->check(CLI::PositiveNumber);
+  run->add_flag("--fast", run_options.fast,
+                "sources that are not live run as fast as they can, no frame dropped");
 
   std::string scenario;
   std::string folder;
   int frames = 0;
-  CLI::App* sim = app.add_subcommand("sim", "render the simulated sensor to a folder: frames, truth, sensor.yaml");
+  CLI::App* sim = app.add_subcommand(
+      "sim", "render the simulated sensor to a folder: frames, truth, sensor.yaml");
   sim->add_option("--scenario", scenario, "scenario YAML; without it the default scenario");
   sim->add_option("--out", folder, "folder to write")->required();
-  sim->add_option("--frames", frames, "number of frames")->required()->check(CLI::Range(1, 10'000'000));
+  sim->add_option("--frames", frames, "number of frames")
+      ->required()
+      ->check(CLI::Range(1, 10'000'000));
 
-  CLI::App* doctor = app.add_subcommand("doctor", "say line by line what works here and what to do about the rest");
+  CLI::App* doctor = app.add_subcommand(
+      "doctor", "say line by line what works here and what to do about the rest");
 
   try {
     app.parse(argc, argv);
@@ -78,7 +87,8 @@ int dispatch(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  cv::setNumThreads(1);  // one thread, one poll loop; and a fork must find a single-threaded process
+  cv::setNumThreads(
+      1);  // one thread, one poll loop; and a fork must find a single-threaded process
   try {
     return dispatch(argc, argv);
   } catch (const tagwrench::ConfigError& e) {

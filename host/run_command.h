@@ -1,4 +1,5 @@
-// `tagwrench run`: from what the user asked for to the objects of the data path, and the run itself.
+// `tagwrench run`: from what the user asked for to the objects of the data path, and the run
+// itself.
 #pragma once
 
 #include <optional>
@@ -8,9 +9,10 @@
 namespace tagwrench {
 
 struct RunOptions {
-  std::string sensor;                ///< path; empty: what the source suggests
-  std::string source;                ///< SRC; empty: a camera that sees the tags, else the simulated sensor
-  std::vector<std::string> outputs;  ///< OUT; empty: terminal and every device that can be made here
+  std::string sensor;  ///< path; empty: what the source suggests
+  std::string source;  ///< SRC; empty: a camera that sees the tags, else the simulated sensor
+  std::vector<std::string>
+      outputs;  ///< OUT; empty: terminal and every device that can be made here
   std::optional<long> frames;
   std::optional<double> seconds;
   bool fast = false;
