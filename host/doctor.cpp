@@ -1,0 +1,261 @@
+#include "host/doctor.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <grp.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <ostream>
+
+#include "host/os/unique_fd.h"
+#include "host/source/v4l2_nodes.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Mark : std::uint8_t { ok, absent, missing };
+
+class Report {
+ public:
+  explicit Report(std::ostream& out) : out_(out) {}
+  void line(Mark mark, std::string_view text) {
+    static constexpr std::array<std::string_view, 3> kMarks = {"ok", "--", "!!"};
+    out_ << kMarks[static_cast<std::size_t>(mark)] << "  " << text << '\n';
+  }
+
+ private:
+  std::ostream& out_;
+};
+
+std::string read_file(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+bool present(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error);
+}
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+void say_machine(Report& report) {
+  utsname system{};
+  ::uname(&system);
+  std::string session = environment("XDG_SESSION_TYPE");
+  if (session.empty()) {
+    session = !environment("WAYLAND_DISPLAY").empty() ? "wayland"
+              : !environment("DISPLAY").empty()       ? "x11"
+                                                      : "no desktop";
+  }
+  report.line(Mark::ok, fmt::format("tagwrench {}, {} {}, session: {}", TAGWRENCH_VERSION,
+                                    system.sysname, system.release, session));
+}
+
+void say_groups(Report& report) {
+  std::array<gid_t, 256> groups{};
+  int count = ::getgroups(static_cast<int>(groups.size()), groups.data());
+  if (count <= 0) {
+    groups[0] = ::getgid();
+    count = 1;
+  }
+  std::string text;
+  for (int i = 0; i < count; ++i) {
+    const group* entry = ::getgrgid(groups[static_cast<std::size_t>(i)]);
+    if (entry) text += fmt::format("{}{}", text.empty() ? "" : " ", entry->gr_name);
+  }
+  report.line(Mark::ok,
+              fmt::format("user id {}, groups: {}", ::getuid(), text.empty() ? "none" : text));
+}
+
+void say_cameras(Report& report) {
+  const auto nodes = list_camera_nodes();
+  bool any = false;
+  for (const CameraNode& node : nodes) {
+    if (node.error == EACCES || node.error == EPERM) {
+      report.line(Mark::missing,
+                  fmt::format("camera {}: no permission; sudo usermod -aG video $USER, then log in "
+                              "again",
+                              node.path));
+    } else if (node.captures) {
+      any = true;
+      report.line(Mark::ok, fmt::format("camera {}: {} ({}); modes: {}; can be locked: {}",
+                                        node.path, node.card, node.driver, describe(node.modes, 6),
+                                        node.controls.empty() ? "nothing" : node.controls));
+    } else if (node.error != 0) {
+      report.line(Mark::absent, fmt::format("camera {}: does not answer: {}", node.path,
+                                            std::strerror(node.error)));
+    } else {
+      report.line(Mark::absent, fmt::format("camera {}: {} ({}) cannot capture", node.path,
+                                            node.card, node.driver));
+    }
+  }
+  if (!any) {
+    report.line(
+        Mark::absent,
+        "no camera that can be used: plug one in, or use --source sim (the simulated sensor)");
+  }
+}
+
+/// Whether a virtual device can be made through this node.
+bool say_device_node(Report& report, const char* path, const char* module, const char* use) {
+  const UniqueFd fd(::open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC));
+  if (fd) {
+    report.line(Mark::ok, fmt::format("{} can be opened ({})", path, use));
+    return true;
+  }
+  const int error = errno;
+  // The node may be a promise of a module that opening it would load.
+  if (error == ENOENT || error == ENODEV || error == ENXIO) {
+    const bool loaded = present(fs::path("/sys/module") / module);
+    report.line(Mark::missing,
+                fmt::format("{}: {}; needed for {}: sudo modprobe {}", path,
+                            loaded ? "the module is loaded but there is no device node"
+                                   : "the module is not loaded",
+                            use, module));
+  } else if (error == EACCES || error == EPERM) {
+    report.line(Mark::missing,
+                fmt::format("{}: no permission; needed for {}: install 70-tagwrench.rules (next "
+                            "line), or run with sudo",
+                            path, use));
+  } else {
+    report.line(Mark::missing, fmt::format("{}: cannot be opened: {}; needed for {}", path,
+                                           std::strerror(error), use));
+  }
+  return false;
+}
+
+void say_udev_rule(Report& report) {
+  for (const char* folder : {"/etc/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"}) {
+    const fs::path rule = fs::path(folder) / "70-tagwrench.rules";
+    if (!present(rule)) continue;
+    report.line(Mark::ok, fmt::format("udev rule {}", rule.string()));
+    return;
+  }
+  report.line(::getuid() == 0 ? Mark::absent : Mark::missing,
+              "no udev rule, so only root can make devices: copy 70-tagwrench.rules to "
+              "/etc/udev/rules.d, then sudo udevadm control --reload && sudo udevadm trigger");
+}
+
+std::optional<int> pid_of(std::string_view name) {
+  std::error_code error;
+  fs::directory_iterator it("/proc", error);
+  for (; !error && it != fs::directory_iterator(); it.increment(error)) {
+    const std::string folder = it->path().filename().string();
+    int pid = 0;
+    const auto [end, bad] = std::from_chars(folder.data(), folder.data() + folder.size(), pid);
+    if (bad != std::errc{} || end != folder.data() + folder.size()) continue;
+    if (read_file(it->path() / "comm") == std::string(name) + "\n") return pid;
+  }
+  return std::nullopt;
+}
+
+void say_spacenavd(Report& report) {
+  const auto pid = pid_of("spacenavd");
+  const bool socket = present("/var/run/spnav.sock");
+  if (pid && socket) {
+    report.line(Mark::ok, fmt::format("spacenavd runs (pid {}), socket /var/run/spnav.sock", *pid));
+  } else if (pid) {
+    report.line(Mark::missing,
+                fmt::format("spacenavd runs (pid {}) without /var/run/spnav.sock: sudo systemctl "
+                            "restart spacenavd",
+                            *pid));
+  } else {
+    report.line(
+        Mark::absent,
+        fmt::format("spacenavd does not run{}; Blender, FreeCAD and others need it: sudo apt "
+                    "install spacenavd",
+                    socket ? " (a left-over /var/run/spnav.sock is there)" : ""));
+  }
+}
+
+void say_other_devices(Report& report) {
+  const auto devices = other_6dof_devices(read_file("/proc/bus/input/devices"));
+  if (devices.empty()) report.line(Mark::ok, "no other 6-DOF device competes for spacenavd");
+  for (const InputDevice& device : devices) {
+    report.line(Mark::missing,
+                fmt::format("{} ({:04x}:{:04x}): spacenavd serves one device, the one plugged in "
+                            "last; start tagwrench after it, or unplug it",
+                            device.name, device.vendor, device.product));
+  }
+}
+
+std::string printable(std::string_view text) {
+  std::string out(text.substr(0, 80));
+  std::replace_if(
+      out.begin(), out.end(), [](unsigned char c) { return c < ' ' || c == 127; }, '?');
+  return out;
+}
+
+unsigned hex_after(std::string_view line, std::string_view key) {
+  const auto at = line.find(key);
+  unsigned value = 0;
+  if (at == std::string_view::npos) return 0;
+  const char* begin = line.data() + at + key.size();
+  const auto [end, error] = std::from_chars(begin, line.data() + line.size(), value, 16);
+  return error == std::errc{} && end != begin ? value : 0;
+}
+
+bool is_6dof(const InputDevice& device) {
+  // The Logitech-branded ones, from spacenavd's table.
+  constexpr std::array<unsigned, 10> kLogitech = {0xc603, 0xc605, 0xc606, 0xc621, 0xc623,
+                                                  0xc625, 0xc626, 0xc627, 0xc628, 0xc62b};
+  if (device.name.find("tagwrench") != std::string::npos) return false;
+  return device.vendor == 0x256f || device.name.find("3Dconnexion") != std::string::npos ||
+         (device.vendor == 0x046d &&
+          std::find(kLogitech.begin(), kLogitech.end(), device.product) != kLogitech.end());
+}
+
+}  // namespace
+
+std::vector<InputDevice> other_6dof_devices(std::string_view text) {
+  std::vector<InputDevice> found;
+  InputDevice device;
+  while (!text.empty()) {
+    const auto end = text.find('\n');
+    const std::string_view line = text.substr(0, end);
+    text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 1);
+    if (line.starts_with("I:")) {
+      device = {{}, hex_after(line, "Vendor="), hex_after(line, "Product=")};
+    } else if (line.starts_with("N: Name=")) {
+      std::string_view name = line.substr(8);
+      if (name.starts_with('"')) name.remove_prefix(1);
+      if (name.ends_with('"')) name.remove_suffix(1);
+      device.name = printable(name);
+      if (is_6dof(device)) found.push_back(device);
+    }
+  }
+  return found;
+}
+
+int run_doctor(std::ostream& out) {
+  Report report(out);
+  say_machine(report);
+  say_groups(report);
+  say_cameras(report);
+  const bool uhid =
+      say_device_node(report, "/dev/uhid", "uhid", "the outputs spacemouse and wrench");
+  const bool uinput = say_device_node(report, "/dev/uinput", "uinput", "the output joystick");
+  say_udev_rule(report);
+  say_spacenavd(report);
+  say_other_devices(report);
+  return uhid && uinput ? 0 : 1;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,208 @@
+#include "host/source/images.h"
+
+#include <fmt/format.h>
+#include <sys/timerfd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+
+#include "host/config_error.h"
+#include "host/source/decode.h"
+#include "host/source/frame_times.h"
+#include "host/source/image_header.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+constexpr Duration kDefaultPeriod = 40ms;
+constexpr std::size_t kHeaderBytes = 256 * 1024;  ///< a JPEG may carry a thumbnail before its size
+constexpr std::streamoff kMaxFileBytes = 512LL << 20;
+
+bool is_picture(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".png" || extension == ".pgm" || extension == ".jpg" || extension == ".jpeg";
+}
+
+std::vector<std::string> picture_names(const std::string& dir) {
+  std::error_code error;
+  if (!fs::is_directory(dir, error)) {
+    throw ConfigError(
+        fmt::format("images:{}: no such folder; give one that holds PNG, PGM or JPEG files", dir));
+  }
+  std::vector<std::string> names;
+  fs::directory_iterator it(dir, error);
+  for (; !error && it != fs::directory_iterator(); it.increment(error)) {
+    if (is_picture(it->path())) names.push_back(it->path().filename().string());
+  }
+  if (error) {
+    throw ConfigError(
+        fmt::format("images:{}: cannot be read: {}; check its permissions", dir, error.message()));
+  }
+  if (names.empty()) {
+    throw ConfigError(
+        fmt::format("images:{}: holds no PNG, PGM or JPEG file; give another folder", dir));
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+ImageSize size_of(const std::string& path, std::vector<char>& scratch) {
+  std::ifstream file(path, std::ios::binary);
+  scratch.resize(kHeaderBytes);
+  file.read(scratch.data(), static_cast<std::streamsize>(scratch.size()));
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(scratch.data());
+  const auto size = image_size({bytes, static_cast<std::size_t>(file.gcount())});
+  if (!size) {
+    throw ConfigError(fmt::format(
+        "{}: is not a readable PNG, PGM or JPEG file; remove it or record it again", path));
+  }
+  return *size;
+}
+
+ImageSize common_size(const std::vector<std::string>& paths) {
+  std::vector<char> scratch;
+  const ImageSize first = size_of(paths.front(), scratch);
+  for (const std::string& path : paths) {
+    const ImageSize size = size_of(path, scratch);
+    if (size == first) continue;
+    throw ConfigError(fmt::format(
+        "{}: is {}x{}, but {} is {}x{}; a folder must hold pictures of one camera and size", path,
+        size.width, size.height, paths.front(), first.width, first.height));
+  }
+  return first;
+}
+
+std::vector<Duration> frame_times(const std::string& dir, const std::vector<std::string>& names) {
+  const fs::path path = fs::path(dir) / "frames.csv";
+  std::error_code error;
+  if (fs::exists(path, error)) {
+    std::ifstream file(path, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    if (!file) {
+      throw ConfigError(fmt::format("{}: cannot be read; check its permissions", path.string()));
+    }
+    return parse_frame_times(text, path.string(), names);
+  }
+  std::vector<Duration> times(names.size());
+  for (std::size_t i = 0; i < times.size(); ++i) times[i] = static_cast<int>(i) * kDefaultPeriod;
+  return times;
+}
+
+}  // namespace
+
+struct ImagesSource::Picture {
+  std::vector<std::uint8_t> bytes;  ///< grows to the largest file and stays there
+  cv::Mat grey;
+  std::optional<Decoder>
+      jpeg;  ///< ours, because OpenCV fills the rest of a truncated JPEG and calls it good
+};
+
+ImagesSource::ImagesSource(const std::string& dir, bool fast)
+    : picture_(std::make_unique<Picture>()) {
+  const std::vector<std::string> names = picture_names(dir);
+  for (const std::string& name : names) paths_.push_back((fs::path(dir) / name).string());
+  const ImageSize size = common_size(paths_);
+  times_ = frame_times(dir, names);
+  format_.width = size.width;
+  format_.height = size.height;
+  format_.period = times_.size() < 2 ? kDefaultPeriod
+                                     : (times_.back() - times_.front()) /
+                                           static_cast<std::int64_t>(times_.size() - 1);
+  format_.description = fmt::format(
+      "{}: {} pictures, {}x{}, {:.4g} fps{}", dir, paths_.size(), size.width, size.height,
+      1e9 / static_cast<double>(format_.period.count()), fast ? ", as fast as they can go" : "");
+  if (fast) return;
+  timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  if (!timer_) {
+    throw ConfigError(fmt::format("images:{}: no more file descriptors; raise ulimit -n", dir));
+  }
+  arm();
+}
+
+ImagesSource::~ImagesSource() = default;
+
+void ImagesSource::arm() const noexcept {
+  if (!timer_) return;
+  // At once for the first frame, which starts the clock, and for the end.
+  const bool wait = next_ > 0 && next_ < paths_.size();
+  const Duration at = wait ? due(next_).time_since_epoch() : Duration(1);
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(at);
+  itimerspec times{};
+  times.it_value = {static_cast<time_t>(seconds.count()),
+                    static_cast<long>((at - seconds).count())};
+  ::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &times, nullptr);
+}
+
+ReadStatus ImagesSource::read(Frame& frame) noexcept {
+  if (next_ >= paths_.size()) return ReadStatus::end;
+  if (timer_) {
+    const TimePoint now = std::chrono::steady_clock::now();
+    if (next_ == 0) start_ = now;
+    if (now < due(next_)) {
+      arm();
+      return ReadStatus::nothing;
+    }
+    while (next_ + 1 < paths_.size() && due(next_ + 1) <= now) ++next_;
+  }
+  const std::size_t index = next_++;
+  arm();
+  const TimePoint handed_over = std::chrono::steady_clock::now();
+  ImageView image;
+  if (!load(paths_[index], image)) {
+    ++corrupt_;
+    return ReadStatus::nothing;
+  }
+  frame.image = image;
+  frame.capture_time = TimePoint(times_[index]);
+  frame.latency_origin = handed_over;
+  frame.sequence = index;
+  frame.dropped = static_cast<std::uint32_t>(index - delivered_);
+  delivered_ = index + 1;
+  return ReadStatus::frame;
+}
+
+bool ImagesSource::load(const std::string& path, ImageView& image) noexcept {
+  try {
+    std::ifstream file(path, std::ios::binary | std::ios::ate);
+    const std::streamoff length = file.tellg();
+    if (length <= 0 || length > kMaxFileBytes) return false;
+    auto& bytes = picture_->bytes;
+    bytes.resize(static_cast<std::size_t>(length));
+    file.seekg(0);
+    if (!file.read(reinterpret_cast<char*>(bytes.data()), length)) return false;
+    // Asked again, so that a file that has changed cannot make a decoder allocate without bound.
+    if (image_size(bytes) != ImageSize{format_.width, format_.height}) return false;
+    if (bytes[0] == 0xFF) {
+      if (!picture_->jpeg) {
+        picture_->jpeg.emplace(PixelFormat::mjpg, format_.width, format_.height, 0);
+      }
+      return picture_->jpeg->decode(bytes, bytes.size(), image);
+    }
+    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data());
+    cv::Mat& grey = picture_->grey;
+    // Not into the old picture: OpenCV leaves that in place when it fails.
+    grey = cv::imdecode(encoded, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    if (grey.cols != format_.width || grey.rows != format_.height || grey.type() != CV_8UC1) {
+      return false;
+    }
+    image = {grey.data, grey.cols, grey.rows, static_cast<int>(grey.step)};
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+}  // namespace tagwrench

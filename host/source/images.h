@@ -1,0 +1,48 @@
+// A folder of pictures as a camera: PNG, PGM and JPEG in the order of their names.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host/os/unique_fd.h"
+#include "host/source/frame_source.h"
+
+namespace tagwrench {
+
+class ImagesSource final : public FrameSource {
+ public:
+  /// Times come from DIR/frames.csv where there is one, else 25 frames a second. `fast`: every
+  /// frame is delivered, as fast as read() is called; else the recorded times pace it, beginning at
+  /// the first read(), and a loop that is late loses frames. Throws ConfigError: no folder, no
+  /// pictures, an unreadable header, sizes that differ, a bad frames.csv.
+  ImagesSource(const std::string& dir, bool fast);
+  ~ImagesSource() override;
+
+  const SourceFormat& format() const noexcept override { return format_; }
+  int poll_fd() const noexcept override { return timer_ ? timer_.get() : -1; }
+  ReadStatus read(Frame& frame) noexcept override;
+
+  /// Files that turned out corrupt; each is also in Frame::dropped of the next good one.
+  std::uint64_t corrupt_frames() const noexcept { return corrupt_; }
+
+ private:
+  struct Picture;  ///< keeps the picture library out of this header
+
+  TimePoint due(std::size_t index) const noexcept { return start_ + (times_[index] - times_[0]); }
+  void arm() const noexcept;
+  bool load(const std::string& path, ImageView& image) noexcept;
+
+  std::vector<std::string> paths_;
+  std::vector<Duration> times_;
+  SourceFormat format_;
+  UniqueFd timer_;
+  std::unique_ptr<Picture> picture_;
+  TimePoint start_{};
+  std::size_t next_ = 0;
+  std::size_t delivered_ = 0;  ///< index after the last frame that was handed on
+  std::uint64_t corrupt_ = 0;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,190 @@
+#include "host/source/v4l2_controls.h"
+
+#include <linux/videodev2.h>
+#include <sys/ioctl.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <string_view>
+
+namespace tagwrench {
+namespace {
+
+enum class Kind : std::uint8_t {
+  before,      ///< set to `off` before settling
+  automatism,  ///< set to `off` when locking
+  value,       ///< kept where it stands when locking
+};
+
+struct Control {
+  std::uint32_t id;
+  Kind kind;
+  std::int32_t off;
+  std::string_view what;
+};
+
+// In the order of locking: an automatism before the value that it governs.
+constexpr std::array<Control, 14> kControls = {{
+    {V4L2_CID_EXPOSURE_AUTO_PRIORITY, Kind::before, 0, "dynamic frame rate"},
+    {V4L2_CID_EXPOSURE_AUTO, Kind::automatism, V4L2_EXPOSURE_MANUAL, "automatic exposure"},
+    {V4L2_CID_EXPOSURE_ABSOLUTE, Kind::value, 0, "exposure"},
+    {V4L2_CID_AUTOGAIN, Kind::automatism, 0, "automatic gain"},
+    {V4L2_CID_GAIN, Kind::value, 0, "gain"},
+    {V4L2_CID_AUTO_WHITE_BALANCE, Kind::automatism, 0, "automatic white balance"},
+    {V4L2_CID_WHITE_BALANCE_TEMPERATURE, Kind::value, 0, "white balance"},
+    {V4L2_CID_FOCUS_AUTO, Kind::automatism, 0, "automatic focus"},
+    {V4L2_CID_FOCUS_ABSOLUTE, Kind::value, 0, "focus"},
+    {V4L2_CID_AUTOBRIGHTNESS, Kind::automatism, 0, "automatic brightness"},
+    {V4L2_CID_BRIGHTNESS, Kind::value, 0, "brightness"},
+    {V4L2_CID_SHARPNESS, Kind::value, 0, "sharpness"},
+    {V4L2_CID_BACKLIGHT_COMPENSATION, Kind::value, 0, "backlight compensation"},
+    {V4L2_CID_POWER_LINE_FREQUENCY, Kind::value, 0, "power-line frequency"},
+}};
+constexpr std::int64_t kExposureUnit_us = 100;  ///< of V4L2_CID_EXPOSURE_ABSOLUTE
+
+bool control_ioctl(int fd, unsigned long request, void* argument) {
+  int result = 0;
+  do {
+    result = ::ioctl(fd, request, argument);
+  } while (result < 0 && errno == EINTR);
+  return result == 0;
+}
+
+std::int32_t within(const ControlRange& range, std::int64_t value) {
+  const std::int64_t step = std::max(1, range.step);
+  const std::int64_t low = range.minimum;
+  const std::int64_t high = std::max<std::int64_t>(low, range.maximum);
+  const std::int64_t clamped = std::clamp(value, low, high);
+  return static_cast<std::int32_t>(low + (clamped - low) / step * step);
+}
+
+}  // namespace
+
+std::optional<ControlRange> V4l2ControlPort::range(std::uint32_t id) {
+  v4l2_queryctrl query{};
+  query.id = id;
+  if (!control_ioctl(fd_, VIDIOC_QUERYCTRL, &query) || (query.flags & V4L2_CTRL_FLAG_DISABLED)) {
+    return std::nullopt;
+  }
+  return ControlRange{query.minimum, query.maximum, query.step,
+                      (query.flags & V4L2_CTRL_FLAG_READ_ONLY) == 0};
+}
+
+std::optional<std::int32_t> V4l2ControlPort::get(std::uint32_t id) {
+  v4l2_control control{};
+  control.id = id;
+  if (!control_ioctl(fd_, VIDIOC_G_CTRL, &control)) return std::nullopt;
+  return control.value;
+}
+
+bool V4l2ControlPort::set(std::uint32_t id, std::int32_t value) {
+  v4l2_control control{};
+  control.id = id;
+  control.value = value;
+  return control_ioctl(fd_, VIDIOC_S_CTRL, &control);
+}
+
+void ControlLock::remember(ControlPort& port) {
+  for (std::size_t i = 0; i < kControls.size(); ++i) {
+    const Control& control = kControls[i];
+    const auto range = port.range(control.id);
+    const auto now = range && range->writable ? port.get(control.id) : std::nullopt;
+    if (!now) {
+      absent_.push_back(i);
+      continue;
+    }
+    original_.push_back({i, *now});
+    if (control.kind == Kind::automatism && *now != control.off) needs_settling_ = true;
+    if (control.kind == Kind::before) apply(port, i, control.off);
+  }
+}
+
+void ControlLock::lock(ControlPort& port, int exposure_us) {
+  // Read all before anything stops: some cameras jump back to an old value when an automatism does.
+  std::vector<Setting> wanted;
+  for (const Setting& setting : original_) {
+    const Control& control = kControls[setting.index];
+    if (control.kind == Kind::automatism) wanted.push_back({setting.index, control.off});
+    if (control.kind != Kind::value) continue;
+    std::int32_t value = port.get(control.id).value_or(setting.value);
+    if (control.id == V4L2_CID_EXPOSURE_ABSOLUTE && exposure_us > 0) {
+      value = static_cast<std::int32_t>(exposure_us / kExposureUnit_us);
+    }
+    // With exposure held, the camera's own search for the mains frequency can only disturb.
+    if (control.id == V4L2_CID_POWER_LINE_FREQUENCY &&
+        value == V4L2_CID_POWER_LINE_FREQUENCY_AUTO) {
+      value = V4L2_CID_POWER_LINE_FREQUENCY_DISABLED;
+    }
+    wanted.push_back({setting.index, value});
+  }
+  for (const Setting& setting : wanted) apply(port, setting.index, setting.value);
+}
+
+void ControlLock::apply(ControlPort& port, std::size_t index, std::int32_t value) {
+  const Control& control = kControls[index];
+  const auto range = port.range(control.id);
+  const std::int32_t wanted = range ? within(*range, value) : value;
+  bool done = port.set(control.id, wanted);
+  std::int32_t final_value = wanted;
+  if (!done && control.id == V4L2_CID_EXPOSURE_AUTO) {
+    // A camera with an iris may offer "exposure manual, iris automatic" only.
+    final_value = V4L2_EXPOSURE_SHUTTER_PRIORITY;
+    done = port.set(control.id, final_value);
+  }
+  if (done) {
+    locked_.push_back({index, final_value});
+  } else {
+    refused_.push_back(index);
+  }
+}
+
+void ControlLock::relock(ControlPort& port) {
+  for (const Setting& setting : locked_) port.set(kControls[setting.index].id, setting.value);
+}
+
+void ControlLock::restore(ControlPort& port) {
+  for (const Kind kind : {Kind::value, Kind::automatism, Kind::before}) {
+    for (const Setting& setting : original_) {
+      const Control& control = kControls[setting.index];
+      if (control.kind == kind) port.set(control.id, setting.value);
+    }
+  }
+}
+
+std::string ControlLock::available(ControlPort& port) {
+  std::string text;
+  for (const Control& control : kControls) {
+    const auto range = port.range(control.id);
+    if (!range || !range->writable) continue;
+    text += text.empty() ? "" : ", ";
+    text += control.what;
+  }
+  return text;
+}
+
+std::string ControlLock::description() const {
+  const auto list = [](std::string_view title, const auto& items, auto index_of) {
+    std::string text;
+    for (const auto& item : items) {
+      text += text.empty() ? std::string(title) + " " : std::string(", ");
+      text += kControls[index_of(item)].what;
+    }
+    return text;
+  };
+  if (original_.empty()) return "it has no controls to lock";
+  std::vector<std::size_t>
+      missing;  // an automatism goes without saying where its value is not there either
+  for (const std::size_t index : absent_) {
+    if (kControls[index].kind != Kind::automatism) missing.push_back(index);
+  }
+  const auto itself = [](std::size_t index) { return index; };
+  std::string text = list("locked", locked_, [](const Setting& s) { return s.index; });
+  for (const std::string& part :
+       {list("refused", refused_, itself), list("without", missing, itself)}) {
+    if (!part.empty()) text += (text.empty() ? "" : "; ") + part;
+  }
+  return text;
+}
+
+}  // namespace tagwrench

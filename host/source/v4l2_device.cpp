@@ -1,0 +1,334 @@
+#include "host/source/v4l2_device.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <linux/videodev2.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+
+#include "host/config_error.h"
+#include "host/source/v4l2_controls.h"
+#include "host/source/v4l2_nodes.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr unsigned kBuffers = 4;  ///< one held by the reader, the rest for a loop that is late once
+constexpr unsigned kMinBuffers = 2;
+constexpr unsigned kMaxListed = 128;  ///< of anything a driver enumerates
+constexpr int kMaxSide = 16384;
+constexpr double kDefaultFps = 30;
+
+int device_ioctl(int fd, unsigned long request, void* argument) noexcept {
+  int result = 0;
+  do {
+    result = ::ioctl(fd, request, argument);
+  } while (result < 0 && errno == EINTR);
+  return result < 0 ? errno : 0;
+}
+
+template <std::size_t size>
+std::string text_of(const __u8 (&field)[size]) {
+  const auto* begin = reinterpret_cast<const char*>(field);
+  std::string text(begin, ::strnlen(begin, size));
+  // The name comes from the device: it must not be able to write on the terminal.
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 127; }, '?');
+  return text;
+}
+
+double rate_of(const v4l2_fract& interval) {
+  if (interval.numerator == 0 || interval.denominator == 0) return 0;
+  return static_cast<double>(interval.denominator) / interval.numerator;
+}
+
+/// Bounded, because a wild stamp must not overflow nanoseconds; the ledger judges whether it makes
+/// sense.
+TimePoint time_of(const timeval& stamp) {
+  const auto seconds = std::clamp<std::int64_t>(stamp.tv_sec, 0, 4'000'000'000);
+  const auto micros = std::clamp<std::int64_t>(stamp.tv_usec, 0, 999'999);
+  return TimePoint(std::chrono::seconds(seconds) + std::chrono::microseconds(micros));
+}
+
+int open_node(const std::string& path, UniqueFd& fd) {
+  fd.reset(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+  return fd ? 0 : errno;
+}
+
+int ask_capability(int fd, V4l2Capability& capability) {
+  v4l2_capability answer{};
+  if (const int error = device_ioctl(fd, VIDIOC_QUERYCAP, &answer)) return error;
+  const auto caps =
+      answer.capabilities & V4L2_CAP_DEVICE_CAPS ? answer.device_caps : answer.capabilities;
+  capability.card = text_of(answer.card);
+  capability.driver = text_of(answer.driver);
+  capability.captures = (caps & V4L2_CAP_VIDEO_CAPTURE) != 0 && (caps & V4L2_CAP_STREAMING) != 0;
+  return 0;
+}
+
+}  // namespace
+
+int query_capability(const std::string& path, V4l2Capability& capability) {
+  UniqueFd fd;
+  const int error = open_node(path, fd);
+  return error ? error : ask_capability(fd.get(), capability);
+}
+
+V4l2Device::V4l2Device(const std::string& path) : path_(path) {
+  if (const int error = open_node(path, fd_)) fail("open it", error);
+  if (ask_capability(fd_.get(), capability_) != 0) {
+    throw ConfigError(fmt::format("{}: is not a video device; {}", path, capture_nodes_text()));
+  }
+  if (!capability_.captures) {
+    throw ConfigError(
+        fmt::format("{}: {} ({}) cannot capture (a metadata or output node, or a loopback that "
+                    "nobody feeds); {}",
+                    path, capability_.card, capability_.driver, capture_nodes_text()));
+  }
+}
+
+std::unique_ptr<V4l2Device> V4l2Device::reopen(const std::string& path) {
+  std::unique_ptr<V4l2Device> device(new V4l2Device);
+  device->path_ = path;
+  if (const int error = open_node(path, device->fd_)) device->fail("open it", error);
+  return device;
+}
+
+V4l2Device::~V4l2Device() {
+  if (streaming_) {
+    int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    device_ioctl(fd_.get(), VIDIOC_STREAMOFF, &type);
+  }
+  for (const auto& mapping : mappings_) ::munmap(mapping.data(), mapping.size());
+}
+
+void V4l2Device::fail(const char* doing, int error) const {
+  switch (error) {
+    case ENOENT:
+    case ENODEV:
+    case ENXIO:
+    case ENOTDIR:
+      throw ConfigError(fmt::format("{}: no such camera; {}", path_, capture_nodes_text()));
+    case EACCES:
+    case EPERM:
+      throw ConfigError(
+          fmt::format("{}: no permission; join the group video: sudo usermod -aG video $USER, then "
+                      "log in again",
+                      path_));
+    case EBUSY: {
+      const std::string holders = holders_text(path_);
+      throw ConfigError(fmt::format(
+          "{}: the camera is busy, {}; close it there, or choose another", path_,
+          holders.empty() ? "held by a process that is not visible" : "held by " + holders));
+    }
+    default:
+      throw ConfigError(fmt::format("{}: cannot {}: {}; try another mode, or plug it in again",
+                                    path_, doing, std::strerror(error)));
+  }
+}
+
+std::vector<V4l2Mode> V4l2Device::modes(int wanted_width, int wanted_height) const {
+  std::vector<V4l2Mode> modes;
+  for (unsigned i = 0; i < kMaxListed; ++i) {
+    v4l2_fmtdesc format{};
+    format.index = i;
+    format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    if (device_ioctl(fd_.get(), VIDIOC_ENUM_FMT, &format)) break;
+    const auto pixels = pixel_format(format.pixelformat);
+    if (!pixels) continue;
+    V4l2Mode mode;
+    mode.pixels = *pixels;
+    mode.fourcc = format.pixelformat;
+    add_sizes(mode, wanted_width, wanted_height, modes);
+  }
+  return modes;
+}
+
+void V4l2Device::add_sizes(V4l2Mode mode, int wanted_width, int wanted_height,
+                           std::vector<V4l2Mode>& modes) const {
+  const auto add = [&](unsigned width, unsigned height) {
+    if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) return;
+    mode.width = static_cast<int>(width);
+    mode.height = static_cast<int>(height);
+    add_rates(mode, modes);
+  };
+  for (unsigned i = 0; i < kMaxListed; ++i) {
+    v4l2_frmsizeenum size{};
+    size.index = i;
+    size.pixel_format = mode.fourcc;
+    if (device_ioctl(fd_.get(), VIDIOC_ENUM_FRAMESIZES, &size)) {
+      if (i > 0) return;
+      // A driver that lists no sizes has the one that is set.
+      v4l2_format format{};
+      format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+      if (device_ioctl(fd_.get(), VIDIOC_G_FMT, &format) == 0 &&
+          format.fmt.pix.pixelformat == mode.fourcc) {
+        add(format.fmt.pix.width, format.fmt.pix.height);
+      }
+      return;
+    }
+    if (size.type == V4L2_FRMSIZE_TYPE_DISCRETE) {
+      add(size.discrete.width, size.discrete.height);
+      continue;
+    }
+    const auto& range = size.stepwise;
+    const auto fits = [](int value, unsigned low, unsigned high, unsigned step) {
+      const auto v = static_cast<unsigned>(value);
+      return value > 0 && v >= low && v <= high && (v - low) % std::max(1U, step) == 0;
+    };
+    if (fits(wanted_width, range.min_width, range.max_width, range.step_width) &&
+        fits(wanted_height, range.min_height, range.max_height, range.step_height)) {
+      add(static_cast<unsigned>(wanted_width), static_cast<unsigned>(wanted_height));
+    }
+    add(range.min_width, range.min_height);
+    add(range.max_width, range.max_height);
+    return;
+  }
+}
+
+void V4l2Device::add_rates(V4l2Mode mode, std::vector<V4l2Mode>& modes) const {
+  for (unsigned i = 0; i < kMaxListed; ++i) {
+    v4l2_frmivalenum interval{};
+    interval.index = i;
+    interval.pixel_format = mode.fourcc;
+    interval.width = static_cast<unsigned>(mode.width);
+    interval.height = static_cast<unsigned>(mode.height);
+    if (device_ioctl(fd_.get(), VIDIOC_ENUM_FRAMEINTERVALS, &interval)) {
+      if (i == 0) modes.push_back(mode);
+      return;
+    }
+    if (interval.type == V4L2_FRMIVAL_TYPE_DISCRETE) {
+      mode.fps_min = mode.fps_max = rate_of(interval.discrete);
+      modes.push_back(mode);
+      continue;
+    }
+    mode.fps_max = rate_of(interval.stepwise.min);
+    mode.fps_min = rate_of(interval.stepwise.max);
+    modes.push_back(mode);
+    return;
+  }
+}
+
+V4l2Stream V4l2Device::set_mode(const V4l2Choice& choice) {
+  const V4l2Mode& mode = choice.mode;
+  v4l2_format format{};
+  format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  format.fmt.pix.width = static_cast<unsigned>(mode.width);
+  format.fmt.pix.height = static_cast<unsigned>(mode.height);
+  format.fmt.pix.pixelformat = mode.fourcc;
+  format.fmt.pix.field = V4L2_FIELD_NONE;
+  if (const int error = device_ioctl(fd_.get(), VIDIOC_S_FMT, &format)) {
+    fail(("set " + describe(mode)).c_str(), error);
+  }
+  const v4l2_pix_format& got = format.fmt.pix;
+  if (got.width != static_cast<unsigned>(mode.width) ||
+      got.height != static_cast<unsigned>(mode.height) || got.pixelformat != mode.fourcc) {
+    throw ConfigError(
+        fmt::format("{}: the driver does not give {} although it lists it; choose "
+                    "another mode",
+                    path_, describe(mode)));
+  }
+  V4l2Stream stream;
+  stream.pixels = mode.pixels;
+  stream.width = mode.width;
+  stream.height = mode.height;
+  const int row = row_bytes(mode.pixels, mode.width);
+  const bool plausible = got.bytesperline >= static_cast<unsigned>(row) &&
+                         got.bytesperline <= static_cast<unsigned>(4 * kMaxSide);
+  stream.stride = row == 0 ? 0 : plausible ? static_cast<int>(got.bytesperline) : row;
+  stream.period = set_rate(choice.fps);
+  return stream;
+}
+
+Duration V4l2Device::set_rate(double fps) const {
+  v4l2_streamparm parameters{};
+  parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  if (fps > 0) {
+    parameters.parm.capture.timeperframe = {1000, static_cast<unsigned>(std::lround(fps * 1000))};
+    device_ioctl(fd_.get(), VIDIOC_S_PARM, &parameters);
+  }
+  // What the driver made of it counts; one that does not answer keeps its own rate.
+  if (device_ioctl(fd_.get(), VIDIOC_G_PARM, &parameters) == 0) {
+    const double answered = rate_of(parameters.parm.capture.timeperframe);
+    if (answered > 0) fps = answered;
+  }
+  if (!(fps > 0.01 && fps < 100000)) fps = kDefaultFps;
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(1 / fps));
+}
+
+void V4l2Device::start() {
+  v4l2_requestbuffers request{};
+  request.count = kBuffers;
+  request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  request.memory = V4L2_MEMORY_MMAP;
+  if (const int error = device_ioctl(fd_.get(), VIDIOC_REQBUFS, &request)) {
+    fail("get buffers", error);
+  }
+  if (request.count < kMinBuffers) fail("get buffers", ENOMEM);
+  for (unsigned i = 0; i < std::min(request.count, 2 * kBuffers); ++i) {
+    v4l2_buffer buffer{};
+    buffer.index = i;
+    buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    buffer.memory = V4L2_MEMORY_MMAP;
+    if (const int error = device_ioctl(fd_.get(), VIDIOC_QUERYBUF, &buffer)) {
+      fail("get buffers", error);
+    }
+    // Read-only would do, but some drivers map writable or not at all.
+    void* memory = ::mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, fd_.get(),
+                          buffer.m.offset);
+    if (memory == MAP_FAILED) fail("map buffers", errno);
+    mappings_.emplace_back(static_cast<std::uint8_t*>(memory), buffer.length);
+    // A child process must not keep the camera's memory alive.
+    ::madvise(memory, buffer.length, MADV_DONTFORK);
+    if (!requeue(i)) fail("queue buffers", errno);
+  }
+  int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  if (const int error = device_ioctl(fd_.get(), VIDIOC_STREAMON, &type)) fail("start it", error);
+  streaming_ = true;
+}
+
+V4l2Device::Dequeue V4l2Device::dequeue(V4l2Buffer& out, int& error) noexcept {
+  v4l2_buffer buffer{};
+  buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  buffer.memory = V4L2_MEMORY_MMAP;
+  error = device_ioctl(fd_.get(), VIDIOC_DQBUF, &buffer);
+  if (error == EAGAIN) return Dequeue::empty;
+  if (error == 0 && buffer.index >= mappings_.size()) error = EPROTO;
+  if (error != 0) return Dequeue::failed;
+  out.index = buffer.index;
+  out.bytes = mappings_[buffer.index];
+  out.bytes_used = buffer.bytesused;
+  out.damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0;
+  out.stamp.sequence = buffer.sequence;
+  out.stamp.driver_time = time_of(buffer.timestamp);
+  out.stamp.monotonic =
+      (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  out.stamp.dequeued = std::chrono::steady_clock::now();
+  return Dequeue::buffer;
+}
+
+bool V4l2Device::requeue(unsigned index) noexcept {
+  v4l2_buffer buffer{};
+  buffer.index = index;
+  buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  buffer.memory = V4L2_MEMORY_MMAP;
+  return device_ioctl(fd_.get(), VIDIOC_QBUF, &buffer) == 0;
+}
+
+bool V4l2Device::broken() const noexcept {
+  pollfd entry{fd_.get(), POLLIN, 0};
+  return ::poll(&entry, 1, 0) > 0 && (entry.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0;
+}
+
+std::string V4l2Device::lockable_controls() const {
+  V4l2ControlPort port(fd_.get());
+  return ControlLock::available(port);
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,274 @@
+#include "host/source/v4l2_source.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/epoll.h>
+#include <sys/timerfd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+
+#include "host/config_error.h"
+#include "host/source/v4l2_nodes.h"
+
+namespace tagwrench {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr Duration kRetryEvery = 500ms;
+constexpr Duration kReopenAfter = 2s;  ///< an open camera that gives no frame is opened afresh
+constexpr int kSettleFrames = 20;
+constexpr int kClockFrames =
+    3;  ///< enough to judge the driver's clock where nothing needs to settle
+constexpr Duration kSettleAtMost = 1500ms;
+
+int milliseconds_left(TimePoint until) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
+  return static_cast<int>(std::max<std::int64_t>(0, left));
+}
+
+timespec to_timespec(Duration time) {
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(time);
+  return {static_cast<time_t>(seconds.count()), static_cast<long>((time - seconds).count())};
+}
+
+V4l2Choice choose(const V4l2Device& device, const V4l2Options& options) {
+  const bool asked = options.width > 0;
+  const auto modes = device.modes(asked ? options.width : options.preferred_width,
+                                  asked ? options.height : options.preferred_height);
+  const auto choice = choose_mode(modes, options);
+  if (choice) return *choice;
+  if (modes.empty()) {
+    throw ConfigError(fmt::format(
+        "{}: {} offers no pixel format of GREY, YUYV, UYVY, NV12, MJPG; choose another camera, or "
+        "start what feeds it first",
+        options.path, device.capability().card));
+  }
+  std::string wish = asked ? fmt::format("{}x{}", options.width, options.height) : "such a mode";
+  if (options.fps > 0) wish += fmt::format("@{:.4g}", options.fps);
+  if (options.pixels) wish += fmt::format(" {}", name(*options.pixels));
+  throw ConfigError(fmt::format("{}: the camera does not have {}; it has {}", options.path, wish,
+                                describe(modes, 8)));
+}
+
+}  // namespace
+
+V4l2Source::V4l2Source(const V4l2Options& options)
+    : path_(options.path), stable_path_(stable_path(options.path)), ledger_(Duration{}) {
+  device_ = std::make_unique<V4l2Device>(path_);
+  choice_ = choose(*device_, options);
+  epoll_.reset(::epoll_create1(EPOLL_CLOEXEC));
+  timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  if (!epoll_ || !timer_) {
+    throw ConfigError(fmt::format("{}: no more file descriptors; raise ulimit -n", path_));
+  }
+  watch(timer_.get());
+  const V4l2Stream stream = device_->set_mode(choice_);
+  format_ = {stream.width, stream.height, stream.period, {}};
+  ledger_ = FrameLedger(stream.period);
+  decoder_.emplace(stream.pixels, stream.width, stream.height, stream.stride);
+  device_->start();
+  settle(options.exposure_us);
+  watch_camera();
+  ledger_.number_from_zero();
+  last_buffer_ = last_drain_ = Clock::now();
+  arm(stall_after(), Duration{});
+  const double fps = 1 / std::chrono::duration<double>(stream.period).count();
+  format_.description = fmt::format(
+      "{} ({}, {}): {}x{} {} at {:.4g} fps, {}; {}", path_, device_->capability().card,
+      device_->capability().driver, stream.width, stream.height, name(stream.pixels), fps,
+      ledger_.trusts_driver_clock() ? "kernel capture times"
+                                    : "times of dequeuing (the driver's are not usable)",
+      controls_.description());
+}
+
+V4l2Source::~V4l2Source() {
+  if (!device_) return;
+  V4l2ControlPort port(device_->fd());
+  controls_.restore(port);
+}
+
+void V4l2Source::watch(int fd) const {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.fd = fd;
+  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0) {
+    throw ConfigError(fmt::format("{}: cannot be waited for: {}; choose a capture device", path_,
+                                  std::strerror(errno)));
+  }
+}
+
+void V4l2Source::watch_camera() {
+  // v4l2loopback joins the waiting list only if no frame is ready at this moment, and else never
+  // wakes an epoll set.
+  constexpr int kTries = 16;
+  for (int tries = 0; tries < kTries; ++tries) {
+    V4l2Buffer buffer;
+    int error = 0;
+    while (device_->dequeue(buffer, error) == V4l2Device::Dequeue::buffer) {
+      ledger_.note(buffer.stamp, false);
+      if (!device_->requeue(buffer.index)) break;
+    }
+    watch(device_->fd());
+    pollfd entry{device_->fd(), POLLIN, 0};
+    if (::poll(&entry, 1, 0) <= 0 || tries + 1 == kTries) return;
+    ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, device_->fd(), nullptr);
+  }
+}
+
+void V4l2Source::arm(Duration after, Duration every) const noexcept {
+  const itimerspec times{to_timespec(every), to_timespec(after)};
+  ::timerfd_settime(timer_.get(), 0, &times, nullptr);
+}
+
+Duration V4l2Source::stall_after() const noexcept {
+  return std::max<Duration>(5 * format_.period, 500ms);
+}
+
+void V4l2Source::settle(int exposure_us) {
+  V4l2ControlPort port(device_->fd());
+  controls_.remember(port);
+  ledger_.stream_started();
+  const int frames = controls_.needs_settling() ? kSettleFrames : kClockFrames;
+  const TimePoint until = Clock::now() + kSettleAtMost;
+  for (int seen = 0; seen < frames && milliseconds_left(until) > 0;) {
+    V4l2Buffer buffer;
+    int error = 0;
+    const auto got = device_->dequeue(buffer, error);
+    if (got == V4l2Device::Dequeue::failed) break;
+    if (got == V4l2Device::Dequeue::buffer) {
+      if (ledger_.note(buffer.stamp, true)) ++seen;
+      device_->requeue(buffer.index);
+      continue;
+    }
+    pollfd entry{device_->fd(), POLLIN, 0};
+    if (::poll(&entry, 1, milliseconds_left(until)) > 0 && (entry.revents & POLLIN) == 0) break;
+  }
+  controls_.lock(port, exposure_us);
+}
+
+void V4l2Source::release_held() noexcept {
+  if (held_ && device_) device_->requeue(*held_);
+  held_.reset();
+}
+
+ReadStatus V4l2Source::read(Frame& frame) noexcept {
+  release_held();
+  if (state_ == State::away) return retry();
+  return drain(frame);
+}
+
+ReadStatus V4l2Source::drain(Frame& frame) noexcept {
+  std::optional<V4l2Buffer> newest;
+  const unsigned at_most =
+      2 * device_->buffer_count();  // a camera faster than this loop must not hold it
+  unsigned taken = 0;
+  while (taken < at_most) {
+    V4l2Buffer buffer;
+    int error = 0;
+    const auto got = device_->dequeue(buffer, error);
+    if (got == V4l2Device::Dequeue::empty) break;
+    if (got == V4l2Device::Dequeue::failed) return lose(std::strerror(error));
+    ++taken;
+    last_buffer_ = buffer.stamp.dequeued;
+    const bool usable = ledger_.note(buffer.stamp, false) && !buffer.damaged;
+    if (newest) device_->requeue(newest->index);
+    newest.reset();
+    if (usable) {
+      newest = buffer;
+    } else {
+      skipped_.corrupt += buffer.damaged ? 1 : 0;
+      device_->requeue(buffer.index);
+    }
+  }
+  if (taken > 0 && state_ == State::streaming) arm(stall_after(), Duration{});
+  if (newest) return deliver(*newest, taken, frame);
+  if (taken > 0) return ReadStatus::nothing;
+  if (device_->broken()) return lose("the driver reports an error");
+  const Duration patience = state_ == State::streaming ? stall_after() : kReopenAfter;
+  const Duration silent = Clock::now() - last_buffer_;
+  if (silent >= patience) return lose("no frame comes");
+  if (state_ == State::streaming) {
+    arm(patience - silent, Duration{});
+  } else {
+    arm(kRetryEvery, kRetryEvery);
+  }
+  return ReadStatus::nothing;
+}
+
+ReadStatus V4l2Source::deliver(const V4l2Buffer& newest, unsigned taken, Frame& frame) noexcept {
+  if (state_ == State::waiting) {
+    state_ = State::streaming;
+    device_->requeue(newest.index);
+    arm(stall_after(), Duration{});
+    last_drain_ = Clock::now();
+    detail_ = fmt::format("{}: the camera is back", stable_path_);
+    return ReadStatus::reconnected;
+  }
+  const TimePoint now = Clock::now();
+  const bool stale = ledger_.stale(now, last_drain_, taken >= device_->buffer_count());
+  last_drain_ = now;
+  ImageView image;
+  if (stale || !decoder_->decode(newest.bytes, newest.bytes_used, image)) {
+    ++(stale ? skipped_.stale : skipped_.corrupt);
+    device_->requeue(newest.index);
+    return ReadStatus::nothing;
+  }
+  if (decoder_->borrows()) {
+    held_ = newest.index;
+  } else {
+    device_->requeue(newest.index);
+  }
+  frame.image = image;
+  frame.capture_time = frame.latency_origin = ledger_.capture_time();
+  frame.sequence = ledger_.sequence();
+  frame.dropped = ledger_.take();
+  return ReadStatus::frame;
+}
+
+ReadStatus V4l2Source::lose(const char* why) noexcept {
+  const bool first = state_ == State::streaming;
+  if (first) {
+    detail_ =
+        fmt::format("{}: the camera stopped: {}; waiting for it at {}", path_, why, stable_path_);
+  }
+  state_ = State::away;
+  // Explicitly, because the registration would outlive close() wherever a child process shares the
+  // descriptor.
+  ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, device_->fd(), nullptr);
+  device_.reset();
+  arm(kRetryEvery, kRetryEvery);
+  return first ? ReadStatus::disconnected : ReadStatus::nothing;
+}
+
+void V4l2Source::open_device() {
+  auto device = V4l2Device::reopen(stable_path_);
+  const V4l2Stream stream = device->set_mode(choice_);
+  V4l2ControlPort port(device->fd());
+  controls_.relock(port);
+  device->start();
+  // The driver may pad its rows otherwise this time.
+  decoder_.emplace(stream.pixels, stream.width, stream.height, stream.stride);
+  ledger_.stream_started();
+  device_ = std::move(device);
+  watch_camera();
+}
+
+ReadStatus V4l2Source::retry() noexcept {
+  std::uint64_t ticks = 0;
+  if (::read(timer_.get(), &ticks, sizeof ticks) <= 0) return ReadStatus::nothing;
+  try {
+    open_device();
+    last_buffer_ = Clock::now();
+    state_ = State::waiting;
+  } catch (const std::exception&) {
+    device_.reset();
+    // Not there yet, or not in this mode: the next tick tries again.
+  }
+  return ReadStatus::nothing;
+}
+
+}  // namespace tagwrench

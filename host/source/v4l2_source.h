@@ -1,0 +1,81 @@
+// A live camera. The newest frame wins, whatever is automatic is locked, and a camera that goes
+// away is waited for.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "host/os/unique_fd.h"
+#include "host/source/frame_source.h"
+#include "host/source/v4l2_controls.h"
+#include "host/source/v4l2_device.h"
+#include "host/source/v4l2_ledger.h"
+#include "host/source/v4l2_mode.h"
+
+namespace tagwrench {
+
+/// What was skipped since the start; every such frame is also in Frame::dropped of the next good
+/// one.
+struct SkippedFrames {
+  std::uint64_t corrupt = 0;
+  std::uint64_t stale = 0;
+};
+
+class V4l2Source final : public FrameSource {
+ public:
+  /// Opens the camera, chooses the mode, and streams for up to 20 frames or 1.5 s so that automatic
+  /// exposure settles and the driver's clock shows what it is worth; then locks the controls.
+  /// Throws ConfigError.
+  explicit V4l2Source(const V4l2Options& options);
+  /// Stops the stream and puts every control back as it was.
+  ~V4l2Source() override;
+
+  const SourceFormat& format() const noexcept override { return format_; }
+  int poll_fd() const noexcept override { return epoll_.get(); }
+  /// While the camera is away this tries to open it twice a second, which may take the driver some
+  /// milliseconds.
+  ReadStatus read(Frame& frame) noexcept override;
+  std::string detail() const override { return detail_; }
+
+  const SkippedFrames& skipped() const noexcept { return skipped_; }
+
+ private:
+  enum class State : std::uint8_t {
+    streaming,
+    away,     ///< closed; tried again at every tick
+    waiting,  ///< open again, no frame yet
+  };
+
+  void open_device();
+  void settle(int exposure_us);
+  void watch(int fd) const;
+  void watch_camera();
+  void arm(Duration after, Duration every) const noexcept;
+  void release_held() noexcept;
+  ReadStatus drain(Frame& frame) noexcept;
+  ReadStatus deliver(const V4l2Buffer& newest, unsigned taken, Frame& frame) noexcept;
+  ReadStatus lose(const char* why) noexcept;
+  ReadStatus retry() noexcept;
+  Duration stall_after() const noexcept;
+
+  V4l2Choice choice_;
+  std::string path_;         ///< as the user named it
+  std::string stable_path_;  ///< where it is looked for when it was away
+  SourceFormat format_;
+  UniqueFd epoll_;
+  UniqueFd timer_;
+  std::unique_ptr<V4l2Device> device_;
+  std::optional<Decoder> decoder_;
+  FrameLedger ledger_;
+  ControlLock controls_;
+  std::optional<unsigned> held_;  ///< the buffer that the last Frame points into
+  State state_ = State::streaming;
+  TimePoint last_buffer_{};
+  TimePoint last_drain_{};
+  SkippedFrames skipped_;
+  std::string detail_;
+};
+
+}  // namespace tagwrench
