@@ -22,7 +22,7 @@
 #include "host/output/wrench_hid.h"
 #include "host/pipeline.h"
 #include "host/source/images.h"
-#include "host/source/simulator/sensor_description.h"
+#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/source/v4l2_source.h"
@@ -65,7 +65,7 @@ Input open_simulator(const RunOptions& options, const std::string& scenario_file
   Input input;
   input.sensor = sensor_or(
       options, [&] { return parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor"); });
-  input.source = std::make_unique<sim::SimulatorSource>(scenario, !options.fast);
+  input.source = std::make_unique<SimulatorSource>(scenario, !options.fast);
   return input;
 }
 
@@ -109,9 +109,10 @@ bool sees_tags(Input& input, Duration patience) {
 Input find_input(const RunOptions& options) {
   constexpr Duration kPatience = std::chrono::seconds(2);
   int cameras = 0;
-  for (const std::string& node : capture_nodes()) {
+  for (const CameraNode& node : list_camera_nodes()) {
+    if (!node.captures) continue;
     try {
-      Input input = open_camera(options, node);
+      Input input = open_camera(options, node.path);
       ++cameras;
       if (input.source->format().width == input.sensor.camera.width_px &&
           sees_tags(input, kPatience))
@@ -124,7 +125,9 @@ Input find_input(const RunOptions& options) {
                       "picks a camera)"
                     : "no camera sees the tags: showing the simulated sensor (--source "
                       "v4l2:/dev/videoN insists)");
-  return open_simulator({.fast = options.fast}, "");
+  RunOptions simulated = options;
+  simulated.sensor.clear();  // it describes the camera that is not there
+  return open_simulator(simulated, "");
 }
 
 Input open_input(const RunOptions& options) {
@@ -167,16 +170,16 @@ SpacemouseOptions spacemouse_options(const SensorConfig& sensor) {
 void add_device(Outputs& outputs, const std::string& kind, const SensorConfig& sensor) {
   if (kind == "spacemouse") {
     auto device = std::make_unique<SpacemouseOutput>(spacemouse_options(sensor));
-    device->append_dead_man(outputs.devices);
+    device->add_to(outputs.devices);
     if (const std::string advice = device->spacenavd_advice(); !advice.empty()) note(advice);
     outputs.all.push_back(std::move(device));
   } else if (kind == "wrench") {
     auto device = std::make_unique<WrenchHidOutput>(WrenchHidOptions{});
-    device->append_dead_man(outputs.devices);
+    device->add_to(outputs.devices);
     outputs.all.push_back(std::move(device));
   } else {
     auto device = std::make_unique<JoystickOutput>(JoystickOptions{});
-    device->append_dead_man(outputs.devices);
+    device->add_to(outputs.devices);
     outputs.all.push_back(std::move(device));
   }
 }
@@ -184,8 +187,9 @@ void add_device(Outputs& outputs, const std::string& kind, const SensorConfig& s
 std::unique_ptr<Output> terminal(const Input& input, bool stdout_taken) {
   TerminalOptions options;
   options.fd = stdout_taken ? STDERR_FILENO : STDOUT_FILENO;
-  options.full_scale = input.sensor.shaping.full_scale;
-  options.source_line = input.source->format().description;
+  const SensorConfig& sensor = input.sensor;
+  options.full_scale = sensor.wrench.range.cwiseMin(sensor.shaping.full_scale * 1.5);
+  options.source = input.source->format().description;
   return std::make_unique<TerminalOutput>(options);
 }
 

@@ -65,8 +65,16 @@ bool YamlReader::has(const std::string& key) {
 YAML::Node YamlReader::required(const std::string& key) {
   asked_.insert(key);
   const YAML::Node node = std::as_const(node_)[key];
-  if (!node) fail(key, "is missing; add it");
+  if (!node) fail(key, fmt::format("is missing; add it (keys here: {})", keys_here()));
   return node;
+}
+
+std::string YamlReader::keys_here() const {
+  std::string out;
+  for (const auto& entry : node_) {
+    if (entry.first.IsScalar()) out += (out.empty() ? "" : ", ") + entry.first.Scalar();
+  }
+  return out.empty() ? "none" : out;
 }
 
 YamlReader YamlReader::child(const std::string& key) {

@@ -64,6 +64,7 @@ class YamlReader {
   YAML::Node required(const std::string& key);
   double finite(const std::string& key, const YAML::Node& node) const;
   std::string full(const std::string& key) const;
+  std::string keys_here() const;
 
   YAML::Node node_;
   std::string file_;

@@ -97,7 +97,11 @@ TEST_F(BadInput, FramesOfAnotherSizeThanTheSensor) {
 }
 
 TEST_F(BadInput, SensorFileNamesKeyAndLine) {
-  expect_refused(run_sensor("family:", "familly:"), 2, {"edited.yaml:", "familly", "unknown key"});
+  expect_refused(run_sensor("border_mm:", "boarder_mm:"), 2,
+                 {"edited.yaml:", "target.boarder_mm", "unknown key"});
+  std::filesystem::remove_all(temporary_ / "frames");
+  expect_refused(run_sensor("family:", "familly:"), 2,
+                 {"edited.yaml:", "target.family", "missing", "familly"});
   std::filesystem::remove_all(temporary_ / "frames");
   expect_refused(run_sensor("tag_size_mm: 3.8", "tag_size_mm: -3.8"), 2,
                  {"edited.yaml:", "tag_size_mm", "greater than 0"});

@@ -38,7 +38,7 @@ class Bridge {
       throw std::runtime_error("pipe");
     out_.reset(out[0]);
     err_.reset(err[0]);
-    std::vector<std::string> all = {TAGWRENCH_PROGRAM};
+    std::vector<std::string> all(1, TAGWRENCH_PROGRAM);
     all.insert(all.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv;
     for (std::string& a : all) argv.push_back(a.data());

@@ -1,0 +1,189 @@
+// Every stage of the data path, timed side by side in one run: medians in microseconds, and ratios
+// to detecting the tags anew in every frame, which is what tag libraries do. No assertions: numbers
+// for people.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <turbojpeg.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <memory>
+#include <opencv2/core/utility.hpp>
+#include <vector>
+
+#include "host/config/sensor_config.h"
+#include "host/os/unique_fd.h"
+#include "host/output/hid_report.h"
+#include "host/source/decode.h"
+#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
+#include "host/tracker/acquire.h"
+#include "host/tracker/tracker.h"
+#include "host/wrench/estimate.h"
+#include "host/wrench/shaping.h"
+#include "tests/support/heap_count.h"
+
+namespace tagwrench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double median_us(std::vector<Duration> times) {
+  const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
+  std::nth_element(times.begin(), middle, times.end());
+  return static_cast<double>(middle->count()) / 1e3;
+}
+
+/// The median and the 99th percentile tell whether a stage is quick, and whether it stays quick.
+double percentile99_us(std::vector<Duration> times) {
+  std::sort(times.begin(), times.end());
+  return static_cast<double>(times[times.size() * 99 / 100].count()) / 1e3;
+}
+
+sim::Scenario scenario_of(int width, int height) {
+  sim::Scenario scenario;
+  const double scale = static_cast<double>(height) / scenario.camera.height_px;
+  scenario.camera.width_px = width;
+  scenario.camera.height_px = height;
+  scenario.camera.fx_px *= scale;
+  scenario.camera.fy_px *= scale;
+  scenario.camera.cx_px = (width - 1) / 2.0;
+  scenario.camera.cy_px = (height - 1) / 2.0;
+  return scenario;
+}
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// A grey picture as a camera would send it.
+Bytes encoded(const ImageView& grey, PixelFormat format) {
+  Bytes out;
+  if (format == PixelFormat::mjpg) {
+    const std::unique_ptr<void, int (*)(tjhandle)> jpeg(tjInitCompress(), tjDestroy);
+    Bytes yuv(static_cast<std::size_t>(grey.width) * grey.height * 2,
+              128);  // 4:2:2, as webcams send it
+    std::copy_n(grey.pixels, static_cast<std::size_t>(grey.width) * grey.height, yuv.begin());
+    unsigned char* buffer = nullptr;
+    unsigned long size = 0;
+    tjCompressFromYUV(jpeg.get(), yuv.data(), grey.width, 1, grey.height, TJSAMP_422, &buffer,
+                      &size, 85, 0);
+    out.assign(buffer, buffer + size);
+    tjFree(buffer);
+    return out;
+  }
+  const std::size_t pixels = static_cast<std::size_t>(grey.width) * grey.height;
+  if (format == PixelFormat::grey) return Bytes(grey.pixels, grey.pixels + pixels);
+  out.resize(pixels * 2, 128);
+  for (std::size_t i = 0; i < pixels; ++i) out[2 * i] = grey.pixels[i];
+  return out;
+}
+
+struct Clip {
+  SensorConfig sensor;
+  std::vector<Bytes> frames;
+  std::vector<TimePoint> times;
+  double render_us = 0;
+};
+
+Clip render(int width, int height, PixelFormat format, int count) {
+  const sim::Scenario scenario = scenario_of(width, height);
+  Clip clip;
+  clip.sensor = parse_sensor(sim::sensor_yaml(scenario), "bench");
+  SimulatorSource source(scenario, /*live=*/false);
+  std::vector<Duration> times;
+  for (int i = 0; i < count; ++i) {
+    Frame frame;
+    const TimePoint begin = Clock::now();
+    source.read(frame);
+    times.push_back(Clock::now() - begin);
+    clip.frames.push_back(encoded(frame.image, format));
+    clip.times.push_back(frame.capture_time);
+  }
+  clip.render_us = median_us(times);
+  return clip;
+}
+
+void bench(const char* title, int width, int height, PixelFormat format, int count) {
+  const Clip clip = render(width, height, format, count);
+  Decoder decoder(format, width, height, 0);
+  Acquirer acquirer(clip.sensor.camera, clip.sensor.target);
+  Tracker tracker(clip.sensor.camera, clip.sensor.target, clip.sensor.rest);
+  const WrenchEstimator estimator(clip.sensor.wrench);
+  const Shaping shaping(clip.sensor.shaping);
+  const UniqueFd device(::open("/dev/null", O_WRONLY | O_CLOEXEC));
+
+  std::vector<Duration> decode, acquire, track, wrench, report, write, total;
+  long allocations = 0;
+  int held = 0;
+  Counts6 last{};
+  for (std::size_t i = 0; i < clip.frames.size(); ++i) {
+    Frame frame;
+    frame.capture_time = frame.latency_origin = clip.times[i];
+    frame.sequence = i;
+    test::start_counting_allocations();
+    const TimePoint t0 = Clock::now();
+    if (!decoder.decode(clip.frames[i], clip.frames[i].size(), frame.image)) continue;
+    const TimePoint t1 = Clock::now();
+    const Track tracked = tracker.track(frame);
+    const TimePoint t2 = Clock::now();
+    Sample sample{
+        .sequence = i, .capture_time = frame.capture_time, .latency_origin = frame.latency_origin};
+    estimator.estimate(tracked, sample);
+    shaping.shape(sample);
+    const TimePoint t3 = Clock::now();
+    const Counts6 counts = dithered(to_counts(sample.motion, kSpacemouseLimit_counts), last);
+    last = counts;
+    const SpacemouseReport motion = spacemouse_report(counts);
+    const WrenchReport reading = wrench_report(sample);
+    const TimePoint t4 = Clock::now();
+    const ssize_t written = ::write(device.get(), motion.data(), motion.size()) +
+                            ::write(device.get(), reading.data(), reading.size());
+    const TimePoint t5 = Clock::now();
+    const long allocated = test::stop_counting_allocations();
+    if (tracked.status != Status::ok || written <= 0) continue;
+    ++held;
+    allocations += allocated;
+    decode.push_back(t1 - t0);
+    track.push_back(t2 - t1);
+    wrench.push_back(t3 - t2);
+    report.push_back(t4 - t3);
+    write.push_back(t5 - t4);
+    total.push_back(t5 - t0);
+    const TimePoint a = Clock::now();
+    acquirer.find(frame.image);
+    acquire.push_back(Clock::now() - a);
+  }
+  if (held == 0) {
+    fmt::print("{:<16} the target was never held\n", title);
+    return;
+  }
+  fmt::print(
+      "{:<16} {:>7.1f} {:>8.1f} {:>7.1f} {:>7.2f} {:>7.2f} {:>7.2f} {:>9.1f} {:>8.1f} {:>8.1f}x "
+      "{:>7.2f} {:>9.0f}\n",
+      title, median_us(decode), median_us(acquire), median_us(track), median_us(wrench),
+      median_us(report), median_us(write), median_us(total), percentile99_us(total),
+      median_us(acquire) / median_us(track), static_cast<double>(allocations) / held,
+      1e6 / clip.render_us);
+}
+
+}  // namespace
+}  // namespace tagwrench
+
+int main() {
+  using tagwrench::PixelFormat;
+  cv::setNumThreads(1);
+  fmt::print(
+      "Medians over moving frames, us; one run, one core. acquire = detecting the tags with "
+      "OpenCV, once at the start\n"
+      "and after a loss; everything else happens in every frame. total = decode to device "
+      "write.\n\n"
+      "{:<16} {:>7} {:>8} {:>7} {:>7} {:>7} {:>7} {:>9} {:>8} {:>9} {:>7} {:>9}\n",
+      "frame", "decode", "acquire", "track", "wrench", "report", "write", "total", "p99",
+      "acq/track", "allocs", "sim fps");
+  tagwrench::bench("640x480 GREY", 640, 480, PixelFormat::grey, 300);
+  tagwrench::bench("640x480 YUYV", 640, 480, PixelFormat::yuyv, 300);
+  tagwrench::bench("640x480 MJPG", 640, 480, PixelFormat::mjpg, 300);
+  tagwrench::bench("1920x1080 GREY", 1920, 1080, PixelFormat::grey, 100);
+  tagwrench::bench("1920x1080 YUYV", 1920, 1080, PixelFormat::yuyv, 100);
+  tagwrench::bench("1920x1080 MJPG", 1920, 1080, PixelFormat::mjpg, 100);
+  fmt::print("\nallocs = heap allocations per tracked frame; those of MJPG are libjpeg's own.\n");
+}
