@@ -1,0 +1,199 @@
+#include "host/source/simulator/folder_export.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "host/config_error.h"
+#include "host/os/unique_fd.h"
+#include "host/source/simulator/image_file.h"
+#include "host/source/simulator/simulator_source.h"
+
+namespace tagwrench::sim {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPartial = ".partial";  // where files wait until all are there
+constexpr int kMostFrames = 1'000'000;        // names have six digits
+
+[[noreturn]] void cannot_write(const fs::path& path, const std::string& reason) {
+  throw std::runtime_error(
+      fmt::format("{}: cannot be written ({}): free some space or choose another --out",
+                  path.string(), reason));
+}
+
+void write_file(const fs::path& path, const void* data, std::size_t size) {
+  const UniqueFd file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (!file) cannot_write(path, std::strerror(errno));
+  const char* next = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t written = ::write(file.get(), next, size);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) cannot_write(path, std::strerror(errno));
+    next += written;
+    size -= static_cast<std::size_t>(written);
+  }
+}
+
+bool is_frame_name(const fs::path& name) {
+  const std::string stem = name.stem().string();
+  const std::string ending = name.extension().string();
+  return stem.size() == 6 &&
+         std::all_of(stem.begin(), stem.end(),
+                     [](unsigned char c) { return std::isdigit(c) != 0; }) &&
+         (ending == ".png" || ending == ".pgm" || ending == ".jpg");
+}
+
+bool is_ours(const fs::path& name) {
+  return name == "frames.csv" || name == "truth.csv" || name == "sensor.yaml" || name == kPartial ||
+         is_frame_name(name);
+}
+
+// What an earlier export left in the folder. Throws if anything else is there.
+std::vector<fs::path> earlier_export(const fs::path& dir) {
+  std::error_code error;
+  fs::create_directories(dir, error);
+  if (error) {
+    throw ConfigError(fmt::format("{}: cannot be made a folder ({}): choose another --out",
+                                  dir.string(), error.message()));
+  }
+  std::vector<fs::path> found;
+  bool marked = false;
+  for (auto entry = fs::directory_iterator(dir, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    const fs::path name = entry->path().filename();
+    marked = marked || name == "truth.csv" || name == kPartial;
+    if (!is_ours(name)) {
+      throw ConfigError(
+          fmt::format("{}: the folder already holds {}: give --out an empty or a new folder",
+                      dir.string(), name.string()));
+    }
+    found.push_back(entry->path());
+  }
+  if (error) {
+    throw ConfigError(fmt::format("{}: cannot be read ({}): choose another --out", dir.string(),
+                                  error.message()));
+  }
+  // Numbered pictures alone may be anybody's.
+  if (!found.empty() && !marked) {
+    throw ConfigError(fmt::format(
+        "{}: the folder holds pictures that are not an earlier export: give --out an empty or "
+        "a new folder",
+        dir.string()));
+  }
+  return found;
+}
+
+std::string truth_row(const Truth& truth) {
+  std::string row = fmt::format("{},{}", truth.sequence, truth.time.count());
+  for (const double value : truth.displacement) row += fmt::format(",{:.9g}", value);
+  for (const double value : truth.wrench) row += fmt::format(",{:.9g}", value);
+  return row + "\n";
+}
+
+void write_all(const Scenario& scenario, const fs::path& partial, int frames) {
+  SimulatorSource source(scenario, false);
+  std::string times = "file,t_ns\n";
+  std::string truths =
+      "seq,t_ns,dx_m,dy_m,dz_m,rx_rad,ry_rad,rz_rad,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm\n";
+  for (int i = 0; i < frames; ++i) {
+    Frame frame;
+    source.read(frame);
+    const std::string name = fmt::format("{:06}{}", i, extension(scenario.compression.file));
+    const auto bytes = encode_image(frame.image.pixels, frame.image.width, frame.image.height,
+                                    scenario.compression.file, scenario.compression.jpeg_quality);
+    write_file(partial / name, bytes.data(), bytes.size());
+    times += fmt::format("{},{}\n", name, frame.capture_time.time_since_epoch().count());
+    truths += truth_row(source.truth());
+  }
+  const std::string sensor = sensor_yaml(scenario);
+  write_file(partial / "sensor.yaml", sensor.data(), sensor.size());
+  write_file(partial / "truth.csv", truths.data(), truths.size());
+  write_file(partial / "frames.csv", times.data(), times.size());
+}
+
+void move_into_place(const fs::path& partial, const fs::path& dir) {
+  // truth.csv first: it marks the folder as ours should the rest fail.
+  fs::rename(partial / "truth.csv", dir / "truth.csv");
+  for (const auto& entry : fs::directory_iterator(partial)) {
+    fs::rename(entry.path(), dir / entry.path().filename());
+  }
+  fs::remove(partial);
+}
+
+std::string list(const double* values, std::size_t count, double scale) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < count; ++i)
+    text += fmt::format("{}{:.10g}", i == 0 ? "" : ", ", scale * values[i]);
+  return text + "]";
+}
+
+}  // namespace
+
+std::string sensor_yaml(const Scenario& s) {
+  const Camera& c = s.camera;
+  std::string text = "# The simulated sensor as its owner knows it.\n";
+  text += fmt::format(
+      "camera:\n  width: {}\n  height: {}\n  fx: {:.10g}\n  fy: {:.10g}\n  cx: {:.10g}\n  cy: "
+      "{:.10g}\n",
+      c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px);
+  text += fmt::format("  distortion: {}\n  mirrored: {}\n", list(c.distortion.data(), 5, 1),
+                      c.mirrored);
+  text +=
+      fmt::format("target:\n  family: {}\n  tag_size_mm: {:.10g}\n  border_mm: {:.10g}\n  tags:\n",
+                  s.target.family, s.target.tag_size * 1e3, s.target.border * 1e3);
+  for (const TagPlacement& tag : s.target.tags) text += fmt::format("    - {{id: {}}}\n", tag.id);
+  const int rest_frames =
+      std::clamp(static_cast<int>(0.8 * s.trajectory.rest_time * s.camera.frame_rate), 1, 25);
+  text += fmt::format("rest:\n  frames: {}\n", rest_frames);
+  text += "wrench:\n  springs:\n    centres_mm:\n";
+  const Eigen::Matrix<double, 4, 3, Eigen::RowMajor> centres = spring_centres(s.mechanics);
+  for (int i = 0; i < 4; ++i)
+    text += fmt::format("      - {}\n", list(centres.data() + 3 * i, 3, 1e3));
+  text += fmt::format(
+      "    axial_n_per_mm: {:.10g}\n    lateral_n_per_mm: {:.10g}\n    bending_nm_per_rad: "
+      "{:.10g}\n"
+      "    torsion_nm_per_rad: {:.10g}\n",
+      s.mechanics.axial_stiffness * 1e-3, s.mechanics.lateral_stiffness * 1e-3,
+      s.mechanics.bending_stiffness, s.mechanics.torsion_stiffness);
+  text += fmt::format("  range_n: {}\n  range_nm: {}\n", list(s.mechanics.range.data(), 3, 1),
+                      list(s.mechanics.range.data() + 3, 3, 1));
+  return text;
+}
+
+void export_folder(const Scenario& scenario, const fs::path& dir, int frames) {
+  if (frames < 1 || frames > kMostFrames) {
+    throw ConfigError(fmt::format("--frames: must lie between 1 and {}", kMostFrames));
+  }
+  const std::string wrong = problem(scenario);
+  if (!wrong.empty()) throw ConfigError("scenario: " + wrong);
+  const std::vector<fs::path> earlier = earlier_export(dir);
+  const fs::path partial = dir / kPartial;
+  std::error_code ignored;
+  fs::remove_all(partial, ignored);
+  try {
+    fs::create_directory(partial);
+    write_all(scenario, partial, frames);
+    for (const fs::path& path : earlier)
+      fs::remove_all(path == partial ? fs::path() : path, ignored);
+    move_into_place(partial, dir);
+  } catch (const fs::filesystem_error& error) {
+    fs::remove_all(partial, ignored);
+    cannot_write(dir, error.code().message());
+  } catch (...) {
+    fs::remove_all(partial, ignored);
+    throw;
+  }
+}
+
+}  // namespace tagwrench::sim

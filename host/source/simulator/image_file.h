@@ -1,0 +1,31 @@
+// Pictures as files, and what JPEG does to them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "host/source/simulator/scenario.h"
+
+namespace tagwrench::sim {
+
+/// The name's ending, dot included.
+const char* extension(FileFormat format);
+
+/// Throws std::runtime_error if the picture cannot be encoded.
+std::vector<std::uint8_t> encode_image(const std::uint8_t* pixels, int width, int height,
+                                       FileFormat format, int jpeg_quality);
+
+/// Encodes and decodes a picture in place, as a camera with JPEG output and its driver do. Quality
+/// 0 does nothing.
+class JpegRoundTrip {
+ public:
+  JpegRoundTrip(int width, int height, int quality);
+  void apply(std::uint8_t* pixels) noexcept;
+
+ private:
+  int width_, height_;
+  std::vector<int> options_;
+  std::vector<std::uint8_t> encoded_;
+};
+
+}  // namespace tagwrench::sim

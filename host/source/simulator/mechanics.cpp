@@ -1,0 +1,172 @@
+#include "host/source/simulator/mechanics.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace tagwrench::sim {
+namespace {
+
+constexpr double kLongestGap = 2.0;  // s
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+Matrix6 symmetric_function(const Matrix6& m, double (*f)(double)) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(m);
+  const Vector6 values = solver.eigenvalues().unaryExpr(f);
+  return solver.eigenvectors() * values.asDiagonal() * solver.eigenvectors().transpose();
+}
+
+}  // namespace
+
+Eigen::Matrix<double, 4, 3> spring_centres(const Mechanics& m) {
+  const double x = m.spring_half_spacing_x;
+  const double y = m.spring_half_spacing_y;
+  const double z =
+      m.spring_attachment_z - 0.5 * m.spring_length;  // the base is on the camera's side
+  Eigen::Matrix<double, 4, 3> centres;
+  centres << -x, -y, z, x, -y, z, -x, y, z, x, y, z;
+  return centres;
+}
+
+Matrix6 stiffness(const Mechanics& m) {
+  // Virtual work, column by column: the wrench that holds a unit displacement against all four
+  // springs.
+  const Eigen::Matrix<double, 4, 3> centres = spring_centres(m);
+  const Eigen::Vector3d linear(m.lateral_stiffness, m.lateral_stiffness, m.axial_stiffness);
+  const Eigen::Vector3d angular(m.bending_stiffness, m.bending_stiffness, m.torsion_stiffness);
+  Matrix6 k = Matrix6::Zero();
+  for (int column = 0; column < 6; ++column) {
+    const Vector6 unit = Vector6::Unit(column);
+    for (int spring = 0; spring < 4; ++spring) {
+      const Eigen::Vector3d arm = centres.row(spring).transpose();
+      const Eigen::Vector3d stretch = unit.head<3>() + unit.tail<3>().cross(arm);
+      const Eigen::Vector3d force = linear.cwiseProduct(stretch);
+      k.block<3, 1>(0, column) += force;
+      k.block<3, 1>(3, column) += arm.cross(force) + angular.cwiseProduct(unit.tail<3>());
+    }
+  }
+  return k;
+}
+
+Matrix6 inertia(const Mechanics& m) {
+  const Eigen::Matrix3d c = cross_matrix(m.centre_of_mass);
+  Matrix6 result;
+  result.topLeftCorner<3, 3>() = m.mass * Eigen::Matrix3d::Identity();
+  result.topRightCorner<3, 3>() = -m.mass * c;
+  result.bottomLeftCorner<3, 3>() = m.mass * c;
+  result.bottomRightCorner<3, 3>() = -m.mass * c * c;
+  result.bottomRightCorner<3, 3>().diagonal() += m.principal_inertia;
+  return result;
+}
+
+Matrix6 damping(const Mechanics& m) {
+  // The same ratio for every mode: C = 2 zeta M^1/2 (M^-1/2 K M^-1/2)^1/2 M^1/2.
+  const Matrix6 mass = inertia(m);
+  const Matrix6 root = symmetric_function(mass, [](double x) { return std::sqrt(x); });
+  const Matrix6 inverse_root =
+      symmetric_function(mass, [](double x) { return 1.0 / std::sqrt(x); });
+  const Matrix6 squared_frequencies = inverse_root * stiffness(m) * inverse_root;
+  const Matrix6 frequencies =
+      symmetric_function(squared_frequencies, [](double x) { return std::sqrt(std::max(x, 0.0)); });
+  return 2 * m.damping_ratio * root * frequencies * root;
+}
+
+PlatformMotion::PlatformMotion(const Mechanics& mechanics, const TrajectoryPlayer& player,
+                               double start_time, double memory)
+    : mechanics_(mechanics),
+      player_(player),
+      stiffness_(stiffness(mechanics)),
+      inertia_(inertia(mechanics)),
+      damping_(damping(mechanics)),
+      inverse_inertia_(inertia_.inverse()),
+      ring_(static_cast<std::size_t>(std::ceil(memory / kStep)) + 4),
+      start_time_(start_time),
+      load_(load_at(start_time)) {}
+
+Vector6 PlatformMotion::load_at(double time) const noexcept {
+  Vector6 load = player_.applied_wrench(time);
+  const Eigen::Vector3d inertial = -mechanics_.mass * player_.base_acceleration(time);
+  load.head<3>() += inertial;
+  load.tail<3>() += mechanics_.centre_of_mass.cross(inertial);
+  return load;
+}
+
+Vector6 PlatformMotion::acceleration(const State& state, const Vector6& load) const noexcept {
+  const Vector6 rest = load - damping_ * state.rate - stiffness_ * state.displacement;
+  return inverse_inertia_ * rest;
+}
+
+void PlatformMotion::step() noexcept {
+  // Classical Runge-Kutta of fourth order.
+  const double time = start_time_ + static_cast<double>(newest_) * kStep;
+  const State& s = ring_[static_cast<std::size_t>(newest_) % ring_.size()];
+  const Vector6 early = load_;
+  const Vector6 middle = load_at(time + 0.5 * kStep);
+  const Vector6 late = load_at(time + kStep);
+  const auto moved = [&s](const Vector6& rate, const Vector6& accel, double dt) {
+    return State{s.displacement + dt * rate, s.rate + dt * accel};
+  };
+  const Vector6 v1 = s.rate;
+  const Vector6 a1 = acceleration(s, early);
+  const State s2 = moved(v1, a1, 0.5 * kStep);
+  const Vector6 a2 = acceleration(s2, middle);
+  const State s3 = moved(s2.rate, a2, 0.5 * kStep);
+  const Vector6 a3 = acceleration(s3, middle);
+  const State s4 = moved(s3.rate, a3, kStep);
+  const Vector6 a4 = acceleration(s4, late);
+  const State next =
+      moved((v1 + 2 * s2.rate + 2 * s3.rate + s4.rate) / 6, (a1 + 2 * a2 + 2 * a3 + a4) / 6, kStep);
+  load_ = late;
+  ++newest_;
+  ring_[static_cast<std::size_t>(newest_) % ring_.size()] = next;
+  oldest_ = std::max(oldest_, newest_ - static_cast<long long>(ring_.size()) + 1);
+}
+
+void PlatformMotion::restart(double time) noexcept {
+  newest_ = static_cast<long long>((time - start_time_) / kStep);
+  oldest_ = newest_;
+  load_ = load_at(start_time_ + static_cast<double>(newest_) * kStep);
+  const Vector6 displacement = stiffness_.ldlt().solve(load_);
+  ring_[static_cast<std::size_t>(newest_) % ring_.size()] = {displacement, Vector6::Zero()};
+}
+
+void PlatformMotion::advance_to(double time) noexcept {
+  const double last = start_time_ + static_cast<double>(newest_) * kStep;
+  if (time - last > kLongestGap) restart(time - kLongestGap);
+  while (start_time_ + static_cast<double>(newest_) * kStep < time) step();
+}
+
+State PlatformMotion::at(double time) const noexcept {
+  const double exact = (time - start_time_) / kStep;
+  const auto position =
+      std::clamp(exact, static_cast<double>(oldest_), static_cast<double>(newest_));
+  const auto low = std::min(static_cast<long long>(position), std::max(newest_ - 1, oldest_));
+  const State& a = ring_[static_cast<std::size_t>(low) % ring_.size()];
+  const State& b = ring_[static_cast<std::size_t>(std::min(low + 1, newest_)) % ring_.size()];
+  // Cubic Hermite: position and rate agree at both ends.
+  const double u = position - static_cast<double>(low);
+  const double u2 = u * u;
+  const double u3 = u2 * u;
+  State state;
+  state.displacement = (2 * u3 - 3 * u2 + 1) * a.displacement + (3 * u2 - 2 * u3) * b.displacement +
+                       kStep * ((u3 - 2 * u2 + u) * a.rate + (u3 - u2) * b.rate);
+  state.rate = (1 - u) * a.rate + u * b.rate;
+  return state;
+}
+
+double PlatformMotion::energy(const State& state) const noexcept {
+  return 0.5 * state.rate.dot(inertia_ * state.rate) +
+         0.5 * state.displacement.dot(stiffness_ * state.displacement);
+}
+
+void PlatformMotion::set_state(const State& state) noexcept {
+  oldest_ = newest_;
+  ring_[static_cast<std::size_t>(newest_) % ring_.size()] = state;
+}
+
+}  // namespace tagwrench::sim

@@ -1,0 +1,69 @@
+// The platform on its springs: M d'' + C d' + K d = applied wrench + inertial load, in displacement
+// coordinates.
+//
+// The springs' law is linear in the displacement (translation and rotation vector), and wrenches
+// are taken about the platform origin at rest; so in equilibrium the applied wrench is K d exactly,
+// whatever the size of the motion.
+#pragma once
+
+#include <vector>
+
+#include "host/source/simulator/scenario.h"
+#include "host/source/simulator/trajectory.h"
+#include "host/types.h"
+
+namespace tagwrench::sim {
+
+Eigen::Matrix<double, 4, 3> spring_centres(
+    const Mechanics& mechanics);  ///< one row each, platform frame, m
+Matrix6 stiffness(const Mechanics& mechanics);
+Matrix6 inertia(const Mechanics& mechanics);
+Matrix6 damping(const Mechanics& mechanics);
+
+/// Displacement and its rate: m, rad, m/s, rad/s.
+struct State {
+  Vector6 displacement = Vector6::Zero();
+  Vector6 rate = Vector6::Zero();
+};
+
+/// Integrates with a fixed step and keeps the last `memory` seconds, so that a camera can look at
+/// any instant of its exposure.
+class PlatformMotion {
+ public:
+  static constexpr double kStep =
+      2.0e-4;  ///< s; the stiffest mode (about 90 Hz) turns 0.1 rad in it
+
+  PlatformMotion(const Mechanics& mechanics, const TrajectoryPlayer& player, double start_time,
+                 double memory);
+
+  /// Integrates until `time` is inside the memory. After a gap of more than two seconds (a
+  /// suspended machine) the platform restarts in equilibrium, so that the cost of one call is
+  /// bounded.
+  void advance_to(double time) noexcept;
+
+  /// The state at a time within the memory; outside of it, at its nearest end.
+  State at(double time) const noexcept;
+
+  /// Kinetic plus elastic energy, J.
+  double energy(const State& state) const noexcept;
+
+  void set_state(const State& state) noexcept;
+  const Matrix6& stiffness_matrix() const noexcept { return stiffness_; }
+
+ private:
+  Vector6 acceleration(const State& state, const Vector6& load) const noexcept;
+  Vector6 load_at(double time) const noexcept;
+  void step() noexcept;
+  void restart(double time) noexcept;
+
+  Mechanics mechanics_;
+  TrajectoryPlayer player_;
+  Matrix6 stiffness_, inertia_, damping_, inverse_inertia_;
+  std::vector<State> ring_;
+  long long newest_ = 0;  ///< step number; its state is ring_[newest_ % size]
+  long long oldest_ = 0;
+  double start_time_;
+  Vector6 load_;  ///< at the newest step
+};
+
+}  // namespace tagwrench::sim

@@ -1,0 +1,53 @@
+// Seeded random numbers that are the same on every machine; the standard library's distributions
+// are not.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+namespace tagwrench::sim {
+
+/// SplitMix64 (Steele, Lea, Flood 2014). Streams with different names never share numbers in
+/// practice.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed, std::uint64_t stream = 0) noexcept
+      : state_(seed * 0x9e3779b97f4a7c15ULL + (stream + 1) * 0xd1342543de82ef95ULL) {
+    next();
+  }
+
+  std::uint64_t next() noexcept {
+    state_ += 0x9e3779b97f4a7c15ULL;
+    std::uint64_t z = state_;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+    return z ^ (z >> 31);
+  }
+
+  /// In [0, 1).
+  double uniform() noexcept { return static_cast<double>(next() >> 11) * 0x1.0p-53; }
+  double uniform(double low, double high) noexcept { return low + (high - low) * uniform(); }
+
+  /// Standard normal (Box and Muller).
+  double normal() noexcept {
+    const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
+    return radius * std::cos(2.0 * std::numbers::pi * uniform());
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+/// Who draws from the scenario's seed; one stream each, so that a change in one leaves the others
+/// alone.
+enum Stream : std::uint64_t {
+  kPlacement = 1,
+  kMotion,
+  kPlate,
+  kNoiseTable,
+  kNoiseOffsets,
+  kPrint = 100
+};
+
+}  // namespace tagwrench::sim

@@ -1,0 +1,203 @@
+// The renderer's inner loops: texel lookups, compositing, point spread, noise. One row at a time,
+// written so that the compiler turns the arithmetic into vector code.
+#include <algorithm>
+#include <cmath>
+
+#include "host/source/simulator/renderer.h"
+
+namespace tagwrench::sim {
+namespace {
+
+// Where in a pixel each of its 2 x 2 samples lies.
+struct Offset {
+  float x, y;
+};
+constexpr Offset kOffsets[4] = {{-0.25F, -0.25F}, {0.25F, -0.25F}, {-0.25F, 0.25F}, {0.25F, 0.25F}};
+
+// Which quarter of the exposure each sample of a pixel sees. One order cannot be free of a drift
+// across both axes of the pixel (a moving edge would reach one half of every pixel first and be
+// seen displaced), so four orders take turns whose drifts cancel over neighbours: up, right, down,
+// left.
+constexpr int kOrders[4][4] = {{0, 1, 3, 2}, {0, 3, 1, 2}, {3, 2, 0, 1}, {3, 0, 2, 1}};
+
+float bilinear(const float* texel, int stride, float fu, float fv) {
+  const float top = texel[0] + fu * (texel[1] - texel[0]);
+  const float bottom = texel[stride] + fu * (texel[stride + 1] - texel[stride]);
+  return top + fv * (bottom - top);
+}
+
+// Texel coordinates of rays, kept inside of the texture (whose outermost texels are empty or
+// continue the plate).
+void find_texels(const std::array<float, 9>& h, const float* x, const float* y, int count,
+                 float max_u, float max_v, float* u, float* v) {
+  const float a = h[0], b = h[1], c = h[2], d = h[3], e = h[4], f = h[5], p = h[6], q = h[7],
+              r = h[8];
+  for (int i = 0; i < count; ++i) {
+    const float w = 1.0F / (p * x[i] + q * y[i] + r);
+    const float uu = (a * x[i] + b * y[i] + c) * w;
+    const float vv = (d * x[i] + e * y[i] + f) * w;
+    u[i] = std::min(std::max(uu, 0.0F), max_u);
+    v[i] = std::min(std::max(vv, 0.0F), max_v);
+  }
+}
+
+}  // namespace
+
+void Renderer::draw_opaque(const Layer& layer, const View& view, int row) noexcept {
+  const Texture& t = layer.texture;
+  const int width = camera_.width_px;
+  const float* texels = t.reflectance.data();
+  float* u = scratch_.u.data();
+  float* v = scratch_.v.data();
+  find_texels(view.instants[0], rays_.x(row), rays_.y(row), width,
+              static_cast<float>(t.width) - 1.01F, static_cast<float>(t.height) - 1.01F, u, v);
+  float* out = scene_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
+  for (int i = 0; i < width; ++i) {
+    const int ui = static_cast<int>(u[i]);
+    const int vi = static_cast<int>(v[i]);
+    out[i] = view.shade * bilinear(texels + vi * t.width + ui, t.width,
+                                   u[i] - static_cast<float>(ui), v[i] - static_cast<float>(vi));
+  }
+}
+
+void Renderer::add_samples(const Layer& layer, const TexelFromRay& h, int count, int first,
+                           int stride) noexcept {
+  const Texture& t = layer.texture;
+  float* u = scratch_.u.data();
+  float* v = scratch_.v.data();
+  find_texels(h, scratch_.x.data(), scratch_.y.data(), count, static_cast<float>(t.width) - 1.01F,
+              static_cast<float>(t.height) - 1.01F, u, v);
+  const float* reflectance = t.reflectance.data();
+  const float* coverage = t.coverage.data();
+  for (int i = 0; i < count; ++i) {
+    const int ui = static_cast<int>(u[i]);
+    const int vi = static_cast<int>(v[i]);
+    const float fu = u[i] - static_cast<float>(ui);
+    const float fv = v[i] - static_cast<float>(vi);
+    const int at = vi * t.width + ui;
+    const auto to = static_cast<std::size_t>(first + i * stride);
+    scratch_.reflectance[to] += bilinear(reflectance + at, t.width, fu, fv);
+    scratch_.coverage[to] += bilinear(coverage + at, t.width, fu, fv);
+  }
+}
+
+void Renderer::draw_coarse(const Layer& layer, const View& view, int row) noexcept {
+  const int count = view.right - view.left;
+  if (count <= 0) return;
+  std::copy_n(rays_.x(row) + view.left, count, scratch_.x.begin());
+  std::copy_n(rays_.y(row) + view.left, count, scratch_.y.begin());
+  std::fill_n(scratch_.reflectance.begin(), count, 0.0F);
+  std::fill_n(scratch_.coverage.begin(), count, 0.0F);
+  add_samples(layer, view.instants[0], count, 0, 1);
+  composite(view, row, 1.0F);
+}
+
+void Renderer::draw_fine(const Layer& layer, const View& view, int row) noexcept {
+  const int count = view.right - view.left;
+  if (count <= 0) return;
+  std::fill_n(scratch_.reflectance.begin(), count, 0.0F);
+  std::fill_n(scratch_.coverage.begin(), count, 0.0F);
+  const float* x = rays_.x(row) + view.left;
+  const float* y = rays_.y(row) + view.left;
+  const auto row_step = rays_.x(1) - rays_.x(0);
+  const int passes = view.instant_count / (kInstantsPerPass * kRowPhases);
+  const int quarter = view.instant_count / 4;
+  for (int sample = 0; sample < 4; ++sample) {
+    const float dx = 0.5F * kOffsets[sample].x;
+    const float dy = 0.5F * kOffsets[sample].y;
+    // Even and odd columns are gathered apart, so that each run of samples shares one instant.
+    for (int parity = 0; parity < 2; ++parity) {
+      const int run = (count - parity + 1) / 2;
+      for (int i = 0; i < run; ++i) {
+        const float* px = x + parity + 2 * i;
+        const float* py = y + parity + 2 * i;
+        scratch_.x[static_cast<std::size_t>(i)] =
+            px[0] + dx * (px[1] - px[-1]) + dy * (px[row_step] - px[-row_step]);
+        scratch_.y[static_cast<std::size_t>(i)] =
+            py[0] + dx * (py[1] - py[-1]) + dy * (py[row_step] - py[-row_step]);
+      }
+      const int turn = kOrders[(row + 2 * ((view.left + parity) & 1)) & 3][sample];
+      for (int pass = 0; pass < passes; ++pass) {
+        // One instant in each quarter of the exposure, in pairs as far before its middle as after:
+        // whatever the row, the mean is mid-exposure.
+        const int step = pass * kRowPhases + ((row / 4) & (kRowPhases - 1));
+        const int instants[4] = {quarter - 1 - step, 2 * quarter - 1 - step, 2 * quarter + step,
+                                 3 * quarter + step};
+        add_samples(layer, view.instants[static_cast<std::size_t>(instants[turn])], run, parity, 2);
+      }
+    }
+  }
+  composite(view, row, 1.0F / static_cast<float>(4 * passes));
+}
+
+void Renderer::composite(const View& view, int row, float weight) noexcept {
+  float* out = scene_.data() +
+               static_cast<std::size_t>(row) * static_cast<std::size_t>(camera_.width_px) +
+               view.left;
+  const float* reflectance = scratch_.reflectance.data();
+  const float* coverage = scratch_.coverage.data();
+  const float lit = weight * view.shade;
+  for (int i = 0; i < view.right - view.left; ++i) {
+    out[i] = out[i] * (1.0F - weight * coverage[i]) + lit * reflectance[i];
+  }
+}
+
+void Renderer::blur_rows() noexcept {
+  const auto width = static_cast<std::size_t>(camera_.width_px);
+  float* middle = padded_.data() + kMaxRadius;
+  for (int row = 0; row < camera_.height_px; ++row) {
+    const auto index = static_cast<std::size_t>(row);
+    const float* source = scene_.data() + index * width;
+    std::copy_n(source, width, middle);
+    std::fill_n(padded_.data(), kMaxRadius, source[0]);
+    std::fill_n(middle + width, kMaxRadius, source[width - 1]);
+    const float* weights = kernels_.data() + index * (kMaxRadius + 1);
+    float* out = blurred_.data() + index * width;
+    for (std::size_t i = 0; i < width; ++i) out[i] = weights[0] * middle[i];
+    for (int k = 1; k <= radii_[index]; ++k) {
+      const float weight = weights[k];
+      const float* before = middle - k;
+      const float* after = middle + k;
+      for (std::size_t i = 0; i < width; ++i) out[i] += weight * (before[i] + after[i]);
+    }
+  }
+}
+
+void Renderer::expose_row(int row, Random& random, std::uint8_t* pixels) noexcept {
+  const auto width = static_cast<std::size_t>(camera_.width_px);
+  const auto index = static_cast<std::size_t>(row);
+  const auto blurred_row = [&](int r) {
+    return blurred_.data() +
+           static_cast<std::size_t>(std::clamp(r, 0, camera_.height_px - 1)) * width;
+  };
+  const float* weights = kernels_.data() + index * (kMaxRadius + 1);
+  float* light = row_.data();
+  const float* centre = blurred_row(row);
+  for (std::size_t i = 0; i < width; ++i) light[i] = weights[0] * centre[i];
+  for (int k = 1; k <= radii_[index]; ++k) {
+    const float weight = weights[k];
+    const float* above = blurred_row(row - k);
+    const float* below = blurred_row(row + k);
+    for (std::size_t i = 0; i < width; ++i) light[i] += weight * (above[i] + below[i]);
+  }
+
+  const float* normals = normals_.data() + random.next() % kNormals;
+  const float* gain = gain_.data() + index * width;
+  const float* glare = glare_.data() + index * width;
+  const auto read_variance = static_cast<float>(noise_.read_counts * noise_.read_counts);
+  const auto shot = static_cast<float>(noise_.shot_counts_per_count);
+  for (std::size_t i = 0; i < width; ++i) {
+    const float level = light[i] * gain[i] + glare[i];
+    const float noisy = level + std::sqrt(read_variance + shot * level) * normals[i];
+    light[i] = std::min(std::max(noisy + 0.5F, 0.0F), 255.0F);
+  }
+  std::uint8_t* out = pixels + index * width;
+  if (camera_.mirrored) {
+    for (std::size_t i = 0; i < width; ++i)
+      out[width - 1 - i] = static_cast<std::uint8_t>(light[i]);
+  } else {
+    for (std::size_t i = 0; i < width; ++i) out[i] = static_cast<std::uint8_t>(light[i]);
+  }
+}
+
+}  // namespace tagwrench::sim

@@ -1,0 +1,271 @@
+#include "host/source/simulator/renderer.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "host/config_error.h"
+#include "host/source/simulator/platform_print.h"
+#include "host/source/simulator/tag_print.h"
+
+namespace tagwrench::sim {
+namespace {
+
+constexpr int kRollingBandRows = 8;
+constexpr double kPlateMargin = 3.5e-3;  // m, how far the platform may move before the plate ends
+constexpr double kPadMargin = 0.7e-3;    // m
+constexpr double kBlurPerPass_px = 3.0;
+constexpr double kLightSlant = 0.35;  // of the LED's direction against the optical axis
+constexpr double kNearest = 1e-3;     // m, nothing is drawn nearer to the lens
+
+std::size_t pixel_count(const Camera& camera) {
+  return static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+}
+
+}  // namespace
+
+Renderer::Renderer(const Scenario& scenario)
+    : camera_(scenario.camera),
+      optics_(scenario.optics),
+      light_(scenario.light),
+      exposure_(scenario.exposure),
+      noise_(scenario.noise),
+      target_(scenario.target),
+      seed_(scenario.seed),
+      tags_(placed_tags(scenario)),
+      rays_(scenario.camera) {
+  const std::size_t pixels = pixel_count(camera_);
+  const auto rows = static_cast<std::size_t>(camera_.height_px);
+  const auto columns = static_cast<std::size_t>(camera_.width_px);
+  scene_.resize(pixels);
+  blurred_.resize(pixels);
+  kernels_.resize(rows * (kMaxRadius + 1));
+  radii_.resize(rows);
+  padded_.resize(columns + 2 * kMaxRadius);
+  row_.resize(columns);
+  for (auto* line : {&scratch_.x, &scratch_.y, &scratch_.u, &scratch_.v, &scratch_.reflectance,
+                     &scratch_.coverage}) {
+    line->resize(columns + 2);
+  }
+  Random random(seed_, kNoiseTable);
+  normals_.resize(kNormals + columns);
+  for (float& value : normals_) value = static_cast<float>(random.normal());
+  build_layers(scenario);
+  build_light();
+}
+
+void Renderer::build_layers(const Scenario& scenario) {
+  const Mechanics& mechanics = scenario.mechanics;
+  const double texels_per_m = camera_.fx_px / target_.rest_position.z();
+  const double plate_depth = target_.rest_position.z() + mechanics.spring_attachment_z;
+  const double half_x = 0.6 * camera_.width_px / camera_.fx_px * plate_depth + kPlateMargin;
+  const double half_y = 0.6 * camera_.height_px / camera_.fy_px * plate_depth + kPlateMargin;
+  const double half_paper = 0.5 * target_.tag_size + target_.border;
+
+  Layer plate;
+  plate.platform_T_plane.position.z() = mechanics.spring_attachment_z;
+  plate.texture = print_plate(mechanics, half_x, half_y, texels_per_m, seed_);
+  layers_.push_back(std::move(plate));
+  for (const PlacedTag& tag : tags_) {
+    Layer pad;
+    pad.platform_T_plane = tag.platform_T_tag;
+    pad.texture =
+        print_pad(half_paper, kPadMargin, texels_per_m, seed_ + static_cast<std::uint64_t>(tag.id));
+    layers_.push_back(std::move(pad));
+  }
+  for (const PlacedTag& tag : tags_) {
+    Layer paper;
+    paper.platform_T_plane = tag.platform_T_tag;
+    paper.texture = print_tag(target_, tag_cells(target_.family, tag.id), 2 * texels_per_m,
+                              seed_ + static_cast<std::uint64_t>(tag.id));
+    paper.fine = true;
+    layers_.push_back(std::move(paper));
+  }
+  for (Layer& layer : layers_) {
+    layer.half_x = 0.5 * layer.texture.width / layer.texture.texels_per_m;
+    layer.half_y = 0.5 * layer.texture.height / layer.texture.texels_per_m;
+  }
+  views_.resize(layers_.size());
+}
+
+void Renderer::build_light() {
+  gain_.resize(pixel_count(camera_));
+  glare_.resize(pixel_count(camera_));
+  const double half_diagonal = 0.5 * std::hypot(camera_.width_px, camera_.height_px);
+  const Eigen::Vector2d bright(std::cos(light_.direction), std::sin(light_.direction));
+  const Eigen::Vector2d middle(0.5 * (camera_.width_px - 1), 0.5 * (camera_.height_px - 1));
+  // The blown-out corner: where the bright side meets the image's edge.
+  const Eigen::Vector2d corner = middle + 1.25 * middle.cwiseProduct(bright);
+  const double spread = 0.12 * camera_.width_px;
+  std::size_t i = 0;
+  for (int row = 0; row < camera_.height_px; ++row) {
+    for (int column = 0; column < camera_.width_px; ++column, ++i) {
+      const Eigen::Vector2d pixel(column, row);
+      const Eigen::Vector2d off = (pixel - middle) / half_diagonal;
+      const double vignette = 1 - optics_.vignetting * off.squaredNorm();
+      const double uneven = 1 - light_.unevenness * 0.5 * (1 - bright.dot(off));
+      gain_[i] = static_cast<float>(light_.level_counts * vignette * uneven);
+      const double away = (pixel - corner).squaredNorm() / (2 * spread * spread);
+      glare_[i] = static_cast<float>(light_.glare_counts * std::exp(-away));
+    }
+  }
+}
+
+double Renderer::half_window() const noexcept {
+  return 0.5 * (exposure_.time + exposure_.rolling_readout);
+}
+
+void Renderer::render(const PlatformMotion& motion, double middle_time, std::uint64_t sequence,
+                      std::uint8_t* pixels) noexcept {
+  const int band = exposure_.rolling_readout > 0 ? kRollingBandRows : camera_.height_px;
+  for (int first = 0; first < camera_.height_px; first += band) {
+    const int last = std::min(first + band, camera_.height_px);
+    view_band(motion, middle_time, first, last);
+    for (int row = first; row < last; ++row) {
+      draw_opaque(layers_.front(), views_.front(), row);
+      for (std::size_t i = 1; i < layers_.size(); ++i) {
+        if (row < views_[i].top || row >= views_[i].bottom) continue;
+        if (layers_[i].fine) {
+          draw_fine(layers_[i], views_[i], row);
+        } else {
+          draw_coarse(layers_[i], views_[i], row);
+        }
+      }
+    }
+  }
+  middle_pose_ = platform_pose(target_, motion.at(middle_time).displacement);
+  choose_point_spread();
+  blur_rows();
+  Random random(seed_ * 0x100000001b3ULL + sequence, kNoiseOffsets);
+  for (int row = 0; row < camera_.height_px; ++row) expose_row(row, random, pixels);
+}
+
+void Renderer::view_band(const PlatformMotion& motion, double middle_time, int first_row,
+                         int last_row) noexcept {
+  const double row = 0.5 * (first_row + last_row - 1);
+  const double middle_row = 0.5 * (camera_.height_px - 1);
+  const double time =
+      middle_time + (row - middle_row) / camera_.height_px * exposure_.rolling_readout;
+  const auto pose_at = [&](double share) {
+    return platform_pose(target_, motion.at(time + share * exposure_.time).displacement);
+  };
+  instant_count_ = kInstantsPerPass * kRowPhases * passes_for(pose_at(-0.5), pose_at(0.5));
+  for (int i = 0; i < instant_count_; ++i) {
+    poses_[static_cast<std::size_t>(i)] = pose_at((i + 0.5) / instant_count_ - 0.5);
+  }
+  middle_pose_ = pose_at(0);
+  for (std::size_t i = 0; i < layers_.size(); ++i) view_layer(layers_[i], views_[i]);
+}
+
+// Enough instants that the samples of a moving edge lie closer than the point spread is wide.
+int Renderer::passes_for(const RigidPose& first, const RigidPose& last) const noexcept {
+  double farthest_px = 0;
+  for (const PlacedTag& tag : tags_) {
+    const Eigen::Vector3d a = first * tag.platform_T_tag.position;
+    const Eigen::Vector3d b = last * tag.platform_T_tag.position;
+    if (a.z() < kNearest || b.z() < kNearest) continue;
+    const Eigen::Vector2d moved = b.head<2>() / b.z() - a.head<2>() / a.z();
+    farthest_px = std::max(farthest_px, camera_.fx_px * moved.norm());
+  }
+  return std::clamp(static_cast<int>(std::ceil(farthest_px / kBlurPerPass_px)), 1, kMaxPasses);
+}
+
+void Renderer::view_layer(const Layer& layer, View& view) noexcept {
+  view.instant_count = layer.fine ? instant_count_ : 1;
+  view.shade = shade(layer, middle_pose_);
+  double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
+  for (int i = 0; i < view.instant_count; ++i) {
+    const RigidPose& pose = layer.fine ? poses_[static_cast<std::size_t>(i)] : middle_pose_;
+    view.instants[static_cast<std::size_t>(i)] = texel_from_ray(layer, pose);
+    for (const double sx : {-1.0, 1.0}) {
+      for (const double sy : {-1.0, 1.0}) {
+        const Eigen::Vector3d point =
+            pose *
+            (layer.platform_T_plane * Eigen::Vector3d(sx * layer.half_x, sy * layer.half_y, 0));
+        if (point.z() < kNearest) continue;
+        const Eigen::Vector2d pixel = project(camera_, point.head<2>() / point.z());
+        left = std::min(left, pixel.x());
+        right = std::max(right, pixel.x());
+        top = std::min(top, pixel.y());
+        bottom = std::max(bottom, pixel.y());
+      }
+    }
+  }
+  const auto limit = [](double value, int high) {
+    return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(high)));
+  };
+  // Straight edges bend by a pixel or two between the corners.
+  view.left = limit(std::floor(left) - 3, camera_.width_px);
+  view.right = limit(std::ceil(right) + 4, camera_.width_px);
+  view.top = limit(std::floor(top) - 3, camera_.height_px);
+  view.bottom = limit(std::ceil(bottom) + 4, camera_.height_px);
+}
+
+// Diffuse light plus a lamp from the side: a surface that turns towards the lamp gets brighter.
+float Renderer::shade(const Layer& layer, const RigidPose& camera_T_platform) const noexcept {
+  const Eigen::Vector3d to_lamp = Eigen::Vector3d(kLightSlant * std::cos(light_.direction),
+                                                  kLightSlant * std::sin(light_.direction), -1)
+                                      .normalized();
+  const Eigen::Vector3d normal =
+      -(camera_T_platform.rotation * layer.platform_T_plane.rotation).col(2);
+  const double facing = std::max(0.0, normal.dot(to_lamp)) / -to_lamp.z();
+  return static_cast<float>(light_.ambient + (1 - light_.ambient) * facing);
+}
+
+// A ray (x, y, 1) meets the plane point (X, Y) where it is parallel to X r1 + Y r2 + t; hence (X,
+// Y, 1) is the inverse of [r1 r2 t] times the ray, up to scale.
+Renderer::TexelFromRay Renderer::texel_from_ray(const Layer& layer,
+                                                const RigidPose& camera_T_platform) const noexcept {
+  const RigidPose pose = camera_T_platform * layer.platform_T_plane;
+  Eigen::Matrix3d ray_from_plane;
+  ray_from_plane << pose.rotation.col(0), pose.rotation.col(1), pose.position;
+  Eigen::Matrix3d texel_from_plane;
+  const Texture& t = layer.texture;
+  texel_from_plane << t.texels_per_m, 0, t.centre_u, 0, t.texels_per_m, t.centre_v, 0, 0, 1;
+  const Eigen::Matrix3d h = texel_from_plane * ray_from_plane.inverse();
+  const double scale = 1.0 / h.cwiseAbs().maxCoeff();
+  TexelFromRay result;
+  for (int i = 0; i < 9; ++i) {
+    result[static_cast<std::size_t>(i)] = static_cast<float>(scale * h(i / 3, i % 3));
+  }
+  return result;
+}
+
+// Depth of what is seen in the column of the target: the tags' planes where they rise above the
+// plate.
+double Renderer::depth_at_row(int row) const noexcept {
+  const Eigen::Vector3d& origin = middle_pose_.position;
+  const int column =
+      std::clamp(static_cast<int>(camera_.cx_px + camera_.fx_px * origin.x() / origin.z()), 0,
+                 camera_.width_px - 1);
+  const Eigen::Vector3d ray(rays_.x(row)[column], rays_.y(row)[column], 1);
+  const auto plane_depth = [&](const RigidPose& platform_T_plane) {
+    const RigidPose plane = middle_pose_ * platform_T_plane;
+    const Eigen::Vector3d normal = plane.rotation.col(2);
+    return normal.dot(plane.position) / normal.dot(ray);
+  };
+  double depth = 0;
+  for (const PlacedTag& tag : tags_) depth = std::max(depth, plane_depth(tag.platform_T_tag));
+  const double plate = plane_depth(layers_.front().platform_T_plane);
+  return std::clamp(std::min(depth, plate), 0.5 * target_.rest_position.z(),
+                    2.0 * target_.rest_position.z());
+}
+
+void Renderer::choose_point_spread() noexcept {
+  for (int row = 0; row < camera_.height_px; ++row) {
+    const double defocus = optics_.defocus_px_per_m * (depth_at_row(row) - optics_.focus_distance);
+    const double sigma = std::min(std::hypot(optics_.psf_sigma_px, defocus), kMaxRadius / 3.0);
+    const int radius = static_cast<int>(std::ceil(3.0 * sigma));
+    float* weights = kernels_.data() + static_cast<std::size_t>(row) * (kMaxRadius + 1);
+    double sum = 0;
+    for (int k = 0; k <= radius; ++k) {
+      const double weight = k == 0 ? 1.0 : std::exp(-0.5 * k * k / (sigma * sigma));
+      weights[k] = static_cast<float>(weight);
+      sum += k == 0 ? weight : 2 * weight;
+    }
+    for (int k = 0; k <= radius; ++k) weights[k] = static_cast<float>(weights[k] / sum);
+    radii_[static_cast<std::size_t>(row)] = radius;
+  }
+}
+
+}  // namespace tagwrench::sim

@@ -1,0 +1,110 @@
+// Platform motion -> 8-bit picture: planes seen through rays, light, point spread, noise.
+//
+// Order of one frame: plate (one sample a pixel), pads (one), tags (2 x 2 samples a pixel, spread
+// over the exposure), Gaussian point spread whose width follows the depth of the scene row by row,
+// light and glare, noise, rounding.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "host/source/simulator/lens.h"
+#include "host/source/simulator/mechanics.h"
+#include "host/source/simulator/random.h"
+#include "host/source/simulator/scenario.h"
+#include "host/source/simulator/target_geometry.h"
+#include "host/source/simulator/texture.h"
+
+namespace tagwrench::sim {
+
+class Renderer {
+ public:
+  /// Throws ConfigError if the scenario cannot be rendered.
+  explicit Renderer(const Scenario& scenario);
+
+  /// Seconds before and after the middle of a frame in which its picture is exposed.
+  double half_window() const noexcept;
+
+  /// Renders the frame whose middle row is exposed around `middle_time`; `pixels` holds width *
+  /// height bytes. The noise depends on the seed and on `sequence` alone. No heap.
+  void render(const PlatformMotion& motion, double middle_time, std::uint64_t sequence,
+              std::uint8_t* pixels) noexcept;
+
+  const std::vector<PlacedTag>& tags() const noexcept { return tags_; }
+
+ private:
+  static constexpr int kInstantsPerPass = 4;  ///< one for each of a pixel's 2 x 2 samples
+  static constexpr int kMaxPasses = 8;
+  static constexpr int kRowPhases = 4;  ///< neighbouring rows look at different instants
+  static constexpr int kMaxInstants = kInstantsPerPass * kMaxPasses * kRowPhases;
+  static constexpr int kMaxRadius = 12;  ///< px, of the point spread
+  static constexpr std::size_t kNormals = 1U << 20U;
+
+  /// (x, y, 1) of a ray -> (u, v, 1) of a texel, up to scale.
+  using TexelFromRay = std::array<float, 9>;
+
+  struct Layer {
+    RigidPose platform_T_plane;
+    Texture texture;
+    double half_x = 0, half_y = 0;  ///< m, where coverage ends
+    bool fine = false;              ///< sampled 2 x 2 over the exposure
+  };
+  struct View {  ///< of one layer in one band of rows
+    std::array<TexelFromRay, kMaxInstants> instants{};
+    int instant_count = 1;
+    float shade = 1;
+    int left = 0, right = 0, top = 0,
+        bottom = 0;  ///< pixels that it can touch; right and bottom exclusive
+  };
+  struct Scratch {  ///< one row of texel lookups
+    std::vector<float> x, y, u, v, reflectance, coverage;
+  };
+
+  void build_layers(const Scenario& scenario);
+  void build_light();
+  void view_band(const PlatformMotion& motion, double middle_time, int first_row,
+                 int last_row) noexcept;
+  void view_layer(const Layer& layer, View& view) noexcept;
+  int passes_for(const RigidPose& first, const RigidPose& last) const noexcept;
+  float shade(const Layer& layer, const RigidPose& camera_T_platform) const noexcept;
+  TexelFromRay texel_from_ray(const Layer& layer,
+                              const RigidPose& camera_T_platform) const noexcept;
+
+  void draw_opaque(const Layer& layer, const View& view, int row) noexcept;
+  void draw_coarse(const Layer& layer, const View& view, int row) noexcept;
+  void draw_fine(const Layer& layer, const View& view, int row) noexcept;
+  void add_samples(const Layer& layer, const TexelFromRay& h, int count, int first,
+                   int stride) noexcept;
+  void composite(const View& view, int row, float weight) noexcept;
+
+  void choose_point_spread() noexcept;
+  double depth_at_row(int row) const noexcept;
+  void blur_rows() noexcept;
+  void expose_row(int row, Random& random, std::uint8_t* pixels) noexcept;
+
+  Camera camera_;
+  Optics optics_;
+  Light light_;
+  Exposure exposure_;
+  Noise noise_;
+  Target target_;
+  std::uint64_t seed_;
+  std::vector<PlacedTag> tags_;
+  RayTable rays_;
+  std::vector<Layer> layers_;
+  std::vector<View> views_;
+  std::array<RigidPose, kMaxInstants> poses_{};  ///< of the platform over one band's exposure
+  RigidPose middle_pose_;                        ///< in the middle of one band's exposure
+  int instant_count_ = kInstantsPerPass * kRowPhases;
+
+  std::vector<float> scene_, blurred_;  ///< reflectance as lit by even light
+  std::vector<float> gain_, glare_;     ///< grey levels per reflectance; grey levels
+  std::vector<float> kernels_;          ///< per row: weights 0..kMaxRadius
+  std::vector<int> radii_;              ///< per row, px
+  std::vector<float> padded_, row_;
+  std::vector<float> normals_;  ///< standard normal numbers, entered at random places
+  Scratch scratch_;
+};
+
+}  // namespace tagwrench::sim

@@ -1,0 +1,149 @@
+#include "host/source/simulator/scenario.h"
+
+#include <cmath>
+#include <initializer_list>
+#include <numbers>
+#include <set>
+#include <utility>
+
+#include "host/source/simulator/tag_print.h"
+
+namespace tagwrench::sim {
+namespace {
+
+constexpr double kRidgeGap = 0.15e-3;  // m, between a paper's edge and the ridge
+
+using Named = std::pair<const char*, double>;
+
+std::string not_positive(std::initializer_list<Named> values) {
+  for (const auto& [key, value] : values) {
+    if (!(value > 0) || !std::isfinite(value)) {
+      return std::string(key) + " must be a positive number";
+    }
+  }
+  return {};
+}
+
+std::string outside(std::initializer_list<Named> values, double low, double high) {
+  for (const auto& [key, value] : values) {
+    if (!(value >= low && value <= high)) {
+      return std::string(key) + " must lie between " + std::to_string(low) + " and " +
+             std::to_string(high);
+    }
+  }
+  return {};
+}
+
+std::string target_problem(const Target& t) {
+  if (!family_exists(t.family)) return "target.family: there is no family " + t.family;
+  if (t.tags.empty()) return "target.tags: at least one tag is needed";
+  std::set<int> ids;
+  for (const TagPlacement& tag : t.tags) {
+    if (tag.id < 0 || tag.id >= family_size(t.family)) {
+      return "target.tags: id " + std::to_string(tag.id) + " does not exist in " + t.family +
+             ", which has ids 0 to " + std::to_string(family_size(t.family) - 1);
+    }
+    if (!ids.insert(tag.id).second) {
+      return "target.tags: id " + std::to_string(tag.id) + " is there twice";
+    }
+    if (!tag.position.allFinite() || !tag.rotation.allFinite()) {
+      return "target.tags: position and rotation must be finite numbers";
+    }
+  }
+  if (!t.rest_position.allFinite() || t.rest_position.z() < 2 * t.tag_size) {
+    return "target.rest_position: must be in front of the lens, by two tag sizes or more";
+  }
+  if (t.border < 0 || t.border > t.tag_size) {
+    return "target.border_mm must lie between 0 and the tag size";
+  }
+  if (!(t.ink_spread >= 0 && t.ink_spread < 0.02 * t.tag_size)) {
+    return "target.ink_spread_um must lie between 0 and 2 % of the tag size";
+  }
+  return {};
+}
+
+std::string first_of(std::initializer_list<std::string> problems) {
+  for (const std::string& text : problems) {
+    if (!text.empty()) return text;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<TagPlacement> roof_placement(int upper_id, int lower_id, double tag_size,
+                                         double border) {
+  const double slope = std::numbers::pi / 4;
+  const double to_ridge = (0.5 * tag_size + border + kRidgeGap) * std::cos(slope);
+  return {{upper_id, {0, -to_ridge, 0}, {-slope, 0, 0}},
+          {lower_id, {0, to_ridge, 0}, {slope, 0, 0}}};
+}
+
+std::string problem(const Scenario& s) {
+  const Mechanics& m = s.mechanics;
+  const Trajectory& j = s.trajectory;
+  if (s.camera.width_px < 64 || s.camera.width_px > 4096 || s.camera.height_px < 64 ||
+      s.camera.height_px > 4096) {
+    return "camera.width and height must lie between 64 and 4096";
+  }
+  if (j.axis < 0 || j.axis > 5) return "trajectory.axis: must be one of the six axes";
+  for (const double k : s.camera.distortion) {
+    if (!std::isfinite(k)) return "camera.distortion must be finite numbers";
+  }
+  for (const double a : j.amplitude) {
+    if (!std::isfinite(a)) return "trajectory.amplitude must be finite numbers";
+  }
+  if (s.compression.jpeg_quality < 0 || s.compression.jpeg_quality > 100) {
+    return "compression.jpeg_quality must lie between 0 and 100";
+  }
+  const double window = s.exposure.time + s.exposure.rolling_readout;
+  std::string found =
+      first_of({not_positive({{"mechanics.mass_g", m.mass},
+                              {"mechanics.axial_n_per_mm", m.axial_stiffness},
+                              {"mechanics.lateral_n_per_mm", m.lateral_stiffness},
+                              {"mechanics.bending_nm_per_rad", m.bending_stiffness},
+                              {"mechanics.torsion_nm_per_rad", m.torsion_stiffness},
+                              {"mechanics.inertia_g_mm2", m.principal_inertia.minCoeff()},
+                              {"camera.fx", s.camera.fx_px},
+                              {"camera.fy", s.camera.fy_px},
+                              {"target.tag_size_mm", s.target.tag_size},
+                              {"trajectory.bandwidth_hz", j.bandwidth},
+                              {"trajectory.sweep_from_hz", j.sweep_from},
+                              {"trajectory.sweep_to_hz", j.sweep_to},
+                              {"trajectory.sweep_s", j.sweep_time},
+                              {"optics.focus_mm", s.optics.focus_distance}}),
+                outside({{"camera.fps", s.camera.frame_rate}}, 0.1, 2000),
+                outside({{"mechanics.damping_ratio", m.damping_ratio},
+                         {"optics.vignetting", s.optics.vignetting},
+                         {"light.unevenness", s.light.unevenness},
+                         {"light.ambient", s.light.ambient},
+                         {"target.paper_reflectance", s.target.paper_reflectance},
+                         {"target.ink_reflectance", s.target.ink_reflectance}},
+                        0, 1),
+                outside({{"optics.psf_sigma_px", s.optics.psf_sigma_px}}, 0, 4),
+                outside({{"optics.defocus_px_per_mm", s.optics.defocus_px_per_m}}, 0, 1e5),
+                outside({{"exposure.time_ms", s.exposure.time},
+                         {"exposure.rolling_readout_ms", s.exposure.rolling_readout},
+                         {"trajectory.rest_s", j.rest_time},
+                         {"trajectory.hold_s", j.hold_time}},
+                        0, 1e6),
+                outside({{"noise.read_counts", s.noise.read_counts},
+                         {"noise.shot_counts_per_count", s.noise.shot_counts_per_count},
+                         {"light.level_counts", s.light.level_counts},
+                         {"light.glare_counts", s.light.glare_counts}},
+                        0, 1e4),
+                outside({{"target.ink_edge_roughness_um", s.target.ink_edge_roughness},
+                         {"target.paper_raggedness_um", s.target.paper_raggedness},
+                         {"target.position_error_mm", s.target.position_error}},
+                        0, 1e-3),
+                outside({{"target.ink_grain", s.target.ink_grain},
+                         {"target.rotation_error_rad", s.target.rotation_error}},
+                        0, 0.5),
+                target_problem(s.target)});
+  if (found.empty() && window * s.camera.frame_rate > 1.0) {
+    found = "exposure: time and readout together are longer than a frame period of camera.fps";
+  }
+  return found;
+}
+
+}  // namespace tagwrench::sim

@@ -1,0 +1,172 @@
+#include "host/source/simulator/tag_print.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/aruco/dictionary.hpp>
+#include <string_view>
+#include <utility>
+
+namespace tagwrench::sim {
+namespace {
+
+using Family = std::pair<std::string_view, cv::aruco::PREDEFINED_DICTIONARY_NAME>;
+
+constexpr std::array<Family, 21> kFamilies{{
+    {"aruco_original", cv::aruco::DICT_ARUCO_ORIGINAL},
+    {"aruco_4x4_50", cv::aruco::DICT_4X4_50},
+    {"aruco_4x4_100", cv::aruco::DICT_4X4_100},
+    {"aruco_4x4_250", cv::aruco::DICT_4X4_250},
+    {"aruco_4x4_1000", cv::aruco::DICT_4X4_1000},
+    {"aruco_5x5_50", cv::aruco::DICT_5X5_50},
+    {"aruco_5x5_100", cv::aruco::DICT_5X5_100},
+    {"aruco_5x5_250", cv::aruco::DICT_5X5_250},
+    {"aruco_5x5_1000", cv::aruco::DICT_5X5_1000},
+    {"aruco_6x6_50", cv::aruco::DICT_6X6_50},
+    {"aruco_6x6_100", cv::aruco::DICT_6X6_100},
+    {"aruco_6x6_250", cv::aruco::DICT_6X6_250},
+    {"aruco_6x6_1000", cv::aruco::DICT_6X6_1000},
+    {"aruco_7x7_50", cv::aruco::DICT_7X7_50},
+    {"aruco_7x7_100", cv::aruco::DICT_7X7_100},
+    {"aruco_7x7_250", cv::aruco::DICT_7X7_250},
+    {"aruco_7x7_1000", cv::aruco::DICT_7X7_1000},
+    {"apriltag_16h5", cv::aruco::DICT_APRILTAG_16h5},
+    {"apriltag_25h9", cv::aruco::DICT_APRILTAG_25h9},
+    {"apriltag_36h10", cv::aruco::DICT_APRILTAG_36h10},
+    {"apriltag_36h11", cv::aruco::DICT_APRILTAG_36h11},
+}};
+
+constexpr double kInkGrainSize = 22e-6;     // m, toner clusters and paper fibres
+constexpr double kInkEdgeSize = 45e-6;      // m, correlation length of the ink's edge
+constexpr double kCutSize = 140e-6;         // m, correlation length of the scissors' edge
+constexpr double kLargestRaggedness = 3.0;  // standard deviations; the texture ends there
+
+const Family* find_family(const std::string& name) {
+  const auto* found = std::find_if(kFamilies.begin(), kFamilies.end(),
+                                   [&](const Family& f) { return f.first == name; });
+  return found == kFamilies.end() ? nullptr : found;
+}
+
+double overlap(double a0, double a1, double b0, double b1) {
+  return std::max(0.0, std::min(a1, b1) - std::max(a0, b0));
+}
+
+// The ink with every black cell grown by `spread` on all sides, as area coverage. Growth cuts each
+// axis into strips: one around every line between cells (it belongs to both neighbours) and one
+// inside of every cell.
+class InkCoverage {
+ public:
+  InkCoverage(const TagCells& cells, double size, double spread)
+      : cells_(cells), cell_(size / cells.across), start_(-0.5 * size), spread_(spread) {}
+
+  /// Share of the rectangle that is black.
+  double operator()(double x0, double x1, double y0, double y1) const {
+    const Range columns = strips(x0, x1);
+    const Range rows = strips(y0, y1);
+    double area = 0;
+    for (int row = rows.first; row <= rows.last; ++row) {
+      const double height = strip_overlap(row, y0, y1);
+      if (height <= 0) continue;
+      for (int column = columns.first; column <= columns.last; ++column) {
+        if (black(column, row)) area += height * strip_overlap(column, x0, x1);
+      }
+    }
+    return area / ((x1 - x0) * (y1 - y0));
+  }
+
+ private:
+  struct Range {
+    int first, last;
+  };
+
+  // Strip 2i lies around line i, strip 2i + 1 inside of cell i.
+  Range strips(double a0, double a1) const {
+    const int first = 2 * static_cast<int>(std::floor((a0 - spread_ - start_) / cell_));
+    const int last = 2 * static_cast<int>(std::ceil((a1 + spread_ - start_) / cell_));
+    return {std::max(first, 0), std::min(last, 2 * cells_.across)};
+  }
+
+  double strip_overlap(int strip, double a0, double a1) const {
+    const double line = start_ + (strip / 2) * cell_;
+    return strip % 2 == 0 ? overlap(line - spread_, line + spread_, a0, a1)
+                          : overlap(line + spread_, line + cell_ - spread_, a0, a1);
+  }
+
+  bool black(int column_strip, int row_strip) const {
+    const auto cells = [](int strip) {
+      return strip % 2 == 0 ? Range{strip / 2 - 1, strip / 2} : Range{strip / 2, strip / 2};
+    };
+    const Range columns = cells(column_strip);
+    const Range rows = cells(row_strip);
+    for (int row = std::max(rows.first, 0); row <= std::min(rows.last, cells_.across - 1); ++row) {
+      for (int c = std::max(columns.first, 0); c <= std::min(columns.last, cells_.across - 1);
+           ++c) {
+        if (cells_.is_black(c, row)) return true;
+      }
+    }
+    return false;
+  }
+
+  const TagCells& cells_;
+  double cell_, start_, spread_;
+};
+
+}  // namespace
+
+bool family_exists(const std::string& family) { return find_family(family) != nullptr; }
+
+int family_size(const std::string& family) {
+  const Family* found = find_family(family);
+  return found == nullptr ? 0 : cv::aruco::getPredefinedDictionary(found->second)->bytesList.rows;
+}
+
+TagCells tag_cells(const std::string& family, int id) {
+  const auto dictionary = cv::aruco::getPredefinedDictionary(find_family(family)->second);
+  const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
+      dictionary->bytesList.rowRange(id, id + 1), dictionary->markerSize);
+  TagCells cells;
+  cells.across = bits.cols + 2;
+  cells.black.assign(static_cast<std::size_t>(cells.across * cells.across), true);
+  for (int row = 0; row < bits.rows; ++row) {
+    for (int column = 0; column < bits.cols; ++column) {
+      cells.black[static_cast<std::size_t>((row + 1) * cells.across + column + 1)] =
+          bits.at<std::uint8_t>(row, column) == 0;
+    }
+  }
+  return cells;
+}
+
+Texture print_tag(const Target& target, const TagCells& cells, double texels_per_m,
+                  std::uint64_t seed) {
+  const double half_paper = 0.5 * target.tag_size + target.border;
+  const double half = half_paper + kLargestRaggedness * target.paper_raggedness;
+  Texture t = Texture::of_size(half, half, texels_per_m, false);
+  Random random(seed, kPrint);
+  const SmoothNoise ink_x(random, kInkEdgeSize), ink_y(random, kInkEdgeSize);
+  const SmoothNoise cut_x(random, kCutSize), cut_y(random, kCutSize);
+  const SmoothNoise grain(random, kInkGrainSize);
+  const InkCoverage ink(cells, target.tag_size, target.ink_spread);
+  const double h = 0.5 / texels_per_m;
+  const double limit = kLargestRaggedness * target.paper_raggedness;
+  for (int v = 0; v < t.height; ++v) {
+    for (int u = 0; u < t.width; ++u) {
+      const double x = t.x(u);
+      const double y = t.y(v);
+      const double cx = x + std::clamp(target.paper_raggedness * cut_x(x, y), -limit, limit);
+      const double cy = y + std::clamp(target.paper_raggedness * cut_y(x, y), -limit, limit);
+      const double paper = overlap(cx - h, cx + h, -half_paper, half_paper) *
+                           overlap(cy - h, cy + h, -half_paper, half_paper) / (4 * h * h);
+      const double ix = x + target.ink_edge_roughness * ink_x(x, y);
+      const double iy = y + target.ink_edge_roughness * ink_y(x, y);
+      const double black = ink(ix - h, ix + h, iy - h, iy + h);
+      const double clean =
+          target.paper_reflectance + black * (target.ink_reflectance - target.paper_reflectance);
+      const double reflectance = std::clamp(clean + target.ink_grain * grain(x, y), 0.0, 1.0);
+      t.coverage[t.index(u, v)] = static_cast<float>(paper);
+      t.reflectance[t.index(u, v)] = static_cast<float>(paper * reflectance);
+    }
+  }
+  return t;
+}
+
+}  // namespace tagwrench::sim

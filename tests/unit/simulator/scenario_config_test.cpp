@@ -1,0 +1,89 @@
+#include "host/config/scenario_config.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "host/config_error.h"
+#include "host/source/simulator/simulator_source.h"
+
+namespace tagwrench {
+namespace {
+
+std::string complaint(const std::string& text) {
+  try {
+    parse_scenario(text, "s.yaml");
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(ScenarioConfig, EveryFileOfTheCollectionLoads) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(TAGWRENCH_SCENARIOS)) {
+    EXPECT_NO_THROW(load_scenario(entry.path().string())) << entry.path();
+    ++files;
+  }
+  EXPECT_GT(files, 10);
+}
+
+TEST(ScenarioConfig, ValuesAreConvertedToSi) {
+  const sim::Scenario s = parse_scenario(
+      "seed: 9\n"
+      "mechanics: {mass_g: 12, axial_n_per_mm: 0.9, range: [1, 2, 3, 4, 5, 6]}\n"
+      "target: {tag_size_mm: 4, rest_position_mm: [0.5, 0, 22]}\n"
+      "exposure: {time_ms: 2}\n"
+      "trajectory: {motion: push, axis: mz, share: -0.5, hold_s: 2}\n",
+      "s.yaml");
+  EXPECT_EQ(s.seed, 9U);
+  EXPECT_DOUBLE_EQ(s.mechanics.mass, 0.012);
+  EXPECT_DOUBLE_EQ(s.mechanics.axial_stiffness, 900);
+  EXPECT_DOUBLE_EQ(s.mechanics.range[5], 6);
+  EXPECT_DOUBLE_EQ(s.target.tag_size, 4e-3);
+  EXPECT_DOUBLE_EQ(s.target.rest_position.z(), 22e-3);
+  EXPECT_DOUBLE_EQ(s.exposure.time, 2e-3);
+  EXPECT_EQ(s.trajectory.motion, sim::Motion::push);
+  EXPECT_EQ(s.trajectory.axis, 5);
+  EXPECT_DOUBLE_EQ(s.trajectory.share, -0.5);
+  EXPECT_DOUBLE_EQ(s.camera.fx_px, 805);  // untouched
+}
+
+TEST(ScenarioConfig, OneTagLiesOnASlopeThroughTheOrigin) {
+  const sim::Scenario s = parse_scenario("target: {tags: [{id: 7}]}\n", "s.yaml");
+  ASSERT_EQ(s.target.tags.size(), 1U);
+  EXPECT_EQ(s.target.tags[0].id, 7);
+  EXPECT_EQ(s.target.tags[0].position, Eigen::Vector3d(0, 0, 0));
+  EXPECT_LT(s.target.tags[0].rotation.x(), -0.5);
+}
+
+TEST(ScenarioConfig, UnknownKeysNameFileLineAndKey) {
+  const std::string text = complaint("seed: 1\ncamera:\n  fx: 805\n  focal: 3\n");
+  EXPECT_EQ(text.rfind("s.yaml:4: camera.focal", 0), 0U) << text;
+}
+
+TEST(ScenarioConfig, ImpossibleValuesNameFileLineAndKey) {
+  EXPECT_EQ(complaint("mechanics:\n  mass_g: -3\n").rfind("s.yaml:2: mechanics.mass_g", 0), 0U);
+  EXPECT_EQ(
+      complaint("seed: 1\ntarget:\n  tag_size_mm: 0\n").rfind("s.yaml:3: target.tag_size_mm", 0),
+      0U);
+  EXPECT_EQ(complaint("camera: {fx: .nan}\n").rfind("s.yaml:1: camera.fx", 0), 0U);
+  EXPECT_EQ(complaint("camera: {fps: 0}\n").rfind("s.yaml:1: camera.fps", 0), 0U);
+  EXPECT_EQ(complaint("target: {family: qr}\n").rfind("s.yaml:1: target.family", 0), 0U);
+  EXPECT_EQ(complaint("target: {tags: [{id: 5}, {id: 5}]}\n").rfind("s.yaml:1: target.tags", 0),
+            0U);
+  EXPECT_EQ(complaint("target: {family: apriltag_16h5, tags: [{id: 30}]}\n")
+                .rfind("s.yaml:1: target.tags", 0),
+            0U);
+  EXPECT_EQ(complaint("exposure: {time_ms: 50}\n").rfind("s.yaml:1: exposure", 0), 0U);
+  EXPECT_EQ(complaint("trajectory: {motion: jump}\n").rfind("s.yaml:1: trajectory.motion", 0), 0U);
+  EXPECT_EQ(complaint("seed: 1\n"), "accepted");
+}
+
+TEST(ScenarioConfig, ALensThatFoldsTheImageOverIsRefused) {
+  const sim::Scenario s = parse_scenario("camera: {distortion: [-3, 0, 0, 0, 0]}\n", "s.yaml");
+  EXPECT_THROW(SimulatorSource(s, false), ConfigError);
+}
+
+}  // namespace
+}  // namespace tagwrench
