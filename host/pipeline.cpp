@@ -112,7 +112,8 @@ void Pipeline::wait(TimePoint until) noexcept {
   if (ready <= 0) return;
   if (fds[1].revents != 0) end_ = RunReport::End::interrupted;
   for (std::size_t i = 0; i < outputs; ++i) {
-    if (fds[i + 2].revents != 0) outputs_[i]->service();
+    if (fds[i + 2].revents == 0) continue;
+    if (const std::string_view news = outputs_[i]->service(); !news.empty()) say(news);
   }
 }
 

@@ -271,7 +271,6 @@ int run(const RunOptions& options) {
   const WrenchEstimator wrench(input.sensor.wrench);
   const Shaping shaping(input.sensor.shaping);
   Outputs outputs = open_outputs(options, input);
-  DeadMan dead_man(std::move(outputs.devices));
   note("source: " + input.source->format().description);
 
   RunLimits limits;
@@ -279,9 +278,12 @@ int run(const RunOptions& options) {
   if (options.seconds)
     limits.time =
         std::chrono::duration_cast<Duration>(std::chrono::duration<double>(*options.seconds));
-  Pipeline pipeline(*input.source, tracker, wrench, shaping, outputs.all, dead_man, stop.get());
-  const RunReport report = pipeline.run(limits);
-
+  RunReport report;
+  {
+    DeadMan dead_man(outputs.devices);
+    report = Pipeline(*input.source, tracker, wrench, shaping, outputs.all, dead_man, stop.get())
+                 .run(limits);
+  }
   outputs.all.clear();  // neutral, then gone, before anything else is said
   if (report.end == RunReport::End::output_failed) {
     note(report.failure);

@@ -32,7 +32,8 @@ class Output {
 
   /// Readable when service() has something to answer (a client's LED report); -1: never.
   virtual int poll_fd() const noexcept { return -1; }
-  virtual void service() noexcept {}
+  /// Answers. What a client has changed, in words for people; empty if nothing.
+  virtual std::string_view service() noexcept { return {}; }
 
   /// Offers a line meant for people; true if this output has shown it.
   virtual bool notice(std::string_view) noexcept { return false; }

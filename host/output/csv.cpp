@@ -1,0 +1,21 @@
+#include "host/output/csv.h"
+
+namespace tagwrench {
+
+// A header that does not go out now (the reader has not started) goes out before the first row; one
+// that cannot go out at all shows as the failure of the first send().
+CsvOutput::CsvOutput(const std::string& path, bool lossless) : sink_(path, lossless) {
+  header_written_ = sink_.write(kCsvHeader) == SendStatus::ok;
+}
+
+SendStatus CsvOutput::send(const Sample& sample) noexcept {
+  if (!header_written_) {
+    const SendStatus status = sink_.write(kCsvHeader);
+    if (status != SendStatus::ok) return status;
+    header_written_ = true;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  return sink_.write(csv_line(line_, sample, latency_us(sample, now)));
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,180 @@
+#include "host/output/dead_man.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <climits>
+#include <cstring>
+#include <string>
+
+#include "host/config_error.h"
+
+namespace tagwrench {
+
+// Two processes meet here; lock-free atomics work across them, locks would not survive a SIGKILL.
+struct DeadMan::Shared {
+  std::atomic<std::int64_t> deadline_ns{0};  ///< CLOCK_MONOTONIC, or one of the two values below
+  std::atomic<bool> dismissed{false};
+};
+
+namespace {
+
+constexpr std::int64_t kStandingDown = 0;
+constexpr std::int64_t kMissed = -1;  ///< neutral is written; wait for the bridge to come back
+constexpr char kReady = 'r';
+
+static_assert(std::atomic<std::int64_t>::is_always_lock_free);
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+// From here to the end of the namespace: the guardian's side. It may be forked from a process with
+// threads, so it makes async-signal-safe calls only, and no allocation.
+
+std::int64_t now_ns() {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+void write_once(int fd, const std::vector<std::uint8_t>& bytes) {
+  if (bytes.empty()) return;
+  // A device that refuses is gone already; there is nobody to tell.
+  [[maybe_unused]] const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+}
+
+void close_gap(unsigned first, unsigned last) {
+  if (first > last || close_range(first, last, 0) == 0) return;
+  const long limit = std::min<long>(sysconf(_SC_OPEN_MAX), 65536);  // kernels before 5.9
+  for (unsigned fd = first; fd <= last && static_cast<long>(fd) < limit; ++fd) {
+    ::close(static_cast<int>(fd));
+  }
+}
+
+/// `kept` in rising order.
+void close_all_but(const std::vector<int>& kept) {
+  unsigned next = 0;
+  for (const int fd : kept) {
+    const auto number = static_cast<unsigned>(fd);
+    if (number > next) close_gap(next, number - 1);
+    next = std::max(next, number + 1);
+  }
+  close_gap(next, UINT_MAX);
+}
+
+void leave_terminal() {
+  setsid();
+  prctl(PR_SET_NAME, "tw-guardian");
+}
+
+/// Sleeps until `until_ns` (any negative: for ever) or a word from the bridge. False: the bridge is
+/// gone.
+bool sleep_until(int link, std::int64_t until_ns) {
+  pollfd waiting{link, POLLIN, 0};
+  const std::int64_t left_ns = std::max<std::int64_t>(until_ns - now_ns(), 0);
+  const timespec left{left_ns / 1'000'000'000, left_ns % 1'000'000'000};
+  if (ppoll(&waiting, 1, until_ns < 0 ? nullptr : &left, nullptr) <= 0) return true;
+  char words[64];
+  const ssize_t got = recv(link, words, sizeof words, MSG_DONTWAIT);
+  return got > 0 || (got < 0 && (errno == EAGAIN || errno == EINTR));
+}
+
+/// The guardian's life, until the bridge is gone.
+void guard(int link, std::atomic<std::int64_t>& deadline_ns,
+           const std::vector<DeadManDevice>& devices) {
+  send(link, &kReady, 1, MSG_NOSIGNAL);
+  while (true) {
+    std::int64_t deadline = deadline_ns.load();
+    const bool armed = deadline > 0;
+    if (!armed || now_ns() < deadline) {
+      if (!sleep_until(link, armed ? deadline : -1)) return;
+    } else if (deadline_ns.compare_exchange_strong(deadline, kMissed)) {
+      // Had the bridge moved the deadline meanwhile, it would be alive and the loop would look
+      // again.
+      for (const DeadManDevice& device : devices) write_once(device.fd, device.neutral);
+    }
+  }
+}
+
+}  // namespace
+
+DeadMan::DeadMan(const std::vector<DeadManDevice>& devices) {
+  if (devices.empty()) return;
+  const auto fail = [](const char* what) {
+    throw ConfigError(std::string("dead man: ") + what + ": " + std::strerror(errno) +
+                      "; end other programs, or run without HID outputs");
+  };
+
+  int ends[2];
+  // A socket pair and not a pipe: it can be written without SIGPIPE if the guardian is gone.
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) fail("cannot make a socket");
+  link_.reset(ends[0]);
+  UniqueFd guardian_end(ends[1]);
+  void* page =
+      mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (page == MAP_FAILED) fail("cannot share memory");
+  shared_ = new (page) Shared;
+
+  std::vector<int> kept{guardian_end.get()};
+  for (const DeadManDevice& device : devices) kept.push_back(device.fd);
+  std::sort(kept.begin(), kept.end());
+
+  // The guardian keeps all signals blocked: from its first instruction only the link (and SIGKILL)
+  // ends it.
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  guardian_ = fork();
+  if (guardian_ != 0) {
+    const int error = errno;
+    char ready = 0;
+    guardian_end.reset();
+    if (guardian_ > 0 && recv(link_.get(), &ready, 1, 0) != 1) waitpid(guardian_, nullptr, 0);
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    if (ready == kReady) return;
+    munmap(page, sizeof(Shared));
+    errno = error;
+    fail("cannot start the guardian process");
+  }
+
+  leave_terminal();
+  close_all_but(kept);  // the other end of the link among them
+  guard(guardian_end.get(), shared_->deadline_ns, devices);
+  if (!shared_->dismissed.load()) {
+    for (const DeadManDevice& device : devices) write_once(device.fd, device.neutral);
+    for (const DeadManDevice& device : devices) write_once(device.fd, device.destroy);
+  }
+  _exit(0);
+}
+
+DeadMan::~DeadMan() {
+  if (guardian_ <= 0) return;
+  shared_->dismissed.store(true);
+  link_.reset();
+  while (waitpid(guardian_, nullptr, 0) < 0 && errno == EINTR) {
+  }
+  munmap(shared_, sizeof(Shared));
+}
+
+void DeadMan::expect_by(TimePoint deadline) noexcept {
+  if (guardian_ <= 0) return;
+  const std::int64_t next_ns = std::max<std::int64_t>(deadline.time_since_epoch().count(), 1);
+  const std::int64_t before_ns = shared_->deadline_ns.exchange(next_ns);
+  // A guardian that sleeps until an earlier deadline looks again by itself.
+  if (before_ns > 0 && before_ns <= next_ns) return;
+  const char word = 1;
+  send(link_.get(), &word, 1, MSG_DONTWAIT | MSG_NOSIGNAL);
+}
+
+void DeadMan::stand_down() noexcept {
+  if (guardian_ > 0) shared_->deadline_ns.store(kStandingDown);
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,67 @@
+// Neutral even when the bridge cannot say so: its loop hangs, it is stopped (SIGSTOP, a debugger),
+// or it is killed.
+//
+// A guardian PROCESS holds duplicates of the devices' file descriptors. It sleeps until the
+// deadline that the bridge keeps pushing ahead in a shared page. When a deadline passes, it writes
+// each device's neutral report, once. When the bridge is gone, it writes neutral, destroys the
+// devices, and exits.
+//
+// Why a process and not a thread: SIGSTOP, a core dump and SIGKILL take all threads of a process at
+// once, and after SIGKILL nobody could send the last neutral report. The kernel does remove the
+// devices of a dead process, but tells evdev readers of no return to zero, and a client such as
+// spacenavd then keeps its last motion.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "host/os/unique_fd.h"
+#include "host/types.h"
+
+namespace tagwrench {
+
+/// A device that the guardian can bring to rest by writing bytes. The fd is borrowed until the
+/// DeadMan exists.
+struct DeadManDevice {
+  int fd = -1;
+  std::vector<std::uint8_t> neutral;
+  std::vector<std::uint8_t> destroy;  ///< may be empty: the last close() then removes the device
+};
+
+/// Construct it after the outputs and before any thread; destroy it before the outputs. A camera
+/// may be open: the guardian keeps no other file open, and capture buffers are mapped
+/// MADV_DONTFORK. It leaves the terminal's session, so Ctrl-C and Ctrl-Z reach the bridge alone;
+/// its name is "tw-guardian", so that a kill by the bridge's name spares it.
+class DeadMan {
+ public:
+  /// Throws ConfigError if there are no processes or memory to be had. Without devices nothing is
+  /// started.
+  explicit DeadMan(const std::vector<DeadManDevice>& devices);
+  DeadMan(const DeadMan&) = delete;
+  DeadMan& operator=(const DeadMan&) = delete;
+  /// Dismisses the guardian without touching the devices, and waits for it to go.
+  ~DeadMan();
+
+  /// Expects the next call by `deadline`; else all devices go neutral. One store; a system call
+  /// only after stand_down(), after a missed deadline, or if the deadline moves back.
+  void expect_by(TimePoint deadline) noexcept;
+
+  /// Expects nothing. The guardian sleeps without waking until the next expect_by() or the bridge's
+  /// end.
+  void stand_down() noexcept;
+
+  /// The guardian's process id, 0 if there is none.
+  pid_t guardian() const noexcept { return guardian_; }
+
+ private:
+  struct Shared;
+
+  Shared* shared_ = nullptr;  ///< one page, MAP_SHARED with the guardian
+  UniqueFd link_;  ///< wakes the guardian; its closing, by whatever end of the bridge, is the death
+                   ///< notice
+  pid_t guardian_ = 0;
+};
+
+}  // namespace tagwrench

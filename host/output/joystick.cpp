@@ -1,0 +1,101 @@
+#include "host/output/joystick.h"
+
+#include <fcntl.h>
+#include <linux/uinput.h>
+#include <sys/ioctl.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "host/config_error.h"
+#include "host/output/shown.h"
+#include "host/output/uhid_device.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr const char* kPath = "/dev/uinput";
+constexpr std::uint16_t kAxes[] = {ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ};
+
+// Six absolute axes without any key would be an accelerometer to udev and SDL; these two codes mean
+// joystick to both.
+constexpr int kButtons[] = {BTN_TRIGGER, BTN_THUMB};
+
+uinput_setup setup_of(const JoystickOptions& options) {
+  uinput_setup setup{};
+  const bool printable = std::all_of(options.name.begin(), options.name.end(),
+                                     [](unsigned char c) { return c >= 0x20 && c != 0x7f; });
+  if (options.name.empty() || options.name.size() >= sizeof setup.name || !printable) {
+    throw ConfigError("joystick name: must be 1 to 79 printable bytes; change it");
+  }
+  std::memcpy(setup.name, options.name.data(), options.name.size());
+  // Games that look for a bus, vendor and product skip devices without them.
+  setup.id = {BUS_USB, options.vendor, options.product, 0x0100};
+  return setup;
+}
+
+}  // namespace
+
+JoystickEvents joystick_events(const Counts6& counts) noexcept {
+  JoystickEvents events{};
+  for (std::size_t i = 0; i < 6; ++i) {
+    events[i].type = EV_ABS;
+    events[i].code = kAxes[i];
+    events[i].value = counts[i];
+  }
+  events[6].type = EV_SYN;
+  events[6].code = SYN_REPORT;
+  return events;
+}
+
+JoystickOutput::JoystickOutput(const JoystickOptions& options) {
+  uinput_setup setup = setup_of(options);
+  uinput_.reset(::open(kPath, O_WRONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!uinput_) throw ConfigError(cannot_open_node(kPath, "uinput", errno));
+  const int fd = uinput_.get();
+  bool good = ioctl(fd, UI_SET_EVBIT, EV_KEY) == 0 && ioctl(fd, UI_SET_EVBIT, EV_ABS) == 0;
+  for (const int button : kButtons) good = good && ioctl(fd, UI_SET_KEYBIT, button) == 0;
+  for (const std::uint16_t axis : kAxes) {
+    uinput_abs_setup abs{};
+    abs.code = axis;
+    abs.absinfo.minimum = -kJoystickLimit_counts;
+    abs.absinfo.maximum = kJoystickLimit_counts;
+    good = good && ioctl(fd, UI_ABS_SETUP, &abs) == 0;
+  }
+  good = good && ioctl(fd, UI_DEV_SETUP, &setup) == 0 && ioctl(fd, UI_DEV_CREATE) == 0;
+  if (!good) {
+    throw ConfigError(std::string(kPath) + ": the kernel refused " + options.name + ": " +
+                      std::strerror(errno) + "; it needs Linux 4.5 or later");
+  }
+}
+
+JoystickOutput::~JoystickOutput() {
+  JoystickOutput::send(Sample{});
+  ioctl(uinput_.get(), UI_DEV_DESTROY);  // the guardian's duplicate of the fd would keep it alive
+}
+
+SendStatus JoystickOutput::send(const Sample& sample) noexcept {
+  Counts6 counts{};
+  if (carries_numbers(shown_status(sample))) {
+    counts = to_counts(sample.motion, kJoystickLimit_counts);
+  }
+  const JoystickEvents events = joystick_events(counts);
+  if (::write(uinput_.get(), events.data(), sizeof events) >= 0) return SendStatus::ok;
+  if (errno == EAGAIN || errno == EINTR) return SendStatus::skipped;
+  error_ = errno;
+  return SendStatus::failed;
+}
+
+std::string JoystickOutput::failure() const {
+  return std::string(kPath) + ": the kernel no longer takes events: " + std::strerror(error_) +
+         "; start again";
+}
+
+void JoystickOutput::add_to(std::vector<DeadManDevice>& devices) const {
+  const JoystickEvents neutral = joystick_events({});
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(neutral.data());
+  devices.push_back({uinput_.get(), {bytes, bytes + sizeof neutral}, {}});
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,73 @@
+#include "host/output/spacemouse.h"
+
+#include <utility>
+
+#include "host/config_error.h"
+#include "host/output/shown.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr std::uint16_t k3dconnexion = 0x256f;
+constexpr std::uint16_t kLogitech = 0x046d;
+
+UhidIdentity identity(const SpacemouseOptions& options) {
+  if (options.vendor == kLogitech) {
+    throw ConfigError(
+        "spacemouse id " + hex_id(options.vendor, options.product) +
+        ": the kernel's hid-logitech driver refuses virtual devices of this vendor; use "
+        "256f:c62e or an id of your own");
+  }
+  return {options.name, options.serial, options.vendor, options.product};
+}
+
+}  // namespace
+
+SpacemouseOutput::SpacemouseOutput(const SpacemouseOptions& options)
+    : SpacemouseOutput(UhidDevice(identity(options), spacemouse_descriptor()), options) {}
+
+SpacemouseOutput::SpacemouseOutput(const SpacemouseOptions& options, UniqueFd uhid)
+    : SpacemouseOutput(UhidDevice(std::move(uhid), identity(options), spacemouse_descriptor()),
+                       options) {}
+
+SpacemouseOutput::SpacemouseOutput(UhidDevice device, const SpacemouseOptions& options)
+    : device_(std::move(device)), vendor_(options.vendor), product_(options.product) {
+  device_.send(spacemouse_report({}));
+}
+
+SpacemouseOutput::~SpacemouseOutput() { device_.send(spacemouse_report({})); }
+
+SendStatus SpacemouseOutput::send(const Sample& sample) noexcept {
+  Counts6 wanted{};
+  if (carries_numbers(shown_status(sample))) {
+    wanted = to_counts(sample.motion, kSpacemouseLimit_counts);
+    if (vendor_ != k3dconnexion) wanted = to_spnav_order(wanted);
+  }
+  const Counts6 counts = dithered(wanted, last_);
+  const SendStatus status = device_.send(spacemouse_report(counts));
+  if (status == SendStatus::ok) last_ = counts;
+  return status;
+}
+
+std::string_view SpacemouseOutput::service() noexcept {
+  const bool before = led_;
+  while (const auto report = device_.next_output()) {
+    if (report->size >= 2 && report->bytes[0] == kSpacemouseLedReportId) {
+      led_ = (report->bytes[1] & 1) != 0;
+    }
+  }
+  if (led_ == before) return {};
+  return led_ ? "spacemouse: LED on" : "spacemouse: LED off";
+}
+
+std::string SpacemouseOutput::spacenavd_advice() const {
+  if (vendor_ == k3dconnexion) return {};
+  return "spacenavd: add this line to /etc/spnavrc and restart it: device-id = " +
+         hex_id(vendor_, product_);
+}
+
+void SpacemouseOutput::add_to(std::vector<DeadManDevice>& devices) const {
+  devices.push_back(device_.dead_man_device(spacemouse_report({})));
+}
+
+}  // namespace tagwrench

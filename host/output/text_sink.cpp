@@ -1,0 +1,171 @@
+#include "host/output/text_sink.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "host/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+/// How often a lossless wait looks for a signal that is blocked (read through a signalfd) and so
+/// interrupts no poll().
+constexpr int kSignalCheck_ms = 50;
+constexpr int kLastWait_ms = 100;
+
+bool stop_is_pending() {
+  sigset_t pending;
+  return sigpending(&pending) == 0 &&
+         (sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1);
+}
+
+const char* remedy(int error) {
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT:
+      return "free some space, or write somewhere else";
+    case EPIPE:
+      return "its reader has gone; start it again, or write to a file";
+    case EFBIG:
+      return "raise the limit (ulimit -f), or write to another file";
+    default:
+      return "write somewhere else";
+  }
+}
+
+}  // namespace
+
+TextSink::TextSink(const std::string& path, bool lossless)
+    : label_(path == "-" ? "standard output" : path), lossless_(lossless) {
+  if (path == "-") {
+    adopt(STDOUT_FILENO);
+    return;
+  }
+  // Non-blocking, so that a named pipe without a reader is an error and not a wait.
+  UniqueFd fd(
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644));
+  if (!fd) {
+    const char* what = errno == ENXIO ? "start the reader of the named pipe first"
+                                      : "choose a file that can be written";
+    throw ConfigError(
+        fmt::format("{}: cannot be written: {}; {}", path, std::strerror(errno), what));
+  }
+  adopt(fd.get());
+}
+
+TextSink::TextSink(int fd, std::string label, bool lossless)
+    : label_(std::move(label)), lossless_(lossless) {
+  adopt(fd);
+}
+
+TextSink::~TextSink() {
+  if (fd_ && error_ == 0 && rest_begin_ < rest_end_ && writable(kLastWait_ms)) flush_rest();
+}
+
+void TextSink::adopt(int fd) {
+  struct stat about {};
+  if (fstat(fd, &about) != 0) {
+    throw ConfigError(
+        fmt::format("{}: not open: {}; redirect it somewhere", label_, std::strerror(errno)));
+  }
+  if (S_ISREG(about.st_mode)) kind_ = Kind::file;
+  if (S_ISSOCK(about.st_mode)) kind_ = Kind::socket;
+  if (kind_ == Kind::stream) {
+    // Opened anew: O_NONBLOCK on a duplicate would also change the shell's and the other programs'
+    // view of the stream.
+    const std::string self = fmt::format("/proc/self/fd/{}", fd);
+    fd_.reset(::open(self.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  }
+  if (!fd_) fd_.reset(fcntl(fd, F_DUPFD_CLOEXEC, 0));
+  if (!fd_) {
+    throw ConfigError(fmt::format("{}: cannot be written: {}; redirect it somewhere", label_,
+                                  std::strerror(errno)));
+  }
+}
+
+bool TextSink::writable(int timeout_ms) noexcept {
+  if (kind_ == Kind::file) return true;
+  pollfd waiting{fd_.get(), POLLOUT, 0};
+  // A hang-up counts as writable: the write then names the error.
+  return ::poll(&waiting, 1, timeout_ms) > 0;
+}
+
+bool TextSink::wait_writable() noexcept {
+  while (!stop_is_pending()) {
+    errno = 0;
+    if (writable(kSignalCheck_ms)) return true;
+    if (errno == EINTR) return false;
+  }
+  return false;
+}
+
+long TextSink::put(const char* data, std::size_t size) noexcept {
+  if (kind_ == Kind::socket) return ::send(fd_.get(), data, size, MSG_DONTWAIT | MSG_NOSIGNAL);
+  return ::write(fd_.get(), data, size);
+}
+
+SendStatus TextSink::fail(int error) noexcept {
+  error_ = error;
+  return SendStatus::failed;
+}
+
+SendStatus TextSink::flush_rest() noexcept {
+  while (rest_begin_ < rest_end_) {
+    const long done = put(rest_.data() + rest_begin_, rest_end_ - rest_begin_);
+    if (done < 0 && errno != EAGAIN && errno != EINTR) return fail(errno);
+    if (done > 0) rest_begin_ += static_cast<std::size_t>(done);
+    if (done <= 0 && (!lossless_ || !wait_writable())) return SendStatus::skipped;
+  }
+  return SendStatus::ok;
+}
+
+void TextSink::undo_partial_line(std::size_t written) noexcept {
+  const off_t end = lseek(fd_.get(), 0, SEEK_CUR);
+  struct stat about {};
+  if (end < static_cast<off_t>(written) || fstat(fd_.get(), &about) != 0) return;
+  if (about.st_size != end) return;  // somebody else writes here too
+  const off_t start = end - static_cast<off_t>(written);
+  if (ftruncate(fd_.get(), start) == 0) lseek(fd_.get(), start, SEEK_SET);
+}
+
+SendStatus TextSink::write(std::string_view block) noexcept {
+  if (error_ != 0) return SendStatus::failed;
+  if (block.size() > kMaxBlock) return fail(EMSGSIZE);
+  if (const SendStatus before = flush_rest(); before != SendStatus::ok) return before;
+
+  while (true) {
+    if (!(lossless_ ? wait_writable() : writable(0))) return SendStatus::skipped;
+    const long done = put(block.data(), block.size());
+    if (done < 0) {
+      if (errno != EAGAIN && errno != EINTR) return fail(errno);
+      if (!lossless_) return SendStatus::skipped;
+      continue;  // a pipe that has room, but less than the block
+    }
+    const auto written = static_cast<std::size_t>(done);
+    if (written == block.size()) return SendStatus::ok;
+    if (kind_ == Kind::file) {  // a file takes less than it is given when there is no more room
+      undo_partial_line(written);
+      return fail(ENOSPC);
+    }
+    rest_begin_ = 0;
+    rest_end_ = block.size() - written;
+    std::memcpy(rest_.data(), block.data() + written, rest_end_);
+    return flush_rest() == SendStatus::failed ? SendStatus::failed : SendStatus::ok;
+  }
+}
+
+std::string TextSink::failure() const {
+  return fmt::format("{}: cannot be written: {}; {}", label_, std::strerror(error_),
+                     remedy(error_));
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,222 @@
+#include "host/output/uhid_device.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+
+#include "host/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+/// The kernel takes an event that is cut short after its payload, and reads the rest as zeros.
+struct ShortInput {
+  std::uint32_t type = UHID_INPUT2;
+  std::uint16_t size = 0;
+  std::uint8_t data[64] = {};
+} __attribute__((packed));
+static_assert(offsetof(ShortInput, data) ==
+              offsetof(uhid_event, u) + offsetof(uhid_input2_req, data));
+
+constexpr std::size_t kInputHeader = offsetof(ShortInput, data);
+
+bool printable(const std::string& text) {
+  return std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return c >= 0x20 && c != 0x7f; });
+}
+
+template <std::size_t Size>
+void copy_text(const std::string& text, std::uint8_t (&field)[Size], const char* what) {
+  if (text.size() >= Size || !printable(text)) {
+    throw ConfigError(
+        fmt::format("HID {}: must be printable and shorter than {} bytes; shorten it", what, Size));
+  }
+  std::memcpy(field, text.data(), text.size());
+}
+
+UniqueFd open_uhid() {
+  UniqueFd fd(::open(UhidDevice::kPath, O_RDWR | O_CLOEXEC | O_NONBLOCK));
+  if (!fd) throw ConfigError(cannot_open_node(UhidDevice::kPath, "uhid", errno));
+  return fd;
+}
+
+}  // namespace
+
+std::string hex_id(std::uint16_t vendor, std::uint16_t product) {
+  return fmt::format("{:04x}:{:04x}", vendor, product);
+}
+
+std::string cannot_open_node(const std::string& path, const char* module, int error) {
+  switch (error) {
+    case EACCES:
+    case EPERM:
+      return fmt::format(
+          "{}: permission denied; install 70-tagwrench.rules in /etc/udev/rules.d and join the "
+          "group "
+          "input, or run as root",
+          path);
+    case ENOENT:
+    case ENODEV:
+    case ENXIO:
+      return fmt::format("{}: not there; load the kernel module: sudo modprobe {}", path, module);
+    default:
+      return fmt::format("{}: {}; check it with: ls -l {}", path, std::strerror(error), path);
+  }
+}
+
+UhidDevice::UhidDevice(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor)
+    : UhidDevice(open_uhid(), identity, descriptor) {}
+
+UhidDevice::UhidDevice(UniqueFd uhid, const UhidIdentity& identity,
+                       std::span<const std::uint8_t> descriptor,
+                       std::chrono::milliseconds start_timeout)
+    : uhid_(std::move(uhid)),
+      label_(fmt::format("{}: {} ({})", kPath, identity.name,
+                         hex_id(identity.vendor, identity.product))),
+      event_(std::make_unique<uhid_event>()) {
+  create(identity, descriptor);
+  wait_for_start(identity, start_timeout);
+}
+
+UhidDevice::~UhidDevice() {
+  if (!uhid_) return;
+  const std::uint32_t destroy = UHID_DESTROY;
+  [[maybe_unused]] const ssize_t written = ::write(uhid_.get(), &destroy, sizeof destroy);
+}
+
+void UhidDevice::create(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor) {
+  *event_ = {};
+  event_->type = UHID_CREATE2;
+  uhid_create2_req& request = event_->u.create2;
+  if (identity.name.empty()) throw ConfigError("HID name: empty; give the device a name");
+  copy_text(identity.name, request.name, "name");
+  copy_text("tagwrench", request.phys, "location");
+  copy_text(identity.serial, request.uniq, "serial");
+  if (descriptor.size() > sizeof request.rd_data) {
+    throw ConfigError(label_ + ": report descriptor too long; shorten it");
+  }
+  std::memcpy(request.rd_data, descriptor.data(), descriptor.size());
+  request.rd_size = static_cast<std::uint16_t>(descriptor.size());
+  // hidapi before 0.16 does not list BUS_VIRTUAL.
+  request.bus = BUS_USB;
+  request.vendor = identity.vendor;
+  request.product = identity.product;
+  request.version = 0x0100;
+  if (::write(uhid_.get(), event_.get(), sizeof(uhid_event)) < 0) {
+    throw ConfigError(fmt::format("{}: the kernel refused the device: {}; see dmesg", label_,
+                                  std::strerror(errno)));
+  }
+}
+
+void UhidDevice::wait_for_start(const UhidIdentity& identity, std::chrono::milliseconds timeout) {
+  using Clock = std::chrono::steady_clock;
+  const auto give_up = Clock::now() + timeout;
+  while (true) {
+    while (read_event()) {
+      if (event_->type == UHID_START) return;
+      if (event_->type == UHID_GET_REPORT) answer_get_report();
+    }
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(give_up - Clock::now());
+    if (left.count() <= 0) break;
+    pollfd waiting{uhid_.get(), POLLIN, 0};
+    if (::poll(&waiting, 1, static_cast<int>(left.count())) < 0 && errno != EINTR) break;
+    if ((waiting.revents & POLLIN) == 0 && (waiting.revents & (POLLHUP | POLLERR)) != 0) break;
+  }
+  throw ConfigError(
+      fmt::format("{}: the kernel did not start a device with id {}; load its driver: sudo "
+                  "modprobe hid-generic",
+                  label_, hex_id(identity.vendor, identity.product)));
+}
+
+SendStatus UhidDevice::send(std::span<const std::uint8_t> report) noexcept {
+  ShortInput input;
+  if (report.size() > sizeof input.data) return SendStatus::failed;
+  input.size = static_cast<std::uint16_t>(report.size());
+  std::memcpy(input.data, report.data(), report.size());
+  if (::write(uhid_.get(), &input, kInputHeader + report.size()) < 0) {
+    if (errno == EAGAIN || errno == EINTR) return SendStatus::skipped;
+    error_ = errno;
+    return SendStatus::failed;
+  }
+  std::memcpy(last_input_.bytes.data(), report.data(), report.size());
+  last_input_.size = report.size();
+  return SendStatus::ok;
+}
+
+std::string UhidDevice::failure() const {
+  return fmt::format("{}: the kernel no longer takes reports: {}; start again", label_,
+                     std::strerror(error_));
+}
+
+bool UhidDevice::read_event() noexcept {
+  const ssize_t got = ::read(uhid_.get(), event_.get(), sizeof(uhid_event));
+  if (got < static_cast<ssize_t>(sizeof event_->type)) return false;
+  // A short event leaves no bytes of the one before it.
+  std::memset(reinterpret_cast<char*>(event_.get()) + got, 0,
+              sizeof(uhid_event) - static_cast<std::size_t>(got));
+  return true;
+}
+
+void UhidDevice::answer_get_report() noexcept {
+  const std::uint32_t id = event_->u.get_report.id;
+  const bool known = event_->u.get_report.rtype == UHID_INPUT_REPORT && last_input_.size > 0 &&
+                     last_input_.bytes[0] == event_->u.get_report.rnum;
+  *event_ = {};
+  event_->type = UHID_GET_REPORT_REPLY;
+  uhid_get_report_reply_req& reply = event_->u.get_report_reply;
+  reply.id = id;
+  reply.err = known ? 0 : EIO;
+  if (known) {
+    reply.size = static_cast<std::uint16_t>(last_input_.size);
+    std::memcpy(reply.data, last_input_.bytes.data(), last_input_.size);
+  }
+  [[maybe_unused]] const ssize_t written = ::write(uhid_.get(), event_.get(), sizeof(uhid_event));
+}
+
+std::optional<HidOutputReport> UhidDevice::next_output() noexcept {
+  const auto take = [](const std::uint8_t* data, std::size_t size) {
+    HidOutputReport report;
+    report.size = std::min(size, report.bytes.size());
+    std::memcpy(report.bytes.data(), data, report.size);
+    return report;
+  };
+  while (read_event()) {
+    if (event_->type == UHID_OUTPUT) {
+      const uhid_output_req& output = event_->u.output;
+      if (output.rtype == UHID_OUTPUT_REPORT) return take(output.data, output.size);
+    } else if (event_->type == UHID_GET_REPORT) {
+      answer_get_report();
+    } else if (event_->type == UHID_SET_REPORT) {
+      const std::uint32_t id = event_->u.set_report.id;
+      const bool output = event_->u.set_report.rtype == UHID_OUTPUT_REPORT;
+      const HidOutputReport report = take(event_->u.set_report.data, event_->u.set_report.size);
+      *event_ = {};
+      event_->type = UHID_SET_REPORT_REPLY;
+      event_->u.set_report_reply.id = id;
+      event_->u.set_report_reply.err = output ? 0 : EIO;
+      [[maybe_unused]] const ssize_t n = ::write(uhid_.get(), event_.get(), sizeof(uhid_event));
+      if (output) return report;
+    }
+  }
+  return std::nullopt;
+}
+
+DeadManDevice UhidDevice::dead_man_device(std::span<const std::uint8_t> neutral) const {
+  ShortInput input;
+  const std::size_t size = std::min(neutral.size(), sizeof input.data);
+  input.size = static_cast<std::uint16_t>(size);
+  std::memcpy(input.data, neutral.data(), size);
+  const std::uint32_t destroy = UHID_DESTROY;
+  const auto* input_bytes = reinterpret_cast<const std::uint8_t*>(&input);
+  const auto* destroy_bytes = reinterpret_cast<const std::uint8_t*>(&destroy);
+  return {uhid_.get(),
+          {input_bytes, input_bytes + kInputHeader + size},
+          {destroy_bytes, destroy_bytes + sizeof destroy}};
+}
+
+}  // namespace tagwrench
