@@ -13,8 +13,8 @@ struct CameraModel {
   double cx_px = 319.5;
   double cy_px = 239.5;
   std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3
-  /// The image is flipped left to right, as many camera modules deliver it. All other parameters describe the image
-  /// after it has been flipped back.
+  /// The image is flipped left to right, as many camera modules deliver it. All other parameters
+  /// describe the image after it has been flipped back.
   bool mirrored = false;
 };
 

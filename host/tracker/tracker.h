@@ -1,7 +1,7 @@
 // Frame -> displacement of the platform from rest.
 //
 // acquire   image -> tag corners. OpenCV lives there; runs only while the target is not held.
-// refine    predicted pose + pixels -> pose with covariance, jointly over all tags as one rigid target.
+// refine    predicted pose + pixels -> pose with covariance, all tags as one rigid target.
 // rest      learns the rest pose and the tags' placement from the first frames.
 #pragma once
 

@@ -1,0 +1,187 @@
+#include "host/tracker/edge_measure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/tracker/projection.h"
+
+namespace tagwrench {
+namespace {
+
+/// Part of the way to the next edge that a profile may take.
+constexpr double kReachUsed = 0.85;
+
+/// Less contrast than this is noise, grey levels.
+constexpr float kLeastContrast = 12.0F;
+
+/// And less than this part of the contrast at rest is not the edge that was learned.
+constexpr float kLeastContrastPart = 0.35F;
+
+/// A falling gradient of up to this size is noise as well, grey levels per px.
+constexpr float kCoarseNoise = 3.0F;
+
+template <class Pixel>
+float sample(const Pixel* pixels, int stride, float x, float y) {
+  const int column = static_cast<int>(x);
+  const int row = static_cast<int>(y);
+  const float fx = x - static_cast<float>(column);
+  const float fy = y - static_cast<float>(row);
+  const Pixel* p = pixels + static_cast<std::ptrdiff_t>(row) * stride + column;
+  const Pixel* q = p + stride;
+  const float upper =
+      static_cast<float>(p[0]) + fx * (static_cast<float>(p[1]) - static_cast<float>(p[0]));
+  const float lower =
+      static_cast<float>(q[0]) + fx * (static_cast<float>(q[1]) - static_cast<float>(q[0]));
+  return upper + fy * (lower - upper);
+}
+
+/// Bilinear sampling reads one pixel to the right and below. False for NaN too.
+template <class Pixel>
+bool inside(const PixelView<Pixel>& image, double x, double y) {
+  return x >= 0.0 && y >= 0.0 && x < image.width - 1.001 && y < image.height - 1.001;
+}
+
+}  // namespace
+
+EdgeMeter::EdgeMeter(const CameraModel& camera) : camera_(camera) {
+  for (int k = 0; k < kWindows; ++k) {
+    const double half = kSmallestHalf_px + k * kHalfStep_px;
+    Window& window = windows_[static_cast<std::size_t>(k)];
+    window.reach_px = std::min(kReach_px, static_cast<int>(std::ceil(half)));
+    for (int i = 0; i < 2 * window.reach_px; ++i) {
+      const double s = i + 0.5 - window.reach_px;
+      const double q = s * s / (half * half);
+      if (q >= 1.0) continue;
+      const auto at = static_cast<std::size_t>(i);
+      const double w = (1 - q) * (1 - q);
+      const double dw = -4 * s / (half * half) * (1 - q);
+      window.weight[at] = static_cast<float>(w);
+      window.moment[at] = static_cast<float>(s * w);
+      window.slope[at] = static_cast<float>(w + s * dw);
+      window.drift[at] = static_cast<float>(dw);
+    }
+  }
+}
+
+template <class Pixel>
+void EdgeMeter::take(const PixelView<Pixel>& image, const Eigen::Vector2d& centre,
+                     const Eigen::Vector2d& direction, const Window& window, bool coarse,
+                     float least_contrast, EdgeMeasurement& out) const noexcept {
+  const int reach = window.reach_px;
+  double x0 = centre.x() - reach * direction.x();
+  double x1 = centre.x() + reach * direction.x();
+  double step_x = direction.x();
+  if (camera_.mirrored) {
+    x0 = image.width - 1 - x0;
+    x1 = image.width - 1 - x1;
+    step_x = -step_x;
+  }
+  const double y0 = centre.y() - reach * direction.y();
+  const double y1 = centre.y() + reach * direction.y();
+  if (!inside(image, x0, y0) || !inside(image, x1, y1)) return;
+
+  const auto fx = static_cast<float>(x0);
+  const auto fy = static_cast<float>(y0);
+  const auto sx = static_cast<float>(step_x);
+  const auto sy = static_cast<float>(direction.y());
+  std::array<float, kSteps + 1> levels;
+  for (int i = 0; i <= 2 * reach; ++i) {
+    const auto t = static_cast<float>(i);
+    // Rounding may step past the border by a hair at the far end.
+    levels[static_cast<std::size_t>(i)] = sample(
+        image.pixels, image.stride, std::max(0.0F, fx + t * sx), std::max(0.0F, fy + t * sy));
+  }
+  float mass = 0;
+  float moment = 0;
+  float slope = 0;
+  float drift = 0;
+  for (int i = 0; i < 2 * reach; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    float gradient = levels[at + 1] - levels[at];
+    if (coarse) gradient = std::max(0.0F, gradient - kCoarseNoise);
+    mass += window.weight[at] * gradient;
+    moment += window.moment[at] * gradient;
+    slope += window.slope[at] * gradient;
+    drift += window.drift[at] * gradient;
+  }
+  out.contrast = mass;
+  if (!(mass > least_contrast)) return;
+  out.offset_px = moment / mass;
+  out.gain = (slope - out.offset_px * drift) / mass;
+  out.valid = true;
+}
+
+template <class Pixel>
+void EdgeMeter::measure(const PixelView<Pixel>& image, const EdgeTag& tag,
+                        const Eigen::Isometry3d& camera_T_platform, double half_width_px,
+                        bool coarse, std::span<EdgeMeasurement> out) const noexcept {
+  const Eigen::Isometry3d camera_T_tag = camera_T_platform * tag.platform_T_tag;
+  const Eigen::Vector3d origin = camera_T_tag.translation();
+  const Eigen::Vector3d axis_x = camera_T_tag.linear().col(0);
+  const Eigen::Vector3d axis_y = camera_T_tag.linear().col(1);
+  const Eigen::Vector3d centre = camera_T_platform.translation();
+  const std::size_t count = std::min(out.size(), tag.points.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const EdgePoint& point = tag.points[i];
+    EdgeMeasurement& m = out[i];
+    m.valid = false;
+    m.weight = 0;
+    const Eigen::Vector3d p = origin + point.x * axis_x + point.y * axis_y;
+    const ProjectedPoint projected = project(camera_, p);
+    if (!projected.valid) continue;
+
+    const Eigen::Vector2d along_x = projected.jacobian * axis_x;
+    const Eigen::Vector2d along_y = projected.jacobian * axis_y;
+    const bool normal_x = point.normal == EdgeNormal::plus_x || point.normal == EdgeNormal::minus_x;
+    const bool reversed =
+        point.normal == EdgeNormal::minus_x || point.normal == EdgeNormal::minus_y;
+    const Eigen::Vector2d& tangent = normal_x ? along_y : along_x;
+    Eigen::Vector2d toward_white = normal_x ? along_x : along_y;
+    if (reversed) toward_white = -toward_white;
+    const double length = tangent.norm();
+    if (!(length > 0)) continue;
+    Eigen::Vector2d direction(-tangent.y() / length, tangent.x() / length);
+    m.px_per_m = direction.dot(toward_white);
+    if (m.px_per_m < 0) {
+      direction = -direction;
+      m.px_per_m = -m.px_per_m;
+    }
+    const double half =
+        std::min({half_width_px, kReachUsed * point.reach * m.px_per_m, kWidestHalf_px});
+    if (!(half >= kSmallestHalf_px)) continue;
+    const auto window =
+        static_cast<std::size_t>(std::lround((half - kSmallestHalf_px) / kHalfStep_px));
+    take(image, projected.pixel, direction, windows_[std::min<std::size_t>(window, kWindows - 1)],
+         coarse, std::max(kLeastContrast, kLeastContrastPart * point.contrast), m);
+    if (!m.valid) continue;
+    const Eigen::Vector3d pull = projected.jacobian.transpose() * direction;
+    m.row.head<3>() = pull;
+    m.row.tail<3>() = (p - centre).cross(pull);
+  }
+}
+
+template <class Pixel>
+double EdgeMeter::cell_grey(const PixelView<Pixel>& image, const EdgeTag& tag,
+                            const CellPoint& cell,
+                            const Eigen::Isometry3d& camera_T_platform) const noexcept {
+  const Eigen::Vector3d p =
+      camera_T_platform * (tag.platform_T_tag * Eigen::Vector3d(cell.x, cell.y, 0));
+  const ProjectedPoint projected = project(camera_, p);
+  if (!projected.valid) return -1;
+  const double x = camera_.mirrored ? image.width - 1 - projected.pixel.x() : projected.pixel.x();
+  if (!inside(image, x, projected.pixel.y())) return -1;
+  return sample(image.pixels, image.stride, static_cast<float>(x),
+                static_cast<float>(projected.pixel.y()));
+}
+
+template void EdgeMeter::measure(const PixelView<std::uint8_t>&, const EdgeTag&,
+                                 const Eigen::Isometry3d&, double, bool,
+                                 std::span<EdgeMeasurement>) const noexcept;
+template void EdgeMeter::measure(const PixelView<float>&, const EdgeTag&, const Eigen::Isometry3d&,
+                                 double, bool, std::span<EdgeMeasurement>) const noexcept;
+template double EdgeMeter::cell_grey(const PixelView<std::uint8_t>&, const EdgeTag&,
+                                     const CellPoint&, const Eigen::Isometry3d&) const noexcept;
+template double EdgeMeter::cell_grey(const PixelView<float>&, const EdgeTag&, const CellPoint&,
+                                     const Eigen::Isometry3d&) const noexcept;
+
+}  // namespace tagwrench

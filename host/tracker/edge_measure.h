@@ -1,0 +1,87 @@
+// Where the boundaries of a tag really are in an image, seen from a pose that is nearly right.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <span>
+#include <vector>
+
+#include "host/tracker/camera_model.h"
+#include "host/tracker/edges.h"
+#include "host/types.h"
+
+namespace tagwrench {
+
+/// Luminance of any number type, borrowed. Row r starts at pixels + r * stride.
+template <class Pixel>
+struct PixelView {
+  const Pixel* pixels = nullptr;
+  int width = 0;
+  int height = 0;
+  int stride = 0;
+};
+
+/// One edge point's place in the image.
+struct EdgeMeasurement {
+  Vector6 row = Vector6::Zero();  ///< d offset_px / d motion of the platform (m, rad, camera axes;
+                                  ///< see rotation.h)
+  double offset_px = 0;           ///< of the edge from its predicted place, toward the white side
+  double gain =
+      1;  ///< d offset_px / d true offset: below 1, for the profile is cut off and blurred
+  double contrast =
+      0;  ///< weighted grey levels across the edge, positive when black and white are as printed
+  double px_per_m = 0;  ///< image distance per distance along the normal in the tag's plane
+  double weight = 0;    ///< for the solver
+  bool valid = false;   ///< projected, inside the image, and with contrast
+};
+
+/// Takes profiles across edges and finds the edge in each by the centroid of its gradient under a
+/// symmetric window. Where the predicted place is right, the centroid of any symmetric edge is
+/// zero, whatever its blur: the truncation of the profile slows convergence and leaves no bias. The
+/// gain is the exact derivative of the centroid.
+class EdgeMeter {
+ public:
+  static constexpr double kWidestHalf_px = 10.0;
+
+  explicit EdgeMeter(const CameraModel& camera);
+
+  /// Fills `out`, one for each point of the tag. Profiles reach half_width_px to each side or as
+  /// far as the pattern allows. `coarse` ignores falling gradients, so that a neighbouring edge in
+  /// the window does not pull.
+  template <class Pixel>
+  void measure(const PixelView<Pixel>& image, const EdgeTag& tag,
+               const Eigen::Isometry3d& camera_T_platform, double half_width_px, bool coarse,
+               std::span<EdgeMeasurement> out) const noexcept;
+
+  /// Grey level in the middle of a cell; negative outside the image.
+  template <class Pixel>
+  double cell_grey(const PixelView<Pixel>& image, const EdgeTag& tag, const CellPoint& cell,
+                   const Eigen::Isometry3d& camera_T_platform) const noexcept;
+
+  const CameraModel& camera() const noexcept { return camera_; }
+
+ private:
+  static constexpr int kReach_px = 10;          // samples to each side at most
+  static constexpr int kSteps = 2 * kReach_px;  // gradients lie between samples
+  static constexpr double kSmallestHalf_px = 1.5;
+  static constexpr double kHalfStep_px = 0.25;
+  static constexpr int kWindows = 35;  // 1.5 .. 10 px
+
+  struct Window {
+    int reach_px = 0;                    // samples -reach..reach
+    std::array<float, kSteps> weight{};  // w(s) at s = -reach + 1/2 + i
+    std::array<float, kSteps> moment{};  // s w(s)
+    std::array<float, kSteps> slope{};   // d(s w)/ds
+    std::array<float, kSteps> drift{};   // dw/ds
+  };
+
+  template <class Pixel>
+  void take(const PixelView<Pixel>& image, const Eigen::Vector2d& centre,
+            const Eigen::Vector2d& direction, const Window& window, bool coarse,
+            float least_contrast, EdgeMeasurement& out) const noexcept;
+
+  CameraModel camera_;
+  std::array<Window, kWindows> windows_{};
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,190 @@
+#include "host/tracker/rest.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/tracker/appearance.h"
+#include "host/tracker/projection.h"
+#include "host/tracker/rotation.h"
+
+namespace tagwrench {
+namespace {
+
+/// Motion of the tags' corners that spoils the average, px: a fifth of the blur would still be
+/// harmless.
+constexpr double kMoved_px = 0.5;
+
+PixelView<std::uint8_t> view(const ImageView& image) {
+  return {image.pixels, image.width, image.height, image.stride};
+}
+
+}  // namespace
+
+RestLearner::RestLearner(const CameraModel& camera, const TargetDescription& target,
+                         const RestOptions& options, const std::vector<TagPattern>& patterns)
+    : camera_(camera),
+      description_(target),
+      options_(options),
+      patterns_(patterns),
+      meter_(camera),
+      single_(camera),
+      joint_(camera) {}
+
+RestLearner::Progress RestLearner::add(const ImageView& image, const Finding& finding) {
+  if (frames_ == 0) {
+    if (!start(image, finding)) return Progress::waiting;
+  } else {
+    const Refinement fit = joint_.refine(view(image), last_pose_);
+    tags_seen_ = fit.tags_held;
+    const bool all = fit.verdict == Verdict::held && fit.tags_held == description_.tags.size();
+    const bool has_moved = all && motion_px(fit.camera_T_platform) > kMoved_px;
+    if (!all || has_moved) {
+      frames_ = 0;
+      return has_moved ? Progress::moved : Progress::waiting;
+    }
+    last_pose_ = fit.camera_T_platform;
+  }
+  accumulate(image);
+  if (frames_ < std::max(1, options_.frames)) return Progress::learning;
+  const bool learned = finish();
+  frames_ = 0;
+  return learned ? Progress::done : Progress::waiting;
+}
+
+bool RestLearner::start(const ImageView& image, const Finding& finding) {
+  tags_seen_ = static_cast<int>(finding.tags.size());
+  if (finding.tags.size() != description_.tags.size()) return false;
+  std::vector<Eigen::Isometry3d> camera_T_tag(description_.tags.size());
+  for (const FoundTag& found : finding.tags) {
+    const std::optional<Eigen::Isometry3d> pose = tag_pose(image, found);
+    if (!pose) return false;
+    camera_T_tag[found.index] = *pose;
+  }
+  if (!place(camera_T_tag)) return false;
+  joint_.set_target(learned_.target);
+  const Refinement fit = joint_.refine(view(image), learned_.camera_T_platform);
+  if (fit.verdict != Verdict::held || fit.tags_held != description_.tags.size()) return false;
+  first_pose_ = last_pose_ = fit.camera_T_platform;
+  return true;
+}
+
+/// Of the two poses that four corners allow, the edges of the whole tag choose one.
+std::optional<Eigen::Isometry3d> RestLearner::tag_pose(const ImageView& image,
+                                                       const FoundTag& found) {
+  single_.set_target({{make_edge_tag(patterns_[found.index], Eigen::Isometry3d::Identity())}, 0});
+  std::optional<Eigen::Isometry3d> best;
+  double least_px = 1e9;
+  for (const Eigen::Isometry3d& candidate : found.camera_T_tag) {
+    const Refinement fit = single_.refine(view(image), candidate);
+    if (fit.verdict != Verdict::held || fit.residual_px >= least_px) continue;
+    if (fit.camera_T_platform.linear().col(2).dot(fit.camera_T_platform.translation()) <= 0)
+      continue;
+    best = fit.camera_T_platform;
+    least_px = fit.residual_px;
+  }
+  return best;
+}
+
+/// The platform frame and the tags in it, as far as the description leaves them open; fills
+/// learned_.
+bool RestLearner::place(const std::vector<Eigen::Isometry3d>& camera_T_tag) {
+  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
+  bool placed = false;
+  if (options_.camera_T_platform) {
+    camera_T_platform = *options_.camera_T_platform;
+    placed = true;
+  } else {
+    for (std::size_t t = 0; t < camera_T_tag.size() && !placed; ++t) {
+      const auto& given = description_.tags[t].platform_T_tag;
+      if (!given) continue;
+      camera_T_platform = camera_T_tag[t] * given->inverse();
+      placed = true;
+    }
+  }
+  if (!placed) {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (const Eigen::Isometry3d& pose : camera_T_tag) centre += pose.translation();
+    camera_T_platform.translation() = centre / static_cast<double>(camera_T_tag.size());
+  }
+  learned_.camera_T_platform = camera_T_platform;
+  learned_.target = {};
+  for (std::size_t t = 0; t < camera_T_tag.size(); ++t) {
+    const auto& given = description_.tags[t].platform_T_tag;
+    const Eigen::Isometry3d platform_T_tag =
+        given ? *given : camera_T_platform.inverse() * camera_T_tag[t];
+    learned_.target.tags.push_back(make_edge_tag(patterns_[t], platform_T_tag));
+  }
+  return camera_T_platform.matrix().allFinite();
+}
+
+void RestLearner::accumulate(const ImageView& image) {
+  const auto width = static_cast<std::size_t>(image.width);
+  if (frames_ == 0) sum_.assign(width * static_cast<std::size_t>(image.height), 0.0F);
+  for (int row = 0; row < image.height; ++row) {
+    const std::uint8_t* from = image.pixels + static_cast<std::ptrdiff_t>(row) * image.stride;
+    float* to = sum_.data() + static_cast<std::size_t>(row) * width;
+    for (std::size_t column = 0; column < width; ++column)
+      to[column] += static_cast<float>(from[column]);
+  }
+  ++frames_;
+}
+
+/// RMS motion of the tags' centres and edges in the image since the first frame.
+double RestLearner::motion_px(const Eigen::Isometry3d& camera_T_platform) const {
+  double squares = 0;
+  double count = 0;
+  for (const EdgeTag& tag : joint_.target().tags) {
+    for (const EdgePoint& point : tag.points) {
+      const Eigen::Vector3d p = tag.platform_T_tag * Eigen::Vector3d(point.x, point.y, 0);
+      const ProjectedPoint before = project(camera_, first_pose_ * p);
+      const ProjectedPoint now = project(camera_, camera_T_platform * p);
+      if (!before.valid || !now.valid) continue;
+      squares += (now.pixel - before.pixel).squaredNorm();
+      count += 1;
+    }
+  }
+  return std::sqrt(squares / std::max(1.0, count));
+}
+
+bool RestLearner::finish() {
+  const float scale = 1.0F / static_cast<float>(frames_);
+  for (float& level : sum_) level *= scale;
+  const PixelView<float> mean{sum_.data(), camera_.width_px, camera_.height_px, camera_.width_px};
+
+  // Every tag by itself, from where the joint fit has it.
+  std::vector<Eigen::Isometry3d> camera_T_tag;
+  std::vector<EdgeTag> spread;
+  for (std::size_t t = 0; t < patterns_.size(); ++t) {
+    Eigen::Isometry3d pose = last_pose_ * joint_.target().tags[t].platform_T_tag;
+    EdgeTarget alone{{make_edge_tag(patterns_[t], Eigen::Isometry3d::Identity())}, 0};
+    if (!fit_pose_and_spread(meter_, mean, alone, pose)) return false;
+    camera_T_tag.push_back(pose);
+    spread.push_back(std::move(alone.tags.front()));
+  }
+  if (!place(camera_T_tag)) return false;
+  bool any_given = false;
+  for (std::size_t t = 0; t < spread.size(); ++t) {
+    any_given = any_given || description_.tags[t].platform_T_tag.has_value();
+    learned_.target.tags[t].points = std::move(spread[t].points);
+  }
+  Eigen::Isometry3d fitted = learned_.camera_T_platform;
+  if (any_given) {
+    // Given tags make one rigid body: they and the rest pose are fitted together, and the open ones
+    // placed by it.
+    EdgeTarget given;
+    for (std::size_t t = 0; t < patterns_.size(); ++t) {
+      if (description_.tags[t].platform_T_tag) given.tags.push_back(learned_.target.tags[t]);
+    }
+    fitted = last_pose_;
+    if (!fit_pose_and_spread(meter_, mean, given, fitted)) return false;
+    if (!options_.camera_T_platform) learned_.camera_T_platform = fitted;
+    for (std::size_t t = 0; t < patterns_.size(); ++t) {
+      if (!description_.tags[t].platform_T_tag) {
+        learned_.target.tags[t].platform_T_tag = fitted.inverse() * camera_T_tag[t];
+      }
+    }
+  }
+  return learn_appearance(meter_, mean, learned_.target, fitted);
+}
+
+}  // namespace tagwrench

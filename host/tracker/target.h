@@ -1,0 +1,59 @@
+// The rigid target under the platform: which tags, how large, and where they sit, as far as that is
+// known.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace tagwrench {
+
+// clang-format off
+enum class TagFamily : std::uint8_t {
+  aruco_original,
+  aruco_4x4_50, aruco_4x4_100, aruco_4x4_250, aruco_4x4_1000,
+  aruco_5x5_50, aruco_5x5_100, aruco_5x5_250, aruco_5x5_1000,
+  aruco_6x6_50, aruco_6x6_100, aruco_6x6_250, aruco_6x6_1000,
+  aruco_7x7_50, aruco_7x7_100, aruco_7x7_250, aruco_7x7_1000,
+  apriltag_16h5, apriltag_25h9, apriltag_36h10, apriltag_36h11,
+};
+// clang-format on
+
+constexpr int kTagFamilies = 21;
+
+/// A target may carry at most this many tags.
+constexpr int kMaxTags = 8;
+
+/// The family's name as sensor.yaml writes it: "aruco_original", "aruco_4x4_50", "apriltag_36h11".
+std::string_view name(TagFamily family);
+
+/// The inverse of name(); empty for a name that is not in the table.
+std::optional<TagFamily> family_from_name(std::string_view text);
+
+/// Data bits along one side; the black square is two cells (its border) wider.
+int bits_per_side(TagFamily family);
+
+/// Number of ids in the family: ids run from 0 to one less.
+int id_count(TagFamily family);
+
+struct Tag {
+  int id = 0;
+  std::optional<Eigen::Isometry3d> platform_T_tag;  ///< learned at rest when absent
+};
+
+struct TargetDescription {
+  TagFamily family = TagFamily::aruco_original;
+  double tag_size = 3.8e-3;  ///< edge of the black square, m
+  double border = 0.35e-3;   ///< white margin around it, m
+  std::vector<Tag> tags = {{5, {}}, {2, {}}};
+};
+
+struct RestOptions {
+  int frames = 25;  ///< the first frames, taken at rest
+  std::optional<Eigen::Isometry3d>
+      camera_T_platform;  ///< known rest pose; learned from the rest frames when absent
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,355 @@
+// Frames in, displacement out, on pictures from render.h.
+#include "host/tracker/tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "tests/unit/tracker/render.h"
+
+namespace tagwrench {
+namespace {
+
+using render::Picture;
+using render::Scene;
+
+constexpr int kRestFrames = 25;
+constexpr Duration kPeriod = std::chrono::milliseconds(40);
+
+CameraModel camera_of(const Scene& scene) {
+  CameraModel camera;
+  camera.fx_px = camera.fy_px = scene.f_px;
+  camera.distortion[0] = scene.k1;
+  camera.mirrored = scene.mirrored;
+  return camera;
+}
+
+TargetDescription ids(TagFamily family, std::vector<int> list) {
+  TargetDescription target;
+  target.family = family;
+  target.tags.clear();
+  for (const int id : list) target.tags.push_back({id, {}});
+  return target;
+}
+
+TargetDescription roof_target() { return ids(TagFamily::aruco_original, {5, 2}); }
+
+Vector6 pose6(double x_mm, double y_mm, double z_mm, double rx, double ry, double rz) {
+  Vector6 d;
+  d << x_mm * 1e-3, y_mm * 1e-3, z_mm * 1e-3, rx, ry, rz;
+  return d;
+}
+
+/// A tracker, its scene and its clock.
+struct Bench {
+  Scene scene;
+  Tracker tracker;
+  std::mt19937 random{7};
+  std::uint64_t sequence = 0;
+
+  Bench(Scene the_scene, const TargetDescription& target, RestOptions rest = {kRestFrames, {}})
+      : scene(std::move(the_scene)), tracker(camera_of(scene), target, rest) {}
+
+  Track show(const Picture& picture) {
+    Frame frame;
+    frame.image = picture.view();
+    frame.sequence = sequence;
+    frame.capture_time = TimePoint{} + kPeriod * static_cast<int>(sequence++);
+    return tracker.track(frame);
+  }
+  Track show(const Vector6& displacement) {
+    return show(render::take(scene, displacement, random));
+  }
+
+  /// Rest frames until learned; the last Track.
+  Track rest() {
+    const std::vector<float> light = render::expose(scene, Vector6::Zero());
+    Track track;
+    for (int i = 0; i < kRestFrames; ++i) track = show(render::develop(scene, light, random));
+    return track;
+  }
+};
+
+/// Smooth motion over all six axes: up to 0.6 mm and 40 mrad, below 5 px a frame.
+Vector6 sway(int i) {
+  const double t = 0.21 * i;
+  return pose6(0.6 * std::sin(t), 0.5 * std::sin(1.3 * t), 0.5 * std::sin(0.7 * t),
+               0.04 * std::sin(0.9 * t), 0.035 * std::sin(1.1 * t), 0.04 * std::sin(1.7 * t));
+}
+
+struct Errors {
+  Vector6 rms = Vector6::Zero();
+  Vector6 normalised = Vector6::Zero();  // mean of (error / sigma)^2
+  int ok = 0;
+};
+
+Errors follow(Bench& bench, int frames) {
+  Errors errors;
+  for (int i = 0; i < frames; ++i) {
+    const Vector6 truth = sway(i);
+    const Track track = bench.show(truth);
+    if (track.status != Status::ok) continue;
+    const Vector6 error = track.displacement - truth;
+    errors.rms += error.cwiseAbs2();
+    errors.normalised += error.cwiseAbs2().cwiseQuotient(track.covariance.diagonal());
+    ++errors.ok;
+  }
+  errors.rms = (errors.rms / std::max(1, errors.ok)).cwiseSqrt();
+  errors.normalised /= std::max(1, errors.ok);
+  std::printf(
+      "rms um %.3f %.3f %.3f mrad %.4f %.4f %.4f  (e/sigma)^2 %.1f %.1f %.1f %.1f %.1f %.1f\n",
+      errors.rms[0] * 1e6, errors.rms[1] * 1e6, errors.rms[2] * 1e6, errors.rms[3] * 1e3,
+      errors.rms[4] * 1e3, errors.rms[5] * 1e3, errors.normalised[0], errors.normalised[1],
+      errors.normalised[2], errors.normalised[3], errors.normalised[4], errors.normalised[5]);
+  return errors;
+}
+
+void expect_accurate(const Errors& errors, int frames, double xy_um, double z_um,
+                     double rotation_mrad) {
+  EXPECT_EQ(errors.ok, frames);
+  EXPECT_LT(errors.rms[0] * 1e6, xy_um);
+  EXPECT_LT(errors.rms[1] * 1e6, xy_um);
+  EXPECT_LT(errors.rms[2] * 1e6, z_um);
+  for (int i = 3; i < 6; ++i) EXPECT_LT(errors.rms[i] * 1e3, rotation_mrad) << i;
+}
+
+TEST(Tracker, FollowsTheRoofInSixAxes) {
+  Bench bench(render::roof(), roof_target());
+  const Track last = bench.rest();
+  EXPECT_EQ(last.hint, Hint::rest_learned);
+  expect_accurate(follow(bench, 40), 40, 1.0, 3.0, 0.3);
+}
+
+TEST(Tracker, InkSpreadDoesNotChangeTheScale) {
+  Scene scene = render::roof();
+  for (auto& tag : scene.tags) tag.ink_spread = 25e-6;
+  Bench bench(scene, roof_target());
+  bench.rest();
+  expect_accurate(follow(bench, 25), 25, 1.0, 3.0, 0.3);
+}
+
+TEST(Tracker, LensDistortionIsUndone) {
+  Scene scene = render::roof();
+  scene.k1 = -0.25;
+  Bench bench(scene, roof_target());
+  bench.rest();
+  expect_accurate(follow(bench, 25), 25, 1.0, 3.0, 0.3);
+}
+
+TEST(Tracker, MirroredCameraGivesTheSameDisplacement) {
+  Scene scene = render::roof();
+  scene.mirrored = true;
+  Bench bench(scene, roof_target());
+  bench.rest();
+  expect_accurate(follow(bench, 25), 25, 1.0, 3.0, 0.3);
+}
+
+TEST(Tracker, OneTagIsEnough) {
+  Bench bench(render::alone(render::tag_five()), ids(TagFamily::aruco_original, {5}));
+  bench.rest();
+  expect_accurate(follow(bench, 25), 25, 5.0, 15.0, 1.5);
+}
+
+TEST(Tracker, AprilTagIsEnough) {
+  Bench bench(render::alone(render::april_seven()), ids(TagFamily::apriltag_36h11, {7}));
+  bench.rest();
+  expect_accurate(follow(bench, 25), 25, 5.0, 15.0, 1.5);
+}
+
+TEST(Tracker, GivenPlacementAndRestPoseNeedNoLearning) {
+  const Scene scene = render::roof();
+  TargetDescription target = roof_target();
+  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
+  camera_T_platform.translation() = scene.pivot;
+  for (std::size_t t = 0; t < 2; ++t) {
+    target.tags[t].platform_T_tag = camera_T_platform.inverse() * scene.tags[t].camera_T_tag;
+  }
+  Bench bench(scene, target, {kRestFrames, camera_T_platform});
+  expect_accurate(follow(bench, 25), 25, 2.0, 6.0, 0.5);
+}
+
+TEST(Tracker, GivenPlacementLearnsTheRestPoseAlone) {
+  const Scene scene = render::roof();
+  TargetDescription target = roof_target();
+  // A platform frame of its own, away from the midpoint and turned: displacement is about its
+  // origin, camera axes.
+  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
+  camera_T_platform.linear() =
+      Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.6, 0, 0.8)).toRotationMatrix();
+  camera_T_platform.translation() = scene.pivot;
+  for (std::size_t t = 0; t < 2; ++t) {
+    target.tags[t].platform_T_tag = camera_T_platform.inverse() * scene.tags[t].camera_T_tag;
+  }
+  Bench bench(scene, target);
+  bench.rest();
+  expect_accurate(follow(bench, 25), 25, 1.0, 3.0, 0.3);
+}
+
+TEST(Tracker, StaysAcquiringWithZeroNumbersUntilRestIsLearned) {
+  Bench bench(render::roof(), roof_target());
+  const std::vector<float> light = render::expose(bench.scene, Vector6::Zero());
+  for (int i = 0; i < kRestFrames; ++i) {
+    const Track track = bench.show(render::develop(bench.scene, light, bench.random));
+    EXPECT_EQ(track.status, Status::acquiring);
+    EXPECT_TRUE(track.displacement.isZero(0));
+    EXPECT_EQ(track.hint, i + 1 == kRestFrames ? Hint::rest_learned : Hint::none) << i;
+  }
+  EXPECT_EQ(bench.show(Vector6::Zero()).status, Status::ok);
+}
+
+TEST(Tracker, MovingWhileLearningStartsAgain) {
+  Bench bench(render::roof(), roof_target());
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.show(Vector6::Zero()).hint, Hint::none);
+  const Vector6 elsewhere = pose6(0.1, 0, 0, 0, 0, 0);
+  EXPECT_EQ(bench.show(elsewhere).hint, Hint::moved_while_learning);
+  for (int i = 0; i + 1 < kRestFrames; ++i) EXPECT_EQ(bench.show(elsewhere).hint, Hint::none) << i;
+  EXPECT_EQ(bench.show(elsewhere).hint, Hint::rest_learned);
+}
+
+TEST(Tracker, MirroredImageIsRecognised) {
+  Bench bench(render::roof(), roof_target());
+  Scene flipped = bench.scene;
+  flipped.mirrored = true;
+  int hints = 0;
+  for (int i = 0; i < 8; ++i) {
+    const Track track = bench.show(render::take(flipped, Vector6::Zero(), bench.random));
+    EXPECT_EQ(track.status, Status::acquiring);
+    hints += track.hint == Hint::image_looks_mirrored ? 1 : 0;
+  }
+  EXPECT_GE(hints, 1);
+}
+
+TEST(Tracker, UnmirroredImageIsRecognised) {
+  Scene scene = render::roof();
+  scene.mirrored = true;
+  Bench bench(scene, roof_target());
+  scene.mirrored = false;
+  int hints = 0;
+  for (int i = 0; i < 8; ++i) {
+    hints += bench.show(render::take(scene, Vector6::Zero(), bench.random)).hint ==
+             Hint::image_looks_unmirrored;
+  }
+  EXPECT_GE(hints, 1);
+}
+
+/// Covers the rows from `top` to `bottom` with one grey.
+Picture cover(Picture picture, int top, int bottom, std::uint8_t level) {
+  std::fill(picture.pixels.begin() + top * picture.width,
+            picture.pixels.begin() + bottom * picture.width, level);
+  return picture;
+}
+
+TEST(Tracker, OneOfTwoTagsCoveredIsHeldWithLargerSigma) {
+  Bench bench(render::roof(), roof_target());
+  bench.rest();
+  const Vector6 truth = pose6(0.1, 0.05, 0, 0, 0, 0.01);
+  const Track whole = bench.show(truth);
+  ASSERT_EQ(whole.status, Status::ok);
+  ASSERT_EQ(whole.tags_held, 2);
+  const Track half =
+      bench.show(cover(render::take(bench.scene, truth, bench.random), 245, 480, 90));
+  ASSERT_EQ(half.status, Status::ok);
+  EXPECT_EQ(half.tags_held, 1);
+  EXPECT_GT(half.covariance(2, 2), 1.5 * whole.covariance(2, 2));
+  EXPECT_LT((half.displacement - truth).head<3>().norm(), 30e-6);
+}
+
+TEST(Tracker, BothTagsCoveredIsLostAndComesBack) {
+  Bench bench(render::roof(), roof_target());
+  bench.rest();
+  const Vector6 truth = pose6(0.3, -0.2, 0.1, 0.02, 0, -0.03);
+  const Track covered =
+      bench.show(cover(render::take(bench.scene, truth, bench.random), 0, 480, 90));
+  EXPECT_EQ(covered.status, Status::lost);
+  EXPECT_TRUE(covered.displacement.isZero(0));
+  const Track back = bench.show(truth);
+  ASSERT_EQ(back.status, Status::ok);
+  EXPECT_LT((back.displacement - truth).head<3>().norm(), 5e-6);
+}
+
+TEST(Tracker, FastAndAbruptMotionIsFollowedInTheSameFrame) {
+  Bench bench(render::roof(), roof_target());
+  bench.rest();
+  // 0.5 mm is 19 px: to and fro, then stopping dead.
+  for (const double x_mm : {0.0, 0.5, 1.0, 1.5, 1.5, 1.0, 0.0, -0.5, -0.5}) {
+    const Vector6 truth = pose6(x_mm, 0.5 * x_mm, 0, 0, 0, 0.05 * x_mm);
+    const Track track = bench.show(truth);
+    ASSERT_EQ(track.status, Status::ok) << x_mm;
+    EXPECT_LT((track.displacement - truth).head<3>().norm(), 8e-6) << x_mm;
+  }
+}
+
+TEST(Tracker, TargetAtTheImageBorderNeverGivesWrongNumbers) {
+  Bench bench(render::roof(), roof_target());
+  bench.rest();
+  int ok = 0;
+  for (int i = 0; i < 24; ++i) {
+    const Vector6 truth = pose6(0.4 * i, 0, 0, 0, 0, 0);
+    const Track track = bench.show(truth);
+    if (track.status != Status::ok) continue;
+    ++ok;
+    EXPECT_LT((track.displacement - truth).head<3>().norm(), 40e-6) << i;
+  }
+  EXPECT_GE(ok, 10);
+  EXPECT_LT(ok, 24);
+}
+
+TEST(Tracker, StandardDeviationsAreHonest) {
+  Bench bench(render::roof(), roof_target());
+  bench.rest();
+  const std::vector<float> light = render::expose(bench.scene, Vector6::Zero());
+  Vector6 mean = Vector6::Zero();
+  Vector6 squares = Vector6::Zero();
+  Vector6 claimed = Vector6::Zero();
+  constexpr int kFrames = 120;
+  for (int i = 0; i < kFrames; ++i) {
+    const Track track = bench.show(render::develop(bench.scene, light, bench.random));
+    ASSERT_EQ(track.status, Status::ok);
+    mean += track.displacement / kFrames;
+    squares += track.displacement.cwiseAbs2() / kFrames;
+    claimed += track.covariance.diagonal() / kFrames;
+  }
+  const Vector6 ratio = (squares - mean.cwiseAbs2()).cwiseQuotient(claimed);
+  for (int i = 0; i < 6; ++i) {
+    std::printf("axis %d: std %.4g, variance over claimed %.2f\n", i,
+                std::sqrt(squares[i] - mean[i] * mean[i]), ratio[i]);
+    EXPECT_GT(ratio[i], 0.3) << i;
+    EXPECT_LT(ratio[i], 2.5) << i;
+  }
+}
+
+TEST(Tracker, GarbageGivesNoNumbersAndNoNan) {
+  Bench bench(render::roof(), roof_target());
+  bench.rest();
+  std::mt19937 random(3);
+  Picture noise{640, 480, std::vector<std::uint8_t>(640 * 480)};
+  for (auto& pixel : noise.pixels) pixel = static_cast<std::uint8_t>(random());
+  const Picture black{640, 480, std::vector<std::uint8_t>(640 * 480, 0)};
+  const Picture white{640, 480, std::vector<std::uint8_t>(640 * 480, 255)};
+  const Picture tiny{3, 2, std::vector<std::uint8_t>(6, 128)};
+  const Picture none;
+  for (const Picture* picture : std::vector<const Picture*>{&noise, &black, &white, &tiny, &none}) {
+    const Track track = bench.show(*picture);
+    EXPECT_EQ(track.status, Status::lost);
+    EXPECT_TRUE(track.displacement.isZero(0));
+    EXPECT_TRUE(track.covariance.isZero(0));
+    EXPECT_TRUE(std::isfinite(track.residual_px));
+  }
+  EXPECT_EQ(bench.show(Vector6::Zero()).status, Status::ok);
+}
+
+TEST(Tracker, TinyCameraNeverFindsAnything) {
+  CameraModel camera;
+  camera.width_px = 3;
+  camera.height_px = 2;
+  Tracker tracker(camera, roof_target(), {});
+  const Picture tiny{3, 2, std::vector<std::uint8_t>(6, 128)};
+  Frame frame;
+  frame.image = tiny.view();
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(tracker.track(frame).status, Status::acquiring);
+}
+
+}  // namespace
+}  // namespace tagwrench
