@@ -1,86 +1,15 @@
-// A held target is tracked without the heap. glibc's malloc family is counted, which operator new
-// and Eigen go through; this file is left out of sanitizer builds, which bring their own.
+// A held target is tracked without the heap.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cerrno>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 
 #include "host/tracker/tracker.h"
+#include "tests/support/heap_count.h"
 #include "tests/unit/tracker/render.h"
 
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* block, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-}
-
 namespace tagwrench {
 namespace {
-
-class AllocationCounter {
- public:
-  void start() {
-    count_ = 0;
-    on_ = true;
-  }
-  long stop() {
-    on_ = false;
-    return count_;
-  }
-  void tick() {
-    if (on_.load(std::memory_order_relaxed)) ++count_;
-  }
-
- private:
-  std::atomic<bool> on_{false};
-  std::atomic<long> count_{0};
-};
-
-constinit AllocationCounter counter;
-
-}  // namespace
-}  // namespace tagwrench
-
-extern "C" {
-void* malloc(std::size_t size) {
-  tagwrench::counter.tick();
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) {
-  tagwrench::counter.tick();
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, std::size_t size) {
-  tagwrench::counter.tick();
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  tagwrench::counter.tick();
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
-  tagwrench::counter.tick();
-  *block = __libc_memalign(alignment, size);
-  return *block != nullptr ? 0 : ENOMEM;
-}
-}
-
-namespace tagwrench {
-namespace {
-
-TEST(TrackerHeap, CounterSeesNewAndMalloc) {
-  counter.start();
-  auto* number = new int(1);
-  void* block = std::malloc(10);
-  const long count = counter.stop();
-  EXPECT_GE(count, 2);
-  delete number;
-  std::free(block);
-}
 
 TEST(TrackerHeap, HeldTargetAllocatesNothing) {
   const render::Scene scene = render::roof();
@@ -101,7 +30,7 @@ TEST(TrackerHeap, HeldTargetAllocatesNothing) {
     Frame frame;
     frame.image = pictures[i].view();
     frame.capture_time = TimePoint{} + std::chrono::milliseconds(40 * i);
-    if (i == 4) counter.start();
+    if (i == 4) test::start_counting_allocations();
     const auto before = std::chrono::steady_clock::now();
     const Track track = tracker.track(frame);
     if (i >= 4) spent += std::chrono::steady_clock::now() - before;
@@ -109,7 +38,7 @@ TEST(TrackerHeap, HeldTargetAllocatesNothing) {
       EXPECT_EQ(track.status, Status::ok) << i;
     }
   }
-  EXPECT_EQ(counter.stop(), 0);
+  EXPECT_EQ(test::stop_counting_allocations(), 0);
   std::printf("%.0f us a frame\n", static_cast<double>(spent.count()) / 1e3 / 5);
 }
 

@@ -1,0 +1,82 @@
+// The loop itself: what it does when frames come, when they stop coming, and when an output dies.
+#include "tests/sim/played.h"
+
+namespace tagwrench::test {
+namespace {
+
+TEST_F(PipelineLoop, EveryFrameBecomesOneSampleInOrder) {
+  PlayedSource source(kFrames, PlayedSource::After::end);
+  const RunReport report = run(source, std::make_unique<Recorder>());
+  EXPECT_EQ(report.end, RunReport::End::source_ended);
+  EXPECT_EQ(report.frames, static_cast<std::uint64_t>(kFrames));
+  ASSERT_EQ(recorder().samples.size(), static_cast<std::size_t>(kFrames));
+  for (std::size_t i = 0; i < recorder().samples.size(); ++i)
+    EXPECT_EQ(recorder().samples[i].sequence, i);
+  EXPECT_EQ(recorder().samples.front().status, Status::acquiring);
+  EXPECT_EQ(recorder().samples.back().status, Status::ok);
+  // Pushed along camera z, which is up: the HID puck moves up, toward negative Z.
+  EXPECT_GT(recorder().samples.back().wrench[2], 0.5);
+  EXPECT_LT(recorder().samples.back().motion[2], -0.2);
+}
+
+TEST_F(PipelineLoop, AMissingFrameIsOneLostSampleWithZeros) {
+  PlayedSource source(kFrames, PlayedSource::After::silence);
+  RunLimits limits;
+  limits.time = std::chrono::seconds(2);
+  auto recorder_of_loss = std::make_unique<Recorder>([this](const Sample& sample) {
+    if (sample.status == Status::lost) ::eventfd_write(stop_.get(), 1);
+    return SendStatus::ok;
+  });
+  const RunReport report = run(source, std::move(recorder_of_loss), limits);
+  EXPECT_EQ(report.end, RunReport::End::interrupted) << "no neutral sample came";
+  EXPECT_EQ(report.frames, static_cast<std::uint64_t>(kFrames)) << "a missing frame is not a frame";
+  ASSERT_EQ(recorder().samples.size(), static_cast<std::size_t>(kFrames) + 1);
+  EXPECT_EQ(recorder().samples.back().motion, Vector6::Zero().eval());
+  EXPECT_EQ(recorder().samples.back().wrench, Vector6::Zero().eval());
+}
+
+TEST_F(PipelineLoop, ADisconnectedCameraIsNeutralAtOnceAndSaid) {
+  PlayedSource source(kFrames, PlayedSource::After::disconnect);
+  RunLimits limits;
+  limits.time = std::chrono::milliseconds(200);
+  run(source, std::make_unique<Recorder>(), limits);
+  ASSERT_FALSE(recorder().samples.empty());
+  EXPECT_EQ(recorder().samples.back().status, Status::lost);
+  EXPECT_EQ(recorder().notices.back(), "the camera went away");
+}
+
+TEST_F(PipelineLoop, AFailedOutputEndsTheRunWithItsReason) {
+  PlayedSource source(kFrames, PlayedSource::After::end);
+  const RunReport report = run(source, std::make_unique<Recorder>([](const Sample& sample) {
+                                 return sample.sequence == 3 ? SendStatus::failed : SendStatus::ok;
+                               }));
+  EXPECT_EQ(report.end, RunReport::End::output_failed);
+  EXPECT_EQ(report.failure, "recorder: broken on purpose");
+  EXPECT_EQ(recorder().samples.size(), 4u);
+}
+
+TEST_F(PipelineLoop, SkippedSamplesAreCounted) {
+  PlayedSource source(kFrames, PlayedSource::After::end);
+  const RunReport report =
+      run(source, std::make_unique<Recorder>([](const Sample& sample) {
+            return sample.sequence % 2 == 0 ? SendStatus::skipped : SendStatus::ok;
+          }));
+  EXPECT_EQ(report.skipped, 6u);
+}
+
+TEST_F(PipelineLoop, EndsAfterTheFramesAskedFor) {
+  PlayedSource source(kFrames, PlayedSource::After::silence);
+  RunLimits limits;
+  limits.frames = 4;
+  EXPECT_EQ(run(source, std::make_unique<Recorder>(), limits).frames, 4u);
+}
+
+TEST_F(PipelineLoop, AHintIsSaidOnce) {
+  PlayedSource source(kFrames, PlayedSource::After::end);
+  run(source, std::make_unique<Recorder>());
+  ASSERT_EQ(recorder().notices.size(), 1u);
+  EXPECT_NE(recorder().notices[0].find("rest pose learned"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tagwrench::test
