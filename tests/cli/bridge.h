@@ -64,9 +64,9 @@ class Bridge {
     }
   }
 
-  /// Waits until standard output holds `text` (true) or has ended (false).
-  bool wait_for(const std::string& text) {
-    while (outcome_.out.find(text) == std::string::npos) {
+  /// Waits until standard output holds `count` lines (true) or has ended (false).
+  bool wait_for_lines(std::ptrdiff_t count) {
+    while (std::count(outcome_.out.begin(), outcome_.out.end(), '\n') < count) {
       if (!pump()) return false;
     }
     return true;
