@@ -50,6 +50,7 @@ Pipeline::Pipeline(FrameSource& source, Tracker& tracker, const WrenchEstimator&
       outputs_(outputs),
       dead_man_(dead_man),
       stop_fd_(stop_fd),
+      intervals_{source.format().period, source.format().period, source.format().period},
       interval_(source.format().period) {}
 
 /// The life of a frame.
@@ -121,11 +122,7 @@ void Pipeline::read_source() noexcept {
   Frame frame;
   switch (source_.read(frame)) {
     case ReadStatus::frame: {
-      const TimePoint now = std::chrono::steady_clock::now();
-      const Duration since = now - last_arrival_;
-      interval_ = std::clamp(interval_ + (since - interval_) / 8, source_.format().period,
-                             std::max<Duration>(source_.format().period, kSlowestInterval));
-      last_arrival_ = now;
+      note_arrival(std::chrono::steady_clock::now());
       step(frame);
       return;
     }
@@ -142,6 +139,17 @@ void Pipeline::read_source() noexcept {
       end_ = RunReport::End::source_ended;
       return;
   }
+}
+
+/// The median of three intervals: one hiccup does not delay the next neutral, a camera that slows
+/// down is believed.
+void Pipeline::note_arrival(TimePoint now) noexcept {
+  intervals_ = {intervals_[1], intervals_[2], now - last_arrival_};
+  last_arrival_ = now;
+  std::array<Duration, 3> sorted = intervals_;
+  std::sort(sorted.begin(), sorted.end());
+  const Duration period = source_.format().period;
+  interval_ = std::clamp(sorted[1], period, std::max(period, kSlowestInterval));
 }
 
 void Pipeline::send(const Sample& sample) noexcept {

@@ -2,6 +2,7 @@
 // that drives it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -51,6 +52,7 @@ class Pipeline {
   void send(const Sample& sample) noexcept;
   void send_neutral() noexcept;
   void read_source() noexcept;
+  void note_arrival(TimePoint now) noexcept;
   void wait(TimePoint until) noexcept;
   void say(std::string_view line) noexcept;
   void say_hint(Hint hint) noexcept;
@@ -66,7 +68,8 @@ class Pipeline {
 
   TimePoint start_{};
   TimePoint last_arrival_{};
-  Duration interval_;  ///< between frames as they really come, at least the announced period
+  std::array<Duration, 3> intervals_;  ///< the last three between frames
+  Duration interval_;                  ///< to be expected, at least the announced period
   bool neutral_ = true;
   bool source_ready_ = false;
   Hint last_hint_ = Hint::none;
