@@ -142,15 +142,18 @@ bool say_device_node(Report& report, const char* path, const char* module, const
 }
 
 void say_udev_rule(Report& report) {
-  for (const char* folder : {"/etc/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"}) {
+  for (const char* folder :
+       {"/etc/udev/rules.d", "/run/udev/rules.d", "/usr/local/lib/udev/rules.d",
+        "/usr/lib/udev/rules.d", "/lib/udev/rules.d"}) {
     const fs::path rule = fs::path(folder) / "70-tagwrench.rules";
     if (!present(rule)) continue;
     report.line(Mark::ok, fmt::format("udev rule {}", rule.string()));
     return;
   }
   report.line(::getuid() == 0 ? Mark::absent : Mark::missing,
-              "no udev rule, so only root can make devices: copy 70-tagwrench.rules to "
-              "/etc/udev/rules.d, then sudo udevadm control --reload && sudo udevadm trigger");
+              "no udev rule, so only root can make devices: sudo cmake --install build (or copy "
+              "host/output/70-tagwrench.rules to /etc/udev/rules.d), then sudo udevadm control "
+              "--reload && sudo udevadm trigger");
 }
 
 std::optional<int> pid_of(std::string_view name) {

@@ -23,7 +23,6 @@ constexpr const char* kSources =
     "  sim | sim:SCENARIO.yaml       the simulated sensor\n"
     "  v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]\n"
     "  images:DIR                    PNG, PGM or JPEG in name order, times from DIR/frames.csv\n"
-    "  recording:FILE                a recording\n"
     "Without it: a camera that sees the tags, else sim";
 constexpr const char* kOutputs =
     "where samples go (repeat it for more than one):\n"
@@ -80,6 +79,7 @@ int dispatch(int argc, char** argv) {
     const tagwrench::sim::Scenario described =
         scenario.empty() ? tagwrench::sim::Scenario{} : tagwrench::load_scenario(scenario);
     tagwrench::sim::export_folder(described, folder, frames);
+    fmt::print(stderr, "tagwrench: {} frames with truth and sensor.yaml in {}\n", frames, folder);
   }
   return 0;
 }

@@ -195,15 +195,15 @@ std::unique_ptr<Output> terminal(const Input& input, bool stdout_taken) {
 
 /// What a user gets who asked for nothing: the view, and every device that this machine allows.
 void add_default_outputs(Outputs& outputs, const Input& input) {
-  std::string why;
   for (const char* kind : {"spacemouse", "wrench", "joystick"}) {
     try {
       add_device(outputs, kind, input.sensor);
     } catch (const ConfigError& e) {
-      if (why.empty() || kind == std::string("joystick")) why = why.empty() ? e.what() : why;
+      // Both uhid devices lack the same thing; say it once.
+      if (kind != std::string("wrench"))
+        note(fmt::format("running without {}: {}", kind, e.what()));
     }
   }
-  if (!why.empty()) note("running without HID devices: " + why);
   outputs.all.push_back(terminal(input, false));
 }
 

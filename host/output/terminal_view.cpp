@@ -118,7 +118,6 @@ class View {
 };
 
 /// Zero in the middle; '#' where the value is beyond the full scale.
-/// beyond the full scale.
 void draw_bar(View& view, double fraction, int half) {
   const int filled = static_cast<int>(std::lround(std::clamp(fraction, -1.0, 1.0) * half));
   const char fill = std::abs(fraction) > 1 ? '#' : '=';
@@ -168,8 +167,8 @@ std::size_t draw_view(Screen& screen, const TerminalOptions& options, const Samp
     if (options.color) view.raw("\x1b[0m");
   }
   if (view.next_line()) {
-    view.print("{:.1f} Hz   latency {:.1f} ms   dropped {}", figures.rate_hz, figures.latency_ms,
-               figures.dropped);
+    view.print("{:.1f} Hz   latency {:.1f} ms   dropped {}   Ctrl-C ends", figures.rate_hz,
+               figures.latency_ms, figures.dropped);
   }
   for (int i = 0; i < 6 && view.next_line(); ++i) {
     draw_axis(view, i, options, sample, carries_numbers(status), width);
