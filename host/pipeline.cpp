@@ -123,6 +123,7 @@ void Pipeline::read_source() noexcept {
   switch (source_.read(frame)) {
     case ReadStatus::frame: {
       note_arrival(std::chrono::steady_clock::now());
+      if (!neutral_) guard();  // or a slow search for the tags would look like a hang
       step(frame);
       return;
     }
@@ -166,9 +167,12 @@ void Pipeline::send(const Sample& sample) noexcept {
   if (neutral_) {
     dead_man_.stand_down();
   } else {
-    dead_man_.expect_by(last_arrival_ + interval_ + kGuardianGrace);
+    guard();
   }
 }
+
+/// If the loop should hang from here on, the guardian sends neutral.
+void Pipeline::guard() noexcept { dead_man_.expect_by(last_arrival_ + interval_ + kGuardianGrace); }
 
 /// The frame that should have come did not: one sample that says so, with zeros.
 void Pipeline::send_neutral() noexcept {

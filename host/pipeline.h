@@ -51,6 +51,7 @@ class Pipeline {
   void step(const Frame& frame) noexcept;
   void send(const Sample& sample) noexcept;
   void send_neutral() noexcept;
+  void guard() noexcept;
   void read_source() noexcept;
   void note_arrival(TimePoint now) noexcept;
   void wait(TimePoint until) noexcept;

@@ -307,8 +307,10 @@ V4l2Device::Dequeue V4l2Device::dequeue(V4l2Buffer& out, int& error) noexcept {
   out.damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0;
   out.stamp.sequence = buffer.sequence;
   out.stamp.driver_time = time_of(buffer.timestamp);
+  // A driver that does not say which clock it reads (v4l2loopback) is judged by its times.
+  const auto type = buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK;
   out.stamp.monotonic =
-      (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+      type == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC || type == V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN;
   out.stamp.dequeued = std::chrono::steady_clock::now();
   return Dequeue::buffer;
 }

@@ -13,7 +13,7 @@ namespace tagwrench {
 struct BufferStamp {
   std::uint32_t sequence = 0;
   TimePoint driver_time{};
-  bool monotonic = false;  ///< the driver says that driver_time is CLOCK_MONOTONIC
+  bool monotonic = false;  ///< the driver does not deny that driver_time is CLOCK_MONOTONIC
   TimePoint dequeued{};
 };
 

@@ -1,0 +1,73 @@
+"""An ordinary user of the groups input and video, our udev rule, and a real systemd-udevd run the whole of it."""
+import os
+import shutil
+
+import rig
+from pushes import PUSHES, check_axis, six, wait_for_zero
+
+USER = "1500"  # no such account is needed
+FOLDER = "/run/ordinary"
+
+
+def start_udevd(rules):
+    shutil.copy(rules, "/etc/udev/rules.d/70-tagwrench.rules")
+    os.makedirs("/run/udev", exist_ok=True)
+    for command in (["/lib/systemd/systemd-udevd", "--daemon"], ["udevadm", "trigger", "--action=add"],
+                    ["udevadm", "settle", "-t", "60"]):
+        status, _, err = rig.run(*command, patience=120)
+        if status != 0:
+            raise rig.GaveUp(f"{' '.join(command)}: {err.strip()}")
+
+
+def copy_for_the_user(setup):
+    """The project may lie where only its owner can go."""
+    os.makedirs(FOLDER, mode=0o755)
+    for file in (setup.tagwrench, *(f"{setup.programs}/{name}" for name in ("spnav_client", "hid_client", "sdl_client"))):
+        shutil.copy(file, FOLDER)
+    shutil.copy(setup.clip("rest") + "/sensor.yaml", FOLDER)
+    setup.tagwrench, setup.programs = f"{FOLDER}/tagwrench", FOLDER
+
+
+def body(setup):
+    rig.load("uhid", "hid-generic", "uinput", "evdev", "joydev", "v4l2loopback video_nr=0 exclusive_caps=1")
+    daemon = rig.start_spacenavd()
+    feeder = setup.feeder(["rest", "push_fx"])
+    feeder.tell("loop rest")
+    copy_for_the_user(setup)
+    os.chmod("/dev/video0", 0o666)
+    sensor = f"{FOLDER}/sensor.yaml"
+
+    for node, output in (("/dev/uhid", "spacemouse"), ("/dev/uhid", "wrench"), ("/dev/uinput", "joystick")):
+        refused = setup.bridge(output, sensor=sensor, user=USER)
+        status = refused.wait()
+        rig.check(f"without the udev rule {output} ends with status 2 and one line that names {node}",
+                  status == 2 and len(refused.err) == 1 and node in refused.err[0], refused.state())
+
+    os.chmod("/dev/video0", 0o600)
+    start_udevd(setup.project + "/host/output/70-tagwrench.rules")
+    bridge = setup.bridge("spacemouse", "wrench", "joystick", f"jsonl:/tmp/ordinary.jsonl", sensor=sensor, user=USER)
+    rig.check("with the udev rule an ordinary user's bridge runs", bridge.wait_error("rest pose learned"), bridge.state())
+    spnav = setup.client("spnav_client", user=USER)
+    spnav.wait_line("connected")
+    hid = setup.client("hid_client", "256f:c62e", "1209:7a6e", user=USER)
+    hid.wait_line("ready")
+    rig.check("an ordinary user's hidapi program reads wrenches", hid.wait_line("wrench"))
+    sdl = setup.client("sdl_client", "tagwrench joystick", user=USER, env={"SDL_VIDEODRIVER": "dummy"})
+    line = sdl.wait_line("joystick")
+    rig.check("an ordinary user's game finds the joystick through udev", line.split()[1] == "6", line)
+    rig.check_taken(daemon)
+
+    name = "push_fx"
+    marks = len(feeder.out), len(spnav.out), len(sdl.out)
+    feeder.tell(f"once {name}")
+    feeder.wait_line(f"done {name}", marks[0])
+    _, (hid_axis, _), (axis, sign) = PUSHES[name]
+    rig.check("release is exactly zero", wait_for_zero(spnav, marks[1]), spnav.out[-1:])
+    check_axis("libspnav of an ordinary user", name, six(spnav.out[marks[1]:], "motion", 1), axis, sign, 100)
+    moved = any(line.startswith("axis ") and line.split()[2] == str(hid_axis) for line in sdl.out[marks[2]:])
+    rig.check("SDL of an ordinary user sees the axis move", moved, sdl.state())
+    rig.check("SIGTERM ends the bridge with status 0", bridge.stop() == 0, bridge.state())
+    rig.check("its devices are gone", rig.wait_until(lambda: not rig.our_devices()), rig.our_devices())
+
+
+rig.main(body)
