@@ -1,8 +1,10 @@
 // The verbs. Exit status: 0 done, 1 failed while running, 2 wrong usage or a configuration that
 // cannot be used.
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <opencv2/core/utility.hpp>
@@ -12,6 +14,7 @@
 #include "host/doctor.h"
 #include "host/run_command.h"
 #include "host/source/simulator/folder_export.h"
+#include "host/tell.h"
 
 namespace {
 
@@ -29,7 +32,7 @@ constexpr const char* kOutputs =
     "  terminal                      live view\n"
     "  jsonl:FILE, csv:FILE          one line per frame, - is standard output\n"
     "  spacemouse                    virtual 6-DOF puck for CAD programs\n"
-    "  wrench                        calibrated HID sensor in N and N m\n"
+    "  wrench                        HID force-torque sensor in N and N m\n"
     "  joystick                      six-axis joystick for games\n"
     "Without it: terminal, and every device that this machine allows";
 
@@ -38,6 +41,15 @@ int dispatch(int argc, char** argv) {
       "tagwrench: a camera under a spring platform as a 6-axis force-torque sensor and 6-DOF input "
       "device"};
   app.require_subcommand(1);
+  const CLI::Validator duration(
+      [](std::string& text) {
+        double seconds = 0;
+        const bool usable =
+            CLI::detail::lexical_cast(text, seconds) && seconds >= 1e-3 && seconds <= 1e9;
+        return usable ? std::string()
+                      : "'" + text + "' is not a number of seconds from 0.001 to 1e9";
+      },
+      "SECONDS");
   app.set_version_flag("--version", TAGWRENCH_VERSION);
 
   tagwrench::RunOptions run_options;
@@ -46,8 +58,7 @@ int dispatch(int argc, char** argv) {
   run->add_option("--source", run_options.source, kSources);
   run->add_option("--output", run_options.outputs, kOutputs);
   run->add_option("--frames", run_options.frames, "end after N frames")->check(CLI::PositiveNumber);
-  run->add_option("--seconds", run_options.seconds, "end after S seconds")
-      ->check(CLI::PositiveNumber);
+  run->add_option("--seconds", run_options.seconds, "end after S seconds")->check(duration);
   run->add_flag("--fast", run_options.fast,
                 "sources that are not live run as fast as they can, no frame dropped");
 
@@ -70,7 +81,7 @@ int dispatch(int argc, char** argv) {
   } catch (const CLI::Success& e) {
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
-    fmt::print(stderr, "tagwrench: {}; `tagwrench --help` lists what there is\n", e.what());
+    tagwrench::tell(fmt::format("{}; `tagwrench --help` lists what there is", e.what()));
     return kUnusable;
   }
   if (run->parsed()) return tagwrench::run(run_options);
@@ -79,23 +90,31 @@ int dispatch(int argc, char** argv) {
     const tagwrench::sim::Scenario described =
         scenario.empty() ? tagwrench::sim::Scenario{} : tagwrench::load_scenario(scenario);
     tagwrench::sim::export_folder(described, folder, frames);
-    fmt::print(stderr, "tagwrench: {} frames with truth and sensor.yaml in {}\n", frames, folder);
+    tagwrench::tell(fmt::format("{} frames with truth and sensor.yaml in {}", frames, folder));
   }
   return 0;
+}
+
+/// A closed standard stream would give its number to the next file that is opened, a device's say.
+void open_standard_streams() {
+  for (int fd = 0; fd <= 2; ++fd) {
+    if (::fcntl(fd, F_GETFD) < 0 && ::open("/dev/null", O_RDWR) != fd) std::abort();
+  }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
   cv::setNumThreads(
       1);  // one thread, one poll loop; and a fork must find a single-threaded process
   try {
     return dispatch(argc, argv);
   } catch (const tagwrench::ConfigError& e) {
-    fmt::print(stderr, "tagwrench: {}\n", e.what());
+    tagwrench::tell(e.what());
     return kUnusable;
   } catch (const std::exception& e) {
-    fmt::print(stderr, "tagwrench: failed: {}\n", e.what());
+    tagwrench::tell(std::string("failed: ") + e.what());
     return kFailed;
   }
 }

@@ -1,10 +1,11 @@
 #include "host/pipeline.h"
 
-#include <fmt/format.h>
 #include <poll.h>
 
 #include <algorithm>
 #include <array>
+
+#include "host/tell.h"
 
 namespace tagwrench {
 namespace {
@@ -76,8 +77,7 @@ RunReport Pipeline::run(const RunLimits& limits) {
     if (limits.time && std::chrono::steady_clock::now() - start_ >= *limits.time) break;
     wait(wake_time(limits));
     if (source_ready_) read_source();
-    if (!neutral_ && std::chrono::steady_clock::now() >= last_arrival_ + interval_ + kGrace)
-      send_neutral();
+    if (std::chrono::steady_clock::now() >= missing_at()) send_neutral();
   }
   dead_man_.stand_down();
   report_.end = end_.value_or(RunReport::End::limit);
@@ -86,10 +86,15 @@ RunReport Pipeline::run(const RunLimits& limits) {
 }
 
 TimePoint Pipeline::wake_time(const RunLimits& limits) const noexcept {
-  TimePoint wake = TimePoint::max();
-  if (!neutral_) wake = last_arrival_ + interval_ + kGrace;
-  if (limits.time) wake = std::min(wake, start_ + *limits.time);
-  return wake;
+  const TimePoint wake = missing_at();
+  return limits.time ? std::min(wake, start_ + *limits.time) : wake;
+}
+
+/// When the next frame is so late that it is missing: never, if all is neutral already or the
+/// source has no clock.
+TimePoint Pipeline::missing_at() const noexcept {
+  if (neutral_ || source_.poll_fd() < 0) return TimePoint::max();
+  return last_arrival_ + interval_ + kGrace;
 }
 
 /// Blocks until the source, an output's client or a stop wants attention, or the time has come.
@@ -154,6 +159,7 @@ void Pipeline::note_arrival(TimePoint now) noexcept {
 }
 
 void Pipeline::send(const Sample& sample) noexcept {
+  if (carries_numbers(sample.status)) guard();
   for (const std::unique_ptr<Output>& output : outputs_) {
     const SendStatus status = output->send(sample);
     if (status == SendStatus::skipped) ++report_.skipped;
@@ -164,11 +170,7 @@ void Pipeline::send(const Sample& sample) noexcept {
   }
   last_sample_ = sample;
   neutral_ = !carries_numbers(sample.status);
-  if (neutral_) {
-    dead_man_.stand_down();
-  } else {
-    guard();
-  }
+  if (neutral_) dead_man_.stand_down();
 }
 
 /// If the loop should hang from here on, the guardian sends neutral.
@@ -192,7 +194,7 @@ void Pipeline::say_hint(Hint hint) noexcept {
 void Pipeline::say(std::string_view line) noexcept {
   bool shown = false;
   for (const std::unique_ptr<Output>& output : outputs_) shown = output->notice(line) || shown;
-  if (!shown) fmt::print(stderr, "tagwrench: {}\n", line);
+  if (!shown) tell(line);
 }
 
 }  // namespace tagwrench

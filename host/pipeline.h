@@ -58,6 +58,7 @@ class Pipeline {
   void say(std::string_view line) noexcept;
   void say_hint(Hint hint) noexcept;
   TimePoint wake_time(const RunLimits& limits) const noexcept;
+  TimePoint missing_at() const noexcept;
 
   FrameSource& source_;
   Tracker& tracker_;

@@ -5,7 +5,10 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -26,6 +29,7 @@
 #include "host/source/simulator/simulator_source.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/source/v4l2_source.h"
+#include "host/tell.h"
 
 namespace tagwrench {
 namespace {
@@ -42,7 +46,20 @@ Spec split(const std::string& spec) {
   return {spec.substr(0, colon), spec.substr(colon + 1)};
 }
 
-void note(const std::string& line) { fmt::print(stderr, "tagwrench: {}\n", line); }
+/// Ctrl-C, kill and a closed terminal wait until the loop reads them.
+sigset_t block_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
+  sigprocmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
+/// Readable once one of them has come.
+UniqueFd signals_as_fd() {
+  const sigset_t signals = block_signals();
+  return UniqueFd(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK));
+}
 
 /// A source and the sensor that it shows.
 struct Input {
@@ -73,7 +90,8 @@ Input open_images(const RunOptions& options, const std::string& folder) {
   const std::filesystem::path beside = std::filesystem::path(folder) / "sensor.yaml";
   Input input;
   input.sensor = sensor_or(options, [&] {
-    return std::filesystem::exists(beside) ? load_sensor(beside) : paper_sensor();
+    std::error_code unreadable;  // the source itself will complain
+    return std::filesystem::exists(beside, unreadable) ? load_sensor(beside) : paper_sensor();
   });
   input.source = std::make_unique<ImagesSource>(folder, options.fast);
   return input;
@@ -85,18 +103,22 @@ Input open_camera(const RunOptions& options, const std::string& argument) {
   V4l2Options camera = parse_v4l2_spec(argument);
   camera.preferred_width = input.sensor.camera.width_px;
   camera.preferred_height = input.sensor.camera.height_px;
+  block_signals();  // from here on the camera's settings must be put back
   input.source = std::make_unique<V4l2Source>(camera);
   return input;
 }
 
-/// Whether the source shows the sensor's tags within `patience`.
+/// Whether the source shows the sensor's tags within `patience`. A signal ends the search; the loop
+/// then sees it too.
 bool sees_tags(Input& input, Duration patience) {
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
+  const UniqueFd stop = signals_as_fd();
   const TimePoint until = std::chrono::steady_clock::now() + patience;
   for (TimePoint now; (now = std::chrono::steady_clock::now()) < until;) {
-    pollfd fd{input.source->poll_fd(), POLLIN, 0};
+    pollfd fds[2] = {{input.source->poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - now);
-    if (::poll(&fd, 1, static_cast<int>(left.count()) + 1) <= 0) continue;
+    if (::poll(fds, 2, static_cast<int>(left.count()) + 1) <= 0) continue;
+    if (fds[1].revents != 0) return true;
     Frame frame;
     if (input.source->read(frame) != ReadStatus::frame) continue;
     const Track track = tracker.track(frame);
@@ -108,6 +130,8 @@ bool sees_tags(Input& input, Duration patience) {
 /// The first camera that sees the tags; the simulated sensor where there is none.
 Input find_input(const RunOptions& options) {
   constexpr Duration kPatience = std::chrono::seconds(2);
+  if (!options.sensor.empty())
+    load_sensor(options.sensor);  // a mistake in it must not look like a missing camera
   int cameras = 0;
   for (const CameraNode& node : list_camera_nodes()) {
     if (!node.captures) continue;
@@ -118,10 +142,10 @@ Input find_input(const RunOptions& options) {
           sees_tags(input, kPatience))
         return input;
     } catch (const ConfigError& e) {
-      note(e.what());
+      tell(e.what());
     }
   }
-  note(cameras == 0 ? "no camera found: showing the simulated sensor (--source v4l2:/dev/videoN "
+  tell(cameras == 0 ? "no camera found: showing the simulated sensor (--source v4l2:/dev/videoN "
                       "picks a camera)"
                     : "no camera sees the tags: showing the simulated sensor (--source "
                       "v4l2:/dev/videoN insists)");
@@ -171,7 +195,7 @@ void add_device(Outputs& outputs, const std::string& kind, const SensorConfig& s
   if (kind == "spacemouse") {
     auto device = std::make_unique<SpacemouseOutput>(spacemouse_options(sensor));
     device->add_to(outputs.devices);
-    if (const std::string advice = device->spacenavd_advice(); !advice.empty()) note(advice);
+    if (const std::string advice = device->spacenavd_advice(); !advice.empty()) tell(advice);
     outputs.all.push_back(std::move(device));
   } else if (kind == "wrench") {
     auto device = std::make_unique<WrenchHidOutput>(WrenchHidOptions{});
@@ -201,54 +225,77 @@ void add_default_outputs(Outputs& outputs, const Input& input) {
     } catch (const ConfigError& e) {
       // Both uhid devices lack the same thing; say it once.
       if (kind != std::string("wrench"))
-        note(fmt::format("running without {}: {}", kind, e.what()));
+        tell(fmt::format("running without {}: {}", kind, e.what()));
     }
   }
   outputs.all.push_back(terminal(input, false));
 }
 
+bool is_device(const std::string& kind) {
+  return kind == "spacemouse" || kind == "wrench" || kind == "joystick";
+}
+
+bool is_file(const std::string& kind) { return kind == "jsonl" || kind == "csv"; }
+
+/// Refuses what cannot be, before anything is made or overwritten.
+void check_outputs(const std::vector<Spec>& specs) {
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    const Spec& spec = specs[i];
+    const bool known = spec.argument.empty() ? spec.kind == "terminal" || is_device(spec.kind)
+                                             : is_file(spec.kind);
+    const std::string text = spec.argument.empty() ? spec.kind : spec.kind + ":" + spec.argument;
+    if (!known) {
+      throw ConfigError(
+          fmt::format("--output {}: not an output; use terminal, jsonl:FILE, csv:FILE, spacemouse, "
+                      "wrench or joystick",
+                      text));
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (spec.argument.empty() ? specs[j].kind == spec.kind : specs[j].argument == spec.argument) {
+        throw ConfigError(
+            spec.argument == "-"
+                ? "--output: only one output can go to standard output (-); give the others a file"
+                : fmt::format("--output {}: is there twice; give every output a place of its own",
+                              text));
+      }
+    }
+    if (spec.argument.empty() || spec.argument == "-") continue;
+    const std::filesystem::path path = spec.argument;
+    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+    const bool exists = ::access(path.c_str(), F_OK) == 0;
+    if (::access(exists ? path.c_str() : folder.c_str(), W_OK) != 0) {
+      throw ConfigError(
+          fmt::format("--output {}: cannot be written: {}; choose a file in a folder of yours",
+                      text, std::strerror(errno)));
+    }
+  }
+}
+
+/// Devices first, because they are what may be refused; files are only then overwritten.
 Outputs open_outputs(const RunOptions& options, const Input& input) {
   Outputs outputs;
   if (options.outputs.empty()) {
     add_default_outputs(outputs, input);
     return outputs;
   }
-  int to_stdout = 0;
-  for (const std::string& text : options.outputs) to_stdout += split(text).argument == "-" ? 1 : 0;
-  if (to_stdout > 1)
-    throw ConfigError(
-        "--output: only one output can go to standard output (-); give the others a file");
-  for (const std::string& text : options.outputs) {
-    const Spec spec = split(text);
-    const bool file = !spec.argument.empty();
-    if (spec.kind == "terminal" && !file) {
-      outputs.all.push_back(terminal(input, to_stdout > 0));
-    } else if (spec.kind == "jsonl" && file) {
-      outputs.all.push_back(std::make_unique<JsonlOutput>(spec.argument, options.fast));
-    } else if (spec.kind == "csv" && file) {
-      outputs.all.push_back(std::make_unique<CsvOutput>(spec.argument, options.fast));
-    } else if ((spec.kind == "spacemouse" || spec.kind == "wrench" || spec.kind == "joystick") &&
-               !file) {
-      add_device(outputs, spec.kind, input.sensor);
-    } else {
-      throw ConfigError(
-          fmt::format("--output {}: not an output; use terminal, jsonl:FILE, csv:FILE, spacemouse, "
-                      "wrench or joystick",
-                      text));
-    }
+  std::vector<Spec> specs;
+  for (const std::string& text : options.outputs) specs.push_back(split(text));
+  check_outputs(specs);
+  for (const Spec& spec : specs) {
+    if (is_device(spec.kind)) add_device(outputs, spec.kind, input.sensor);
+  }
+  // Only a source that waits for its reader may be made to wait.
+  const bool lossless = options.fast && input.source->poll_fd() < 0;
+  const bool stdout_taken = std::any_of(specs.begin(), specs.end(),
+                                        [](const Spec& spec) { return spec.argument == "-"; });
+  for (const Spec& spec : specs) {
+    if (spec.kind == "terminal") outputs.all.push_back(terminal(input, stdout_taken));
+    if (spec.kind == "jsonl")
+      outputs.all.push_back(std::make_unique<JsonlOutput>(spec.argument, lossless));
+    if (spec.kind == "csv")
+      outputs.all.push_back(std::make_unique<CsvOutput>(spec.argument, lossless));
   }
   return outputs;
-}
-
-/// Ctrl-C, kill and a closed terminal become readable instead of interrupting; a closed pipe
-/// becomes an error code.
-UniqueFd signals_as_fd() {
-  std::signal(SIGPIPE, SIG_IGN);
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
-  sigprocmask(SIG_BLOCK, &signals, nullptr);
-  return UniqueFd(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK));
 }
 
 std::string summary(const RunReport& report) {
@@ -264,14 +311,15 @@ std::string summary(const RunReport& report) {
 }  // namespace
 
 int run(const RunOptions& options) {
-  const UniqueFd stop = signals_as_fd();
+  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
   Input input = open_input(options);
+  const UniqueFd stop = signals_as_fd();
   check_size(input);
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
   const WrenchEstimator wrench(input.sensor.wrench);
   const Shaping shaping(input.sensor.shaping);
   Outputs outputs = open_outputs(options, input);
-  note("source: " + input.source->format().description);
+  tell("source: " + input.source->format().description);
 
   RunLimits limits;
   if (options.frames) limits.frames = static_cast<std::uint64_t>(*options.frames);
@@ -286,10 +334,11 @@ int run(const RunOptions& options) {
   }
   outputs.all.clear();  // neutral, then gone, before anything else is said
   if (report.end == RunReport::End::output_failed) {
-    note(report.failure);
+    tell(report.failure);
     return 1;
   }
-  note(summary(report));
+  tell(summary(report));
+  if (const std::string unusable = input.source->unusable(); !unusable.empty()) tell(unusable);
   return 0;
 }
 

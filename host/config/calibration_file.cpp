@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "host/config_error.h"
 
@@ -23,7 +24,9 @@ class CalibrationReader {
       fail(
           "cannot be read; run `tagwrench calibrate wrench`, or remove wrench.calibration to use "
           "springs");
-    root_ = json::parse(in, nullptr, /*allow_exceptions=*/false);
+    std::ostringstream text;
+    if (!(text << in.rdbuf())) fail("cannot be read; it is empty, or no file");
+    root_ = json::parse(text.str(), nullptr, /*allow_exceptions=*/false);
     if (!root_.is_object())
       fail("is not a JSON object; it was cut short or is another kind of file");
     if (root_.value("format", json()) != kFormat) {
@@ -103,7 +106,11 @@ void load_calibration(const std::string& path, const CameraModel& camera,
   model.B = file.vector6(file.at("B"), "B");
   model.range = file.vector6(file.at("range"), "range");
   if ((model.range.array() <= 0).any()) file.fail("\"range\" must be greater than 0 on every axis");
-  if (file.has("covariance")) model.model_covariance = file.matrix6("covariance");
+  if (!file.has("covariance")) return;
+  model.model_covariance = file.matrix6("covariance");
+  if ((model.model_covariance.diagonal().array() < 0).any()) {
+    file.fail("\"covariance\" has a negative variance on its diagonal");
+  }
 }
 
 }  // namespace tagwrench

@@ -46,6 +46,7 @@ bool TerminalOutput::notice(std::string_view line) noexcept {
   if (!live_) return false;
   notice_size_ = std::min(line.size(), notice_.size());
   std::memcpy(notice_.data(), line.data(), notice_size_);
+  draw(last_, std::chrono::steady_clock::now());  // no sample may follow for a long time
   return true;
 }
 
@@ -70,8 +71,10 @@ void TerminalOutput::account(const Sample& sample, TimePoint now) noexcept {
 SendStatus TerminalOutput::send(const Sample& sample) noexcept {
   const TimePoint now = std::chrono::steady_clock::now();
   account(sample, now);
-  if (live_) return now >= next_draw_ ? draw(sample, now) : SendStatus::ok;
-  return sample.capture_time >= next_line_ ? print_line(sample) : SendStatus::ok;
+  const bool changed = sample.status != last_.status;  // shown at once: nothing may follow a loss
+  last_ = sample;
+  if (live_) return changed || now >= next_draw_ ? draw(sample, now) : SendStatus::ok;
+  return changed || sample.capture_time >= next_line_ ? print_line(sample) : SendStatus::ok;
 }
 
 SendStatus TerminalOutput::draw(const Sample& sample, TimePoint now) noexcept {

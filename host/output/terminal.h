@@ -60,6 +60,7 @@ class TerminalOutput : public Output {
   double period_s_ = 0;  ///< smoothed
   std::optional<TimePoint> first_capture_;
   TimePoint last_capture_{};
+  Sample last_;
   TimePoint next_line_{};
   TimePoint next_draw_{};
   int lines_drawn_ = 0;

@@ -25,7 +25,8 @@ constexpr int kLastWait_ms = 100;
 bool stop_is_pending() {
   sigset_t pending;
   return sigpending(&pending) == 0 &&
-         (sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1);
+         (sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1 ||
+          sigismember(&pending, SIGHUP) == 1);
 }
 
 const char* remedy(int error) {

@@ -42,6 +42,9 @@ class FrameSource {
   /// until the next read().
   virtual ReadStatus read(Frame& frame) noexcept = 0;
 
+  /// One line about the frames that were delivered but could not be used; empty if there were none.
+  virtual std::string unusable() const { return {}; }
+
   /// One line about the last disconnected or reconnected status.
   virtual std::string detail() const { return {}; }
 };

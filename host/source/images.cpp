@@ -45,7 +45,8 @@ std::vector<std::string> picture_names(const std::string& dir) {
   std::vector<std::string> names;
   fs::directory_iterator it(dir, error);
   for (; !error && it != fs::directory_iterator(); it.increment(error)) {
-    if (is_picture(it->path())) names.push_back(it->path().filename().string());
+    if (is_picture(it->path()) && it->is_regular_file(error))
+      names.push_back(it->path().filename().string());
   }
   if (error) {
     throw ConfigError(
@@ -133,6 +134,10 @@ ImagesSource::ImagesSource(const std::string& dir, bool fast)
 }
 
 ImagesSource::~ImagesSource() = default;
+
+std::string ImagesSource::unusable() const {
+  return corrupt_ == 0 ? std::string() : fmt::format("{} corrupt pictures were skipped", corrupt_);
+}
 
 void ImagesSource::arm() const noexcept {
   if (!timer_) return;

@@ -24,7 +24,8 @@ class ImagesSource final : public FrameSource {
   int poll_fd() const noexcept override { return timer_ ? timer_.get() : -1; }
   ReadStatus read(Frame& frame) noexcept override;
 
-  /// Files that turned out corrupt; each is also in Frame::dropped of the next good one.
+  /// Corrupt files; each is also in Frame::dropped of the next good one.
+  std::string unusable() const override;
   std::uint64_t corrupt_frames() const noexcept { return corrupt_; }
 
  private:

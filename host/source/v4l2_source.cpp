@@ -86,9 +86,21 @@ V4l2Source::V4l2Source(const V4l2Options& options)
 }
 
 V4l2Source::~V4l2Source() {
-  if (!device_) return;
-  V4l2ControlPort port(device_->fd());
-  controls_.restore(port);
+  try {
+    // A camera that is away may have come back since the last try; it must not keep our settings.
+    if (!device_) device_ = V4l2Device::reopen(stable_path_);
+    if (!device_) return;
+    V4l2ControlPort port(device_->fd());
+    controls_.restore(port);
+  } catch (const std::exception&) {
+    // It stays away: then there is nothing to restore.
+  }
+}
+
+std::string V4l2Source::unusable() const {
+  if (skipped_.corrupt == 0 && skipped_.stale == 0) return {};
+  return fmt::format("{} corrupt and {} stale frames were skipped", skipped_.corrupt,
+                     skipped_.stale);
 }
 
 void V4l2Source::watch(int fd) const {

@@ -38,6 +38,7 @@ class V4l2Source final : public FrameSource {
   /// milliseconds.
   ReadStatus read(Frame& frame) noexcept override;
   std::string detail() const override { return detail_; }
+  std::string unusable() const override;
 
   const SkippedFrames& skipped() const noexcept { return skipped_; }
 

@@ -202,5 +202,64 @@ TEST_F(BadInput, SimRefusesToMixItsFramesWithOtherFiles) {
   EXPECT_FALSE(std::filesystem::exists(temporary_ / "d" / "000000.png"));
 }
 
+TEST_F(BadInput, ASensorFileThatCannotBeUsedIsNotMistakenForAMissingCamera) {
+  expect_refused(run_bridge({"run", "--sensor", "/nonexistent.yaml", "--frames", "3"}), 2,
+                 {"/nonexistent.yaml", "cannot be read"});
+}
+
+TEST_F(BadInput, ARefusedRunLeavesExistingFilesAlone) {
+  write_file(temporary_ / "keep.jsonl", "precious\n");
+  const std::string keep = "jsonl:" + (temporary_ / "keep.jsonl").string();
+  for (const char* other : {"bogus", "csv:/nonexistent/x.csv"}) {
+    const Outcome o = run_bridge({"run", "--source", "sim", "--output", keep, "--output", other});
+    EXPECT_EQ(o.status, 2) << o.err;
+    EXPECT_EQ(read_file(temporary_ / "keep.jsonl"), "precious\n") << other;
+  }
+}
+
+TEST_F(BadInput, TwoOutputsCannotShareAFile) {
+  const std::string file = (temporary_ / "both").string();
+  expect_refused(run_bridge({"run", "--source", "sim", "--output", "jsonl:" + file, "--output",
+                             "csv:" + file}),
+                 2, {"twice"});
+}
+
+TEST_F(BadInput, ADurationThatIsNone) {
+  for (const char* seconds : {"0", "-1", "nan", "1e300", "5s"}) {
+    expect_refused(run_bridge({"run", "--source", "sim", "--seconds", seconds}), 2, {"--seconds"});
+  }
+}
+
+TEST_F(BadInput, AClosedStandardErrorDoesNotEndTheRun) {
+  Bridge bridge({"run", "--source", "sim", "--output", "jsonl:-", "--frames", "30"});
+  bridge.close_stderr();
+  const Outcome o = bridge.finish();
+  EXPECT_EQ(o.status, 0);
+  EXPECT_EQ(lines_in(o.out), 30u);
+}
+
+TEST_F(BadInput, ASlowReaderOfAFastRunGetsEveryFrameOnce) {
+  Bridge bridge(
+      {"run", "--source", "images:" + render(60).string(), "--fast", "--output", "jsonl:-"});
+  const Outcome o = bridge.finish_slowly();
+  EXPECT_EQ(o.status, 0) << o.err;
+  EXPECT_EQ(lines_in(o.out), 60u);
+  EXPECT_EQ(o.out.find("\"lost\""), std::string::npos);
+}
+
+TEST_F(BadInput, ScenariosBeyondAllMeasureAreRefused) {
+  for (const char* text :
+       {"mechanics: {mass_g: 1e-300}", "mechanics: {axial_n_per_mm: 1e300}",
+        "mechanics: {spring_length_mm: 1e300}", "mechanics: {inertia_g_mm2: [1e-300, 1, 1]}",
+        "trajectory: {amplitude: [1e300, 1, 1, 1, 1, 1]}",
+        "mechanics: {range: [0, 1, 1, 1, 1, 1]}"}) {
+    write_file(temporary_ / "s.yaml", std::string(text) + "\n");
+    const Outcome o =
+        run_bridge({"run", "--source", "sim:" + (temporary_ / "s.yaml").string(), "--frames", "3"});
+    EXPECT_EQ(o.status, 2) << text << o.err;
+    EXPECT_NE(o.err.find("s.yaml"), std::string::npos) << o.err;
+  }
+}
+
 }  // namespace
 }  // namespace tagwrench::test

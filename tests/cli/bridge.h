@@ -72,7 +72,20 @@ class Bridge {
     return true;
   }
   void close_stdout() { out_.reset(); }
+  void close_stderr() { err_.reset(); }
   void signal(int number) { ::kill(pid_, number); }
+
+  /// Reads a small pipe once every 150 ms, much longer than a frame may take, so that the program
+  /// must wait.
+  Outcome finish_slowly() {
+    ::fcntl(out_.get(), F_SETPIPE_SZ, 4096);
+    while (out_) {
+      take(out_, outcome_.out);
+      const timespec pause{0, 150'000'000};
+      ::nanosleep(&pause, nullptr);
+    }
+    return finish();
+  }
 
   Outcome finish() {
     while (pump()) {

@@ -36,8 +36,9 @@ void find_texels(const std::array<float, 9>& h, const float* x, const float* y, 
     const float w = 1.0F / (p * x[i] + q * y[i] + r);
     const float uu = (a * x[i] + b * y[i] + c) * w;
     const float vv = (d * x[i] + e * y[i] + f) * w;
-    u[i] = std::min(std::max(uu, 0.0F), max_u);
-    v[i] = std::min(std::max(vv, 0.0F), max_v);
+    // In this order of arguments a number that is not one becomes 0.
+    u[i] = std::min(std::max(0.0F, uu), max_u);
+    v[i] = std::min(std::max(0.0F, vv), max_v);
   }
 }
 

@@ -90,56 +90,70 @@ std::string problem(const Scenario& s) {
   for (const double k : s.camera.distortion) {
     if (!std::isfinite(k)) return "camera.distortion must be finite numbers";
   }
-  for (const double a : j.amplitude) {
-    if (!std::isfinite(a)) return "trajectory.amplitude must be finite numbers";
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (!(std::abs(j.amplitude[i]) <= (i < 3 ? 1e3 : 1e2))) {
+      return "trajectory.amplitude must lie within 1000 N and 100 N m";
+    }
+    if (!(m.range[i] > 0 && m.range[i] <= 1e6)) return "mechanics.range must be positive numbers";
+  }
+  if (!(m.centre_of_mass.cwiseAbs().maxCoeff() <= 1)) {
+    return "mechanics.centre_of_mass_mm must lie within 1000 mm";
   }
   if (s.compression.jpeg_quality < 0 || s.compression.jpeg_quality > 100) {
     return "compression.jpeg_quality must lie between 0 and 100";
   }
   const double window = s.exposure.time + s.exposure.rolling_readout;
-  std::string found =
-      first_of({not_positive({{"mechanics.mass_g", m.mass},
-                              {"mechanics.axial_n_per_mm", m.axial_stiffness},
-                              {"mechanics.lateral_n_per_mm", m.lateral_stiffness},
-                              {"mechanics.bending_nm_per_rad", m.bending_stiffness},
-                              {"mechanics.torsion_nm_per_rad", m.torsion_stiffness},
-                              {"mechanics.inertia_g_mm2", m.principal_inertia.minCoeff()},
-                              {"camera.fx", s.camera.fx_px},
-                              {"camera.fy", s.camera.fy_px},
-                              {"target.tag_size_mm", s.target.tag_size},
-                              {"trajectory.bandwidth_hz", j.bandwidth},
-                              {"trajectory.sweep_from_hz", j.sweep_from},
-                              {"trajectory.sweep_to_hz", j.sweep_to},
-                              {"trajectory.sweep_s", j.sweep_time},
-                              {"optics.focus_mm", s.optics.focus_distance}}),
-                outside({{"camera.fps", s.camera.frame_rate}}, 0.1, 2000),
-                outside({{"mechanics.damping_ratio", m.damping_ratio},
-                         {"optics.vignetting", s.optics.vignetting},
-                         {"light.unevenness", s.light.unevenness},
-                         {"light.ambient", s.light.ambient},
-                         {"target.paper_reflectance", s.target.paper_reflectance},
-                         {"target.ink_reflectance", s.target.ink_reflectance}},
-                        0, 1),
-                outside({{"optics.psf_sigma_px", s.optics.psf_sigma_px}}, 0, 4),
-                outside({{"optics.defocus_px_per_mm", s.optics.defocus_px_per_m}}, 0, 1e5),
-                outside({{"exposure.time_ms", s.exposure.time},
-                         {"exposure.rolling_readout_ms", s.exposure.rolling_readout},
-                         {"trajectory.rest_s", j.rest_time},
-                         {"trajectory.hold_s", j.hold_time}},
-                        0, 1e6),
-                outside({{"noise.read_counts", s.noise.read_counts},
-                         {"noise.shot_counts_per_count", s.noise.shot_counts_per_count},
-                         {"light.level_counts", s.light.level_counts},
-                         {"light.glare_counts", s.light.glare_counts}},
-                        0, 1e4),
-                outside({{"target.ink_edge_roughness_um", s.target.ink_edge_roughness},
-                         {"target.paper_raggedness_um", s.target.paper_raggedness},
-                         {"target.position_error_mm", s.target.position_error}},
-                        0, 1e-3),
-                outside({{"target.ink_grain", s.target.ink_grain},
-                         {"target.rotation_error_rad", s.target.rotation_error}},
-                        0, 0.5),
-                target_problem(s.target)});
+  std::string found = first_of(
+      {outside({{"mechanics.mass_g", m.mass * 1e3}}, 0.01, 1e4),
+       outside({{"mechanics.axial_n_per_mm", m.axial_stiffness * 1e-3},
+                {"mechanics.lateral_n_per_mm", m.lateral_stiffness * 1e-3}},
+               1e-4, 1e3),
+       outside({{"mechanics.bending_nm_per_rad", m.bending_stiffness},
+                {"mechanics.torsion_nm_per_rad", m.torsion_stiffness}},
+               1e-6, 1e2),
+       outside({{"mechanics.inertia_g_mm2", m.principal_inertia.minCoeff() * 1e9},
+                {"mechanics.inertia_g_mm2", m.principal_inertia.maxCoeff() * 1e9}},
+               1, 1e7),
+       outside({{"mechanics.spring_length_mm", m.spring_length * 1e3},
+                {"mechanics.spring_half_spacing_x_mm", m.spring_half_spacing_x * 1e3},
+                {"mechanics.spring_half_spacing_y_mm", m.spring_half_spacing_y * 1e3}},
+               0.1, 1e3),
+       outside({{"mechanics.spring_attachment_z_mm", m.spring_attachment_z * 1e3}}, -1e3, 1e3),
+       outside({{"camera.fx", s.camera.fx_px}, {"camera.fy", s.camera.fy_px}}, 1, 1e5),
+       outside({{"target.tag_size_mm", s.target.tag_size * 1e3}}, 0.1, 1e3),
+       not_positive({{"trajectory.bandwidth_hz", j.bandwidth},
+                     {"trajectory.sweep_from_hz", j.sweep_from},
+                     {"trajectory.sweep_to_hz", j.sweep_to},
+                     {"trajectory.sweep_s", j.sweep_time},
+                     {"optics.focus_mm", s.optics.focus_distance}}),
+       outside({{"camera.fps", s.camera.frame_rate}}, 0.1, 2000),
+       outside({{"mechanics.damping_ratio", m.damping_ratio},
+                {"optics.vignetting", s.optics.vignetting},
+                {"light.unevenness", s.light.unevenness},
+                {"light.ambient", s.light.ambient},
+                {"target.paper_reflectance", s.target.paper_reflectance},
+                {"target.ink_reflectance", s.target.ink_reflectance}},
+               0, 1),
+       outside({{"optics.psf_sigma_px", s.optics.psf_sigma_px}}, 0, 4),
+       outside({{"optics.defocus_px_per_mm", s.optics.defocus_px_per_m}}, 0, 1e5),
+       outside({{"exposure.time_ms", s.exposure.time},
+                {"exposure.rolling_readout_ms", s.exposure.rolling_readout},
+                {"trajectory.rest_s", j.rest_time},
+                {"trajectory.hold_s", j.hold_time}},
+               0, 1e6),
+       outside({{"noise.read_counts", s.noise.read_counts},
+                {"noise.shot_counts_per_count", s.noise.shot_counts_per_count},
+                {"light.level_counts", s.light.level_counts},
+                {"light.glare_counts", s.light.glare_counts}},
+               0, 1e4),
+       outside({{"target.ink_edge_roughness_um", s.target.ink_edge_roughness},
+                {"target.paper_raggedness_um", s.target.paper_raggedness},
+                {"target.position_error_mm", s.target.position_error}},
+               0, 1e-3),
+       outside({{"target.ink_grain", s.target.ink_grain},
+                {"target.rotation_error_rad", s.target.rotation_error}},
+               0, 0.5),
+       target_problem(s.target)});
   if (found.empty() && window * s.camera.frame_rate > 1.0) {
     found = "exposure: time and readout together are longer than a frame period of camera.fps";
   }

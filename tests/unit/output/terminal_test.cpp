@@ -145,6 +145,20 @@ TEST(NotATerminal, PrintsOneLineForEveryHalfSecondOfSampleTime) {
   EXPECT_NE(text.find("60.0 Hz"), std::string::npos);
 }
 
+TEST(NotATerminal, ALossHasALineOfItsOwn) {
+  int ends[2];
+  ASSERT_EQ(pipe2(ends, O_CLOEXEC), 0);
+  UniqueFd reader(ends[0]), writer(ends[1]);
+  TerminalOptions options;
+  options.fd = writer.get();
+  TerminalOutput out(options);
+  Sample s = test::ok_sample();
+  out.send(s);
+  s.status = Status::lost;  // the time is the last frame's
+  out.send(s);
+  EXPECT_NE(drain(reader.get()).find("lost"), std::string::npos);
+}
+
 class OnATerminal : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -175,6 +189,19 @@ TEST_F(OnATerminal, DrawsInPlaceShowsNoticesAndGivesTheCursorBack) {
     EXPECT_LT(drain(screen_.get()).size(), text.size());
   }
   EXPECT_NE(drain(screen_.get()).find("\n\x1b[?25h"), std::string::npos);
+}
+
+TEST_F(OnATerminal, ALossIsShownAtOnceAndSoIsTheNoticeAfterIt) {
+  TerminalOutput out(options_);
+  Sample s = test::ok_sample();
+  out.send(s);
+  drain(screen_.get());
+  s = {};
+  s.status = Status::lost;
+  out.send(s);  // sooner than the next drawing is due, and no sample follows
+  EXPECT_NE(drain(screen_.get()).find("lost"), std::string::npos);
+  out.notice("the camera stopped");
+  EXPECT_NE(drain(screen_.get()).find("the camera stopped"), std::string::npos);
 }
 
 TEST_F(OnATerminal, NoColorIsHonoured) {

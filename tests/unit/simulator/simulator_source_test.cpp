@@ -5,23 +5,7 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include "host/config_error.h"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace tagwrench {
 namespace {
@@ -116,21 +100,6 @@ TEST(SimulatorSource, LiveReadBeforeTheTickGivesNothing) {
   SimulatorSource source(small(1), true);
   Frame frame;
   EXPECT_EQ(source.read(frame), ReadStatus::nothing);
-}
-
-TEST(SimulatorSource, NoHeapPerFrame) {
-  for (const double readout : {0.0, 10e-3}) {
-    sim::Scenario s;
-    s.trajectory.rest_time = 0;
-    s.exposure.rolling_readout = readout;
-    SimulatorSource source(s, false);
-    Frame frame;
-    source.read(frame);
-    const long before = allocations;
-    for (int i = 0; i < 30; ++i) source.read(frame);
-    EXPECT_EQ(allocations - before, 0);
-  }
-  EXPECT_GT(allocations, 0);  // the counter counts
 }
 
 TEST(SimulatorSource, LargerFormatsRender) {
