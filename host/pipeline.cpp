@@ -76,8 +76,8 @@ RunReport Pipeline::run(const RunLimits& limits) {
     if (limits.frames && report_.frames >= *limits.frames) break;
     if (limits.time && std::chrono::steady_clock::now() - start_ >= *limits.time) break;
     wait(wake_time(limits));
-    if (source_ready_) read_source();
-    if (std::chrono::steady_clock::now() >= missing_at()) send_neutral();
+    const bool came = source_ready_ && read_source();
+    if (!came && std::chrono::steady_clock::now() >= missing_at()) send_neutral();
   }
   dead_man_.stand_down();
   report_.end = end_.value_or(RunReport::End::limit);
@@ -123,28 +123,29 @@ void Pipeline::wait(TimePoint until) noexcept {
   }
 }
 
-void Pipeline::read_source() noexcept {
+/// Takes what the source has; false if that was no frame.
+bool Pipeline::read_source() noexcept {
   Frame frame;
   switch (source_.read(frame)) {
-    case ReadStatus::frame: {
+    case ReadStatus::frame:
       note_arrival(std::chrono::steady_clock::now());
       if (!neutral_) guard();  // or a slow search for the tags would look like a hang
       step(frame);
-      return;
-    }
+      return true;
     case ReadStatus::nothing:
-      return;
+      return false;
     case ReadStatus::disconnected:
       send_neutral();
       say(source_.detail());
-      return;
+      return false;
     case ReadStatus::reconnected:
       say(source_.detail());
-      return;
+      return false;
     case ReadStatus::end:
       end_ = RunReport::End::source_ended;
-      return;
+      return false;
   }
+  return false;
 }
 
 /// The median of three intervals: one hiccup does not delay the next neutral, a camera that slows

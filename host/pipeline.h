@@ -52,7 +52,7 @@ class Pipeline {
   void send(const Sample& sample) noexcept;
   void send_neutral() noexcept;
   void guard() noexcept;
-  void read_source() noexcept;
+  bool read_source() noexcept;
   void note_arrival(TimePoint now) noexcept;
   void wait(TimePoint until) noexcept;
   void say(std::string_view line) noexcept;
