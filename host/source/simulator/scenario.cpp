@@ -1,5 +1,7 @@
 #include "host/source/simulator/scenario.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <initializer_list>
 #include <numbers>
@@ -27,8 +29,7 @@ std::string not_positive(std::initializer_list<Named> values) {
 std::string outside(std::initializer_list<Named> values, double low, double high) {
   for (const auto& [key, value] : values) {
     if (!(value >= low && value <= high)) {
-      return std::string(key) + " must lie between " + std::to_string(low) + " and " +
-             std::to_string(high);
+      return fmt::format("{} must lie between {:g} and {:g}, is {:g}", key, low, high, value);
     }
   }
   return {};

@@ -133,7 +133,8 @@ TEST(SimulatorSource, RefusesAScenarioInOneLine) {
     SimulatorSource source(s, false);
     FAIL() << "accepted a negative mass";
   } catch (const ConfigError& error) {
-    EXPECT_STREQ(error.what(), "scenario: mechanics.mass_g must be a positive number");
+    EXPECT_STREQ(error.what(),
+                 "scenario: mechanics.mass_g must lie between 0.01 and 10000, is -1000");
   }
 }
 
