@@ -1,6 +1,7 @@
 #include "host/config/calibration_file.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -19,7 +20,9 @@ const char* const kGood = R"({"format": "tagwrench-calibration-1",
 class CalibrationFile : public testing::Test {
  protected:
   void SetUp() override {
-    path_ = std::filesystem::path(testing::TempDir()) / "calibration_file_test.json";
+    // Tests run side by side, each in a process of its own.
+    path_ = std::filesystem::path(testing::TempDir()) /
+            ("calibration_file_test_" + std::to_string(::getpid()) + ".json");
   }
   void TearDown() override { std::filesystem::remove(path_); }
 
