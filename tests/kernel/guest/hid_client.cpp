@@ -10,6 +10,8 @@
 //   m lost VID:PID
 // `led 0` or `led 1` on standard input writes the LED report 04 00 or 04 01.
 #include <hidapi.h>
+#include <sys/inotify.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -18,10 +20,10 @@
 #include <fstream>
 #include <iterator>
 #include <span>
-#include <thread>
 #include <utility>
 #include <vector>
 
+#include "host/os/unique_fd.h"
 #include "tests/kernel/guest/lines.h"
 #include "tests/unit/output/hid_parser.h"
 
@@ -48,7 +50,15 @@ class Device {
  public:
   /// Waits for the device.
   explicit Device(std::string id) : id_(std::move(id)) {
-    while (!find()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    // Watched before looking, so that no node comes unseen; udev gives permission after the node is
+    // made.
+    const UniqueFd nodes(::inotify_init1(IN_CLOEXEC));
+    if (::inotify_add_watch(nodes.get(), "/dev", IN_CREATE | IN_ATTRIB) < 0)
+      fail("cannot watch /dev");
+    std::array<char, 4096> events;
+    while (!find()) {
+      if (::read(nodes.get(), events.data(), events.size()) < 0) fail("cannot watch /dev");
+    }
     layout_ = test::parse_hid(descriptor_of(path_));
   }
   Device(const Device&) = delete;
