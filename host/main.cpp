@@ -9,11 +9,13 @@
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 
+#include "host/calibrate_command.h"
 #include "host/config/scenario_config.h"
 #include "host/config_error.h"
 #include "host/doctor.h"
 #include "host/run_command.h"
 #include "host/source/simulator/folder_export.h"
+#include "host/tags_command.h"
 #include "host/tell.h"
 
 namespace {
@@ -73,6 +75,9 @@ int dispatch(int argc, char** argv) {
       ->required()
       ->check(CLI::Range(1, 10'000'000));
 
+  tagwrench::CalibrateCommand calibrate(app);
+  tagwrench::TagsCommand tags(app);
+
   CLI::App* doctor = app.add_subcommand(
       "doctor", "say line by line what works here and what to do about the rest");
 
@@ -85,6 +90,8 @@ int dispatch(int argc, char** argv) {
     return kUnusable;
   }
   if (run->parsed()) return tagwrench::run(run_options);
+  if (calibrate.parsed()) return calibrate.run();
+  if (tags.parsed()) return tags.run();
   if (doctor->parsed()) return tagwrench::run_doctor(std::cout);
   if (sim->parsed()) {
     const tagwrench::sim::Scenario described =

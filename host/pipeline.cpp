@@ -33,6 +33,9 @@ const char* text(Hint hint) {
       return "rest pose learned; the wrench counts from here";
     case Hint::moved_while_learning:
       return "the platform moved while its rest pose was learned; let it rest for a moment";
+    case Hint::appearance_does_not_fit:
+      return "the target does not look like the picture in rest.appearance (light, focus, dirt or "
+             "another lens?); run `tagwrench calibrate target`, or remove that line";
     case Hint::none:
       break;
   }
@@ -55,8 +58,10 @@ Pipeline::Pipeline(FrameSource& source, Tracker& tracker, const WrenchEstimator&
       interval_(source.format().period) {}
 
 /// The life of a frame.
-void Pipeline::step(const Frame& frame) noexcept {
-  const Track track = tracker_.track(frame);  // pixels -> displacement of the platform
+void Pipeline::step(Frame& frame) noexcept {
+  Track track = tracker_.track(frame);  // pixels -> displacement of the platform
+  if (track.needs_whole_frame && source_.complete(frame)) track = tracker_.track(frame);
+  source_.want(track.wanted);
   Sample sample{.sequence = frame.sequence,
                 .capture_time = frame.capture_time,
                 .latency_origin = frame.latency_origin,

@@ -48,7 +48,7 @@ class Pipeline {
   RunReport run(const RunLimits& limits);
 
  private:
-  void step(const Frame& frame) noexcept;
+  void step(Frame& frame) noexcept;
   void send(const Sample& sample) noexcept;
   void send_neutral() noexcept;
   void guard() noexcept;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,13 +9,11 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
-#include <functional>
 #include <memory>
 
-#include "host/config/scenario_config.h"
 #include "host/config/sensor_config.h"
 #include "host/config_error.h"
-#include "host/os/unique_fd.h"
+#include "host/input.h"
 #include "host/output/csv.h"
 #include "host/output/joystick.h"
 #include "host/output/jsonl.h"
@@ -24,89 +21,11 @@
 #include "host/output/terminal.h"
 #include "host/output/wrench_hid.h"
 #include "host/pipeline.h"
-#include "host/source/images.h"
-#include "host/source/simulator/folder_export.h"
-#include "host/source/simulator/simulator_source.h"
 #include "host/source/v4l2_nodes.h"
-#include "host/source/v4l2_source.h"
 #include "host/tell.h"
 
 namespace tagwrench {
 namespace {
-
-struct Spec {
-  std::string kind;
-  std::string argument;
-};
-
-/// "kind:argument", or "kind".
-Spec split(const std::string& spec) {
-  const std::size_t colon = spec.find(':');
-  if (colon == std::string::npos) return {spec, ""};
-  return {spec.substr(0, colon), spec.substr(colon + 1)};
-}
-
-/// Ctrl-C, kill and a closed terminal wait until the loop reads them.
-sigset_t block_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
-  sigprocmask(SIG_BLOCK, &signals, nullptr);
-  return signals;
-}
-
-/// Readable once one of them has come.
-UniqueFd signals_as_fd() {
-  const sigset_t signals = block_signals();
-  return UniqueFd(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK));
-}
-
-/// A source and the sensor that it shows.
-struct Input {
-  SensorConfig sensor;
-  std::unique_ptr<FrameSource> source;
-};
-
-SensorConfig sensor_or(const RunOptions& options, const std::function<SensorConfig()>& fallback) {
-  return options.sensor.empty() ? fallback() : load_sensor(options.sensor);
-}
-
-/// The paper's sensor with nominal lens: what a fresh build comes closest to.
-SensorConfig paper_sensor() {
-  return parse_sensor(sim::sensor_yaml(sim::Scenario{}), "the built-in sensor");
-}
-
-Input open_simulator(const RunOptions& options, const std::string& scenario_file) {
-  const sim::Scenario scenario =
-      scenario_file.empty() ? sim::Scenario{} : load_scenario(scenario_file);
-  Input input;
-  input.sensor = sensor_or(
-      options, [&] { return parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor"); });
-  input.source = std::make_unique<SimulatorSource>(scenario, !options.fast);
-  return input;
-}
-
-Input open_images(const RunOptions& options, const std::string& folder) {
-  const std::filesystem::path beside = std::filesystem::path(folder) / "sensor.yaml";
-  Input input;
-  input.sensor = sensor_or(options, [&] {
-    std::error_code unreadable;  // the source itself will complain
-    return std::filesystem::exists(beside, unreadable) ? load_sensor(beside) : paper_sensor();
-  });
-  input.source = std::make_unique<ImagesSource>(folder, options.fast);
-  return input;
-}
-
-Input open_camera(const RunOptions& options, const std::string& argument) {
-  Input input;
-  input.sensor = sensor_or(options, paper_sensor);
-  V4l2Options camera = parse_v4l2_spec(argument);
-  camera.preferred_width = input.sensor.camera.width_px;
-  camera.preferred_height = input.sensor.camera.height_px;
-  block_signals();  // from here on the camera's settings must be put back
-  input.source = std::make_unique<V4l2Source>(camera);
-  return input;
-}
 
 /// Whether the source shows the sensor's tags within `patience`. A signal ends the search; the loop
 /// then sees it too.
@@ -136,7 +55,7 @@ Input find_input(const RunOptions& options) {
   for (const CameraNode& node : list_camera_nodes()) {
     if (!node.captures) continue;
     try {
-      Input input = open_camera(options, node.path);
+      Input input = open_input({options.sensor, "v4l2:" + node.path, options.fast});
       ++cameras;
       if (input.source->format().width == input.sensor.camera.width_px &&
           sees_tags(input, kPatience))
@@ -149,33 +68,7 @@ Input find_input(const RunOptions& options) {
                       "picks a camera)"
                     : "no camera sees the tags: showing the simulated sensor (--source "
                       "v4l2:/dev/videoN insists)");
-  RunOptions simulated = options;
-  simulated.sensor.clear();  // it describes the camera that is not there
-  return open_simulator(simulated, "");
-}
-
-Input open_input(const RunOptions& options) {
-  if (options.source.empty()) return find_input(options);
-  const Spec spec = split(options.source);
-  if (spec.kind == "sim") return open_simulator(options, spec.argument);
-  if (spec.kind == "images" && !spec.argument.empty()) return open_images(options, spec.argument);
-  if (spec.kind == "v4l2" && !spec.argument.empty()) return open_camera(options, spec.argument);
-  if (spec.kind == "recording") {
-    throw ConfigError("--source recording: this version reads no recordings yet; use images:DIR");
-  }
-  throw ConfigError(fmt::format(
-      "--source {}: not a source; use sim, sim:SCENARIO.yaml, v4l2:/dev/videoN or images:DIR",
-      options.source));
-}
-
-void check_size(const Input& input) {
-  const SourceFormat& format = input.source->format();
-  const CameraModel& camera = input.sensor.camera;
-  if (format.width == camera.width_px && format.height == camera.height_px) return;
-  throw ConfigError(fmt::format(
-      "{}: frames are {}x{}, but sensor.yaml's camera is {}x{}; give the --sensor made for this "
-      "mode, or ask the camera for that size",
-      format.description, format.width, format.height, camera.width_px, camera.height_px));
+  return open_input({"", "sim", options.fast});  // --sensor describes the camera that is not there
 }
 
 /// The outputs, and the devices among them that a guardian must bring to rest.
@@ -279,7 +172,7 @@ Outputs open_outputs(const RunOptions& options, const Input& input) {
     return outputs;
   }
   std::vector<Spec> specs;
-  for (const std::string& text : options.outputs) specs.push_back(split(text));
+  for (const std::string& text : options.outputs) specs.push_back(split_spec(text));
   check_outputs(specs);
   for (const Spec& spec : specs) {
     if (is_device(spec.kind)) add_device(outputs, spec.kind, input.sensor);
@@ -312,7 +205,8 @@ std::string summary(const RunReport& report) {
 
 int run(const RunOptions& options) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
-  Input input = open_input(options);
+  Input input = options.source.empty() ? find_input(options)
+                                       : open_input({options.sensor, options.source, options.fast});
   const UniqueFd stop = signals_as_fd();
   check_size(input);
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);

@@ -14,8 +14,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <utility>
 
 namespace tagwrench {
 
@@ -33,9 +35,41 @@ struct ImageView {
   int stride = 0;
 };
 
+/// A rectangle of pixels in the coordinates of an ImageView as delivered, that is of the camera's
+/// raw image, mirrored or not: columns x to x + width - 1, rows y to y + height - 1. Empty stands
+/// for the whole image wherever a region is asked for or told.
+struct Region {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+
+  constexpr bool empty() const { return width <= 0 || height <= 0; }
+  constexpr bool contains(const Region& other) const {
+    return other.x >= x && other.y >= y && other.x + other.width <= x + width &&
+           other.y + other.height <= y + height;
+  }
+  /// What lies within an image of this size; all of it if nothing does, or if this is empty. Safe
+  /// for numbers of any size.
+  constexpr Region clipped(int image_width, int image_height) const {
+    const auto span = [](int from, int count, int limit) {
+      const auto begin = std::clamp<std::int64_t>(from, 0, limit);
+      const auto end = std::clamp<std::int64_t>(std::int64_t{from} + count, 0, limit);
+      return std::pair{static_cast<int>(begin), static_cast<int>(end - begin)};
+    };
+    const auto [left, columns] = span(x, width, image_width);
+    const auto [top, rows] = span(y, height, image_height);
+    const Region inside{left, top, columns, rows};
+    return inside.empty() ? Region{0, 0, image_width, image_height} : inside;
+  }
+  constexpr bool operator==(const Region&) const = default;
+};
+
 /// One picture as its source delivered it; valid until the source's next read().
 struct Frame {
   ImageView image;
+  Region decoded;  ///< the part of `image` that shows this picture. The rest is undefined (of an
+                   ///< earlier picture, or never written) and must not be read. Empty: all of it
   TimePoint
       capture_time{};  ///< the kernel's capture time, or the recording's or simulator's own clock
   TimePoint
@@ -43,6 +77,9 @@ struct Frame {
                          ///< capture_time for live sources, the hand-over time for replayed ones
   std::uint64_t sequence = 0;  ///< counts the frames that the source captured, lost ones included
   std::uint32_t dropped = 0;   ///< frames lost since the previous Frame
+
+  /// `decoded`, spelt out when it is all.
+  constexpr Region readable() const { return decoded.clipped(image.width, image.height); }
 };
 
 enum class Status : std::uint8_t {
@@ -82,6 +119,7 @@ enum class Hint : std::uint8_t {
   image_looks_unmirrored,  ///< the reverse: the sensor says mirrored: true
   rest_learned,            ///< this frame completed the rest pose
   moved_while_learning,    ///< the platform moved during the rest frames; learning starts again
+  appearance_does_not_fit,  ///< the target no longer looks like the picture that was loaded
 };
 
 /// The platform's displacement from rest, as the tracker sees it. Numbers are zero unless status is
@@ -94,6 +132,9 @@ struct Track {
   Matrix6 covariance = Matrix6::Zero();    ///< of displacement, m^2, m rad, rad^2
   double residual_px = 0;                  ///< RMS of the fit
   std::uint8_t tags_held = 0;              ///< number of tags that carried the fit
+  Region wanted;                   ///< what the next frame must show to be tracked; empty: all
+  bool needs_whole_frame = false;  ///< Frame::decoded was too small to tell: ask again with the
+                                   ///< completed frame. If there is none, the rest stands
 };
 
 /// One line of output: all that the instrument knows about one frame.

@@ -4,7 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "host/config/yaml_reader.h"
+#include "host/config/disturbance_config.h"
+#include "host/config/yaml_section.h"
 #include "host/config_error.h"
 
 namespace tagwrench {
@@ -13,32 +14,7 @@ namespace {
 constexpr double kMilli = 1e-3;
 constexpr double kMicro = 1e-6;
 
-// Reads keys over the defaults that a struct already holds, and converts to SI.
-class Section {
- public:
-  explicit Section(YamlReader reader) : reader_(std::move(reader)) {}
-
-  void number(const char* key, double& value, double unit = 1.0) {
-    if (reader_.has(key)) value = unit * reader_.number(key);
-  }
-  template <typename Vector>  // anything with size() and []
-  void numbers(const char* key, Vector& value, double unit = 1.0) {
-    if (!reader_.has(key)) return;
-    const std::vector<double> read = reader_.numbers(key, static_cast<std::size_t>(value.size()));
-    for (std::size_t i = 0; i < read.size(); ++i) value[static_cast<int>(i)] = unit * read[i];
-  }
-  template <typename Enum>
-  void choice(const char* key, Enum& value, const std::vector<std::string_view>& names) {
-    if (reader_.has(key)) value = static_cast<Enum>(reader_.one_of(key, names));
-  }
-  YamlReader& reader() { return reader_; }
-  void finish() { reader_.finish(); }
-
- private:
-  YamlReader reader_;
-};
-
-void read_mechanics(Section s, sim::Mechanics& m) {
+void read_mechanics(YamlSection s, sim::Mechanics& m) {
   s.number("mass_g", m.mass, kMilli);
   s.numbers("centre_of_mass_mm", m.centre_of_mass, kMilli);
   s.numbers("inertia_g_mm2", m.principal_inertia, 1e-9);
@@ -55,7 +31,7 @@ void read_mechanics(Section s, sim::Mechanics& m) {
   s.finish();
 }
 
-void read_camera(Section s, sim::Camera& c) {
+void read_camera(YamlSection s, sim::Camera& c) {
   c.width_px = s.reader().integer_or("width", 64, 4096, c.width_px);
   c.height_px = s.reader().integer_or("height", 64, 4096, c.height_px);
   s.number("fx", c.fx_px);
@@ -68,7 +44,7 @@ void read_camera(Section s, sim::Camera& c) {
   s.finish();
 }
 
-void read_optics(Section s, sim::Optics& o) {
+void read_optics(YamlSection s, sim::Optics& o) {
   s.number("psf_sigma_px", o.psf_sigma_px);
   s.number("focus_mm", o.focus_distance, kMilli);
   s.number("defocus_px_per_mm", o.defocus_px_per_m, 1 / kMilli);
@@ -83,7 +59,7 @@ void read_tags(YamlReader& reader, sim::Target& t) {
   bool all_placed = true;
   if (reader.has("tags")) {
     for (YamlReader& entry : reader.children("tags")) {
-      Section s(entry);
+      YamlSection s(entry);
       sim::TagPlacement tag;
       tag.id = s.reader().integer("id", 0, 1'000'000);
       const bool here = s.reader().has("position_mm");
@@ -109,7 +85,7 @@ void read_tags(YamlReader& reader, sim::Target& t) {
   t.tags = tags;
 }
 
-void read_target(Section s, sim::Target& t) {
+void read_target(YamlSection s, sim::Target& t) {
   t.family = s.reader().text_or("family", t.family);
   s.number("tag_size_mm", t.tag_size, kMilli);
   s.number("border_mm", t.border, kMilli);
@@ -126,7 +102,7 @@ void read_target(Section s, sim::Target& t) {
   s.finish();
 }
 
-void read_light(Section s, sim::Light& l) {
+void read_light(YamlSection s, sim::Light& l) {
   s.number("level_counts", l.level_counts);
   s.number("unevenness", l.unevenness);
   s.number("direction_rad", l.direction);
@@ -135,9 +111,9 @@ void read_light(Section s, sim::Light& l) {
   s.finish();
 }
 
-void read_trajectory(Section s, sim::Trajectory& t) {
+void read_trajectory(YamlSection s, sim::Trajectory& t) {
   s.choice("motion", t.motion,
-           {"rest", "hold", "push", "steps", "sweep", "tap", "drop", "compound"});
+           {"rest", "hold", "push", "steps", "sweep", "tap", "drop", "compound", "hard"});
   s.number("rest_s", t.rest_time);
   s.numbers("amplitude", t.amplitude);
   s.choice("axis", t.axis, {"fx", "fy", "fz", "mx", "my", "mz"});
@@ -147,22 +123,24 @@ void read_trajectory(Section s, sim::Trajectory& t) {
   s.number("sweep_from_hz", t.sweep_from);
   s.number("sweep_to_hz", t.sweep_to);
   s.number("sweep_s", t.sweep_time);
+  s.number("event_s", t.event_time);
   s.finish();
 }
 
-void read_exposure(Section s, sim::Exposure& e) {
+void read_exposure(YamlSection s, sim::Exposure& e) {
   s.number("time_ms", e.time, kMilli);
   s.number("rolling_readout_ms", e.rolling_readout, kMilli);
+  e.even = s.reader().boolean_or("even", e.even);
   s.finish();
 }
 
-void read_noise(Section s, sim::Noise& n) {
+void read_noise(YamlSection s, sim::Noise& n) {
   s.number("read_counts", n.read_counts);
   s.number("shot_counts_per_count", n.shot_counts_per_count);
   s.finish();
 }
 
-void read_compression(Section s, sim::Compression& c) {
+void read_compression(YamlSection s, sim::Compression& c) {
   c.jpeg_quality = s.reader().integer_or("jpeg_quality", 0, 100, c.jpeg_quality);
   s.choice("file", c.file, {"png", "pgm", "jpeg"});
   s.finish();
@@ -172,7 +150,7 @@ sim::Scenario read_scenario(YamlReader root) {
   sim::Scenario scenario;
   scenario.seed = static_cast<std::uint64_t>(root.integer_or("seed", 0, 2'147'483'647, 1));
   const auto section = [&root](const char* key, auto read, auto& into) {
-    if (root.has(key)) read(Section(root.child(key)), into);
+    if (root.has(key)) read(YamlSection(root.child(key)), into);
   };
   section("mechanics", read_mechanics, scenario.mechanics);
   section("camera", read_camera, scenario.camera);
@@ -183,6 +161,9 @@ sim::Scenario read_scenario(YamlReader root) {
   section("exposure", read_exposure, scenario.exposure);
   section("noise", read_noise, scenario.noise);
   section("compression", read_compression, scenario.compression);
+  if (root.has("disturbances")) {
+    read_disturbances(root.child("disturbances"), scenario.disturbances);
+  }
   root.finish();
   return scenario;
 }

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "host/config/appearance_file.h"
 #include "host/config/calibration_file.h"
 #include "host/config/yaml_reader.h"
 #include "host/wrench/spring_model.h"
@@ -38,7 +39,49 @@ std::optional<Eigen::Isometry3d> optional_pose(YamlReader& node) {
   return pose;
 }
 
-CameraModel read_camera(YamlReader node) {
+/// Standard deviations of a tag's pose, both or neither, and only where there is a pose.
+Vector6 optional_pose_sigma(YamlReader& node, bool has_pose) {
+  const bool position = node.has("position_sigma_mm");
+  if (node.has("rotation_sigma_rad") != position) {
+    node.fail(position ? "position_sigma_mm" : "rotation_sigma_rad",
+              "position_sigma_mm and rotation_sigma_rad belong together; give both or neither");
+  }
+  Vector6 sigma = Vector6::Zero();
+  if (!position) return sigma;
+  if (!has_pose) {
+    node.fail("position_sigma_mm",
+              "there is no pose that it could belong to; give position_mm and rotation_rad too, or "
+              "leave the sigmas out");
+  }
+  sigma << vector3(node.numbers("position_sigma_mm", 3)) * kMm,
+      vector3(node.numbers("rotation_sigma_rad", 3));
+  for (int i = 0; i < 6; ++i) {
+    if (sigma[i] < 0)
+      node.fail(i < 3 ? "position_sigma_mm" : "rotation_sigma_rad", "must not be negative");
+  }
+  return sigma;
+}
+
+bool is_date(const std::string& text) {
+  constexpr std::string_view kForm = "0000-00-00";
+  return text.size() == kForm.size() &&
+         std::equal(text.begin(), text.end(), kForm.begin(), [](char c, char form) {
+           return form == '0' ? c >= '0' && c <= '9' : c == form;
+         });
+}
+
+/// {date: YYYY-MM-DD, views: N, rms_px: x}
+CameraRecord read_camera_record(YamlReader node) {
+  CameraRecord record;
+  record.date = node.text("date");
+  if (!is_date(record.date)) node.fail("date", fmt::format("'{}' is not YYYY-MM-DD", record.date));
+  record.views = node.integer("views", 1, 100'000);
+  record.rms_px = node.non_negative("rms_px");
+  node.finish();
+  return record;
+}
+
+CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record) {
   CameraModel camera;
   camera.width_px = node.integer("width", 16, 16384);
   camera.height_px = node.integer("height", 16, 16384);
@@ -49,6 +92,8 @@ CameraModel read_camera(YamlReader node) {
   const std::vector<double> distortion = node.numbers_or("distortion", std::vector<double>(5, 0.0));
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
   camera.mirrored = node.boolean_or("mirrored", false);
+  camera.readout = node.number_or("readout_ms", 0.0) * 1e-3;
+  if (node.has("calibrated")) record = read_camera_record(node.child("calibrated"));
   node.finish();
   return camera;
 }
@@ -69,6 +114,7 @@ TargetDescription read_target(YamlReader node) {
         entry.fail("id", fmt::format("tag {} is listed twice; every tag needs its own id", tag.id));
     }
     tag.platform_T_tag = optional_pose(entry);
+    tag.sigma = optional_pose_sigma(entry, tag.platform_T_tag.has_value());
     entry.finish();
     target.tags.push_back(tag);
   }
@@ -78,10 +124,24 @@ TargetDescription read_target(YamlReader node) {
   return target;
 }
 
-RestOptions read_rest(YamlReader node) {
+/// `written` relative to the folder of sensor.yaml.
+std::filesystem::path beside(const YamlReader& node, const std::filesystem::path& written) {
+  return std::filesystem::path(node.file()).parent_path() / written;
+}
+
+RestOptions read_rest(YamlReader node, const CameraModel& camera) {
   RestOptions rest;
   rest.frames = node.integer_or("frames", 1, 1000, rest.frames);
   rest.camera_T_platform = optional_pose(node);
+  if (node.has("appearance")) {
+    if (!rest.camera_T_platform) {
+      node.fail("appearance",
+                "needs position_mm and rotation_rad, the pose that it shows; run `tagwrench "
+                "calibrate target`, or leave it out");
+    }
+    rest.appearance = load_rest_image(beside(node, node.text("appearance")), camera);
+    rest.appearance->frames = rest.frames;
+  }
   node.finish();
   return rest;
 }
@@ -124,10 +184,7 @@ WrenchModel read_wrench(YamlReader node, const SensorConfig& sensor) {
         "give either calibration: FILE or springs: {...}, so that displacement becomes newtons");
   }
   if (calibrated) {
-    const std::filesystem::path file = node.text("calibration");
-    const std::filesystem::path folder = std::filesystem::path(node.file()).parent_path();
-    load_calibration(file.is_absolute() ? file : folder / file, sensor.camera, sensor.target,
-                     model);
+    load_calibration(beside(node, node.text("calibration")), sensor.camera, sensor.target, model);
   } else {
     model.K = stiffness(read_springs(node.child("springs")));
   }
@@ -199,9 +256,9 @@ HidIdentity read_identity(YamlReader node) {
 
 SensorConfig read_sensor(YamlReader root) {
   SensorConfig sensor;
-  sensor.camera = read_camera(root.child("camera"));
+  sensor.camera = read_camera(root.child("camera"), sensor.camera_calibrated);
   sensor.target = read_target(root.child("target"));
-  if (root.has("rest")) sensor.rest = read_rest(root.child("rest"));
+  if (root.has("rest")) sensor.rest = read_rest(root.child("rest"), sensor.camera);
   sensor.wrench = read_wrench(root.child("wrench"), sensor);
   if (root.has("mounting")) sensor.shaping.hid_R_camera = read_mounting(root.child("mounting"));
   if (root.has("shaping")) sensor.shaping = read_shaping(root.child("shaping"), sensor.shaping);

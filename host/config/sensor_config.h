@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "host/tracker/camera_model.h"
@@ -17,8 +18,16 @@ struct HidIdentity {
   std::uint16_t product = 0xc62e;  ///< SpaceMouse Wireless: one combined 6-axis report
 };
 
+/// What `tagwrench calibrate camera` wrote about its work.
+struct CameraRecord {
+  std::string date;  ///< YYYY-MM-DD
+  int views = 0;
+  double rms_px = 0;  ///< reprojection error
+};
+
 struct SensorConfig {
   CameraModel camera;
+  std::optional<CameraRecord> camera_calibrated;
   TargetDescription target;
   RestOptions rest;
   WrenchModel wrench;

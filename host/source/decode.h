@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
+#include "host/source/jpeg_luma.h"
 #include "host/types.h"
 
 namespace tagwrench {
@@ -35,14 +35,16 @@ class Decoder {
  public:
   /// `stride` is the distance between rows in bytes; 0, or anything too small, means packed rows.
   Decoder(PixelFormat format, int width, int height, int stride);
-  ~Decoder();
-  Decoder(Decoder&&) noexcept;
-  Decoder& operator=(Decoder&&) noexcept;
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
 
-  /// `bytes_used` of `buffer` hold a frame. False: truncated, corrupt or of another size, and
-  /// `image` is untouched.
+  /// `bytes_used` of `buffer` hold a frame. At least the `wanted` part of it becomes readable in
+  /// `image` (empty: all); `decoded` tells which. Elsewhere the image holds what earlier frames
+  /// left there. Decoding the same buffer again with more wanted leaves what was readable as it
+  /// was. False: truncated, corrupt or of another size, and `image` and `decoded` are untouched. Of
+  /// a JPEG no more is looked at than the wanted part requires (see JpegLuma): cut off below it is
+  /// good.
+  bool decode(std::span<const std::uint8_t> buffer, std::size_t bytes_used, const Region& wanted,
+              ImageView& image, Region& decoded) noexcept;
+  /// All of it.
   bool decode(std::span<const std::uint8_t> buffer, std::size_t bytes_used,
               ImageView& image) noexcept;
 
@@ -52,17 +54,12 @@ class Decoder {
   }
 
  private:
-  bool decode_jpeg(std::span<const std::uint8_t> jpeg) noexcept;
-
-  struct JpegCloser {
-    void operator()(void* handle) const noexcept;
-  };
   PixelFormat format_;
   int width_;
   int height_;
   int stride_;
   std::vector<std::uint8_t> luma_;
-  std::unique_ptr<void, JpegCloser> jpeg_;
+  std::optional<JpegLuma> jpeg_;
 };
 
 }  // namespace tagwrench

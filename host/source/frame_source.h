@@ -42,6 +42,14 @@ class FrameSource {
   /// until the next read().
   virtual ReadStatus read(Frame& frame) noexcept = 0;
 
+  /// From the next read() on only this part of the image will be looked at (empty: all), so that
+  /// no more than this needs to be decoded. A source may deliver more: Frame::decoded says.
+  virtual void want(const Region& /*region*/) noexcept {}
+
+  /// Decodes the rest of the frame that the last read() delivered, in place. False: the rest is
+  /// damaged, and the frame is as it was.
+  virtual bool complete(Frame& /*frame*/) noexcept { return true; }
+
   /// One line about the frames that were delivered but could not be used; empty if there were none.
   virtual std::string unusable() const { return {}; }
 

@@ -165,12 +165,10 @@ ReadStatus ImagesSource::read(Frame& frame) noexcept {
   const std::size_t index = next_++;
   arm();
   const TimePoint handed_over = std::chrono::steady_clock::now();
-  ImageView image;
-  if (!load(paths_[index], image)) {
+  if (!load(paths_[index], frame)) {
     ++corrupt_;
     return ReadStatus::nothing;
   }
-  frame.image = image;
   frame.capture_time = TimePoint(times_[index]);
   frame.latency_origin = handed_over;
   frame.sequence = index;
@@ -179,7 +177,15 @@ ReadStatus ImagesSource::read(Frame& frame) noexcept {
   return ReadStatus::frame;
 }
 
-bool ImagesSource::load(const std::string& path, ImageView& image) noexcept {
+bool ImagesSource::complete(Frame& frame) noexcept {
+  const Region whole{0, 0, format_.width, format_.height};
+  const auto& bytes = picture_->bytes;
+  return frame.readable() == whole ||
+         (picture_->jpeg &&
+          picture_->jpeg->decode(bytes, bytes.size(), whole, frame.image, frame.decoded));
+}
+
+bool ImagesSource::load(const std::string& path, Frame& frame) noexcept {
   try {
     std::ifstream file(path, std::ios::binary | std::ios::ate);
     const std::streamoff length = file.tellg();
@@ -194,7 +200,7 @@ bool ImagesSource::load(const std::string& path, ImageView& image) noexcept {
       if (!picture_->jpeg) {
         picture_->jpeg.emplace(PixelFormat::mjpg, format_.width, format_.height, 0);
       }
-      return picture_->jpeg->decode(bytes, bytes.size(), image);
+      return picture_->jpeg->decode(bytes, bytes.size(), wanted_, frame.image, frame.decoded);
     }
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data());
     cv::Mat& grey = picture_->grey;
@@ -203,7 +209,8 @@ bool ImagesSource::load(const std::string& path, ImageView& image) noexcept {
     if (grey.cols != format_.width || grey.rows != format_.height || grey.type() != CV_8UC1) {
       return false;
     }
-    image = {grey.data, grey.cols, grey.rows, static_cast<int>(grey.step)};
+    frame.image = {grey.data, grey.cols, grey.rows, static_cast<int>(grey.step)};
+    frame.decoded = {};
     return true;
   } catch (const std::exception&) {
     return false;

@@ -23,6 +23,13 @@ class ImagesSource final : public FrameSource {
   const SourceFormat& format() const noexcept override { return format_; }
   int poll_fd() const noexcept override { return timer_ ? timer_.get() : -1; }
   ReadStatus read(Frame& frame) noexcept override;
+  /// Saves work where the picture is a JPEG; PNG and PGM are always decoded whole.
+  void want(const Region& region) noexcept override { wanted_ = region; }
+  bool complete(Frame& frame) noexcept override;
+
+  std::size_t count() const noexcept { return paths_.size(); }
+  /// The file that a Frame came from, by its sequence.
+  const std::string& path_of(std::uint64_t sequence) const { return paths_.at(sequence); }
 
   /// Corrupt files; each is also in Frame::dropped of the next good one.
   std::string unusable() const override;
@@ -33,13 +40,14 @@ class ImagesSource final : public FrameSource {
 
   TimePoint due(std::size_t index) const noexcept { return start_ + (times_[index] - times_[0]); }
   void arm() const noexcept;
-  bool load(const std::string& path, ImageView& image) noexcept;
+  bool load(const std::string& path, Frame& frame) noexcept;
 
   std::vector<std::string> paths_;
   std::vector<Duration> times_;
   SourceFormat format_;
   UniqueFd timer_;
   std::unique_ptr<Picture> picture_;
+  Region wanted_;
   TimePoint start_{};
   std::size_t next_ = 0;
   std::size_t delivered_ = 0;  ///< index after the last frame that was handed on

@@ -162,18 +162,26 @@ void V4l2Source::settle(int exposure_us) {
   controls_.lock(port, exposure_us);
 }
 
-void V4l2Source::release_held() noexcept {
-  if (held_ && device_) device_->requeue(*held_);
+bool V4l2Source::release_held() noexcept {
+  const bool held = held_ && device_;
+  if (held) device_->requeue(held_->index);
   held_.reset();
+  return held;
 }
 
 ReadStatus V4l2Source::read(Frame& frame) noexcept {
-  release_held();
+  const unsigned kept = release_held() ? 1 : 0;
   if (state_ == State::away) return retry();
-  return drain(frame);
+  return drain(device_->buffer_count() - kept, frame);
 }
 
-ReadStatus V4l2Source::drain(Frame& frame) noexcept {
+bool V4l2Source::complete(Frame& frame) noexcept {
+  return !held_ ||
+         decoder_->decode(held_->bytes, held_->bytes_used, {}, frame.image, frame.decoded);
+}
+
+/// `queued`: how many buffers the driver had to fill since the last read().
+ReadStatus V4l2Source::drain(unsigned queued, Frame& frame) noexcept {
   std::optional<V4l2Buffer> newest;
   const unsigned at_most =
       2 * device_->buffer_count();  // a camera faster than this loop must not hold it
@@ -197,7 +205,7 @@ ReadStatus V4l2Source::drain(Frame& frame) noexcept {
     }
   }
   if (taken > 0 && state_ == State::streaming) arm(stall_after(), Duration{});
-  if (newest) return deliver(*newest, taken, frame);
+  if (newest) return deliver(*newest, taken >= queued, frame);
   if (taken > 0) return ReadStatus::nothing;
   if (device_->broken()) return lose("the driver reports an error");
   const Duration patience = state_ == State::streaming ? stall_after() : kReopenAfter;
@@ -211,7 +219,8 @@ ReadStatus V4l2Source::drain(Frame& frame) noexcept {
   return ReadStatus::nothing;
 }
 
-ReadStatus V4l2Source::deliver(const V4l2Buffer& newest, unsigned taken, Frame& frame) noexcept {
+ReadStatus V4l2Source::deliver(const V4l2Buffer& newest, bool queue_was_full,
+                               Frame& frame) noexcept {
   if (state_ == State::waiting) {
     state_ = State::streaming;
     device_->requeue(newest.index);
@@ -221,20 +230,21 @@ ReadStatus V4l2Source::deliver(const V4l2Buffer& newest, unsigned taken, Frame& 
     return ReadStatus::reconnected;
   }
   const TimePoint now = Clock::now();
-  const bool stale = ledger_.stale(now, last_drain_, taken >= device_->buffer_count());
+  const bool stale = ledger_.stale(now, last_drain_, queue_was_full);
   last_drain_ = now;
-  ImageView image;
-  if (stale || !decoder_->decode(newest.bytes, newest.bytes_used, image)) {
+  const bool usable = !stale && decoder_->decode(newest.bytes, newest.bytes_used, wanted_,
+                                                 frame.image, frame.decoded);
+  if (!usable) {
     ++(stale ? skipped_.stale : skipped_.corrupt);
     device_->requeue(newest.index);
     return ReadStatus::nothing;
   }
-  if (decoder_->borrows()) {
-    held_ = newest.index;
+  const bool whole = frame.decoded == Region{0, 0, format_.width, format_.height};
+  if (decoder_->borrows() || !whole) {
+    held_ = newest;
   } else {
     device_->requeue(newest.index);
   }
-  frame.image = image;
   frame.capture_time = frame.latency_origin = ledger_.capture_time();
   frame.sequence = ledger_.sequence();
   frame.dropped = ledger_.take();

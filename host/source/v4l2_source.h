@@ -37,6 +37,8 @@ class V4l2Source final : public FrameSource {
   /// While the camera is away this tries to open it twice a second, which may take the driver some
   /// milliseconds.
   ReadStatus read(Frame& frame) noexcept override;
+  void want(const Region& region) noexcept override { wanted_ = region; }
+  bool complete(Frame& frame) noexcept override;
   std::string detail() const override { return detail_; }
   std::string unusable() const override;
 
@@ -54,9 +56,9 @@ class V4l2Source final : public FrameSource {
   void watch(int fd) const;
   void watch_camera();
   void arm(Duration after, Duration every) const noexcept;
-  void release_held() noexcept;
-  ReadStatus drain(Frame& frame) noexcept;
-  ReadStatus deliver(const V4l2Buffer& newest, unsigned taken, Frame& frame) noexcept;
+  bool release_held() noexcept;
+  ReadStatus drain(unsigned queued, Frame& frame) noexcept;
+  ReadStatus deliver(const V4l2Buffer& newest, bool queue_was_full, Frame& frame) noexcept;
   ReadStatus lose(const char* why) noexcept;
   ReadStatus retry() noexcept;
   Duration stall_after() const noexcept;
@@ -71,7 +73,8 @@ class V4l2Source final : public FrameSource {
   std::optional<Decoder> decoder_;
   FrameLedger ledger_;
   ControlLock controls_;
-  std::optional<unsigned> held_;  ///< the buffer that the last Frame points into
+  std::optional<V4l2Buffer> held_;  ///< that the last Frame points into, or may be completed from
+  Region wanted_;
   State state_ = State::streaming;
   TimePoint last_buffer_{};
   TimePoint last_drain_{};

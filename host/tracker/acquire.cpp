@@ -9,6 +9,8 @@
 #include <string>
 
 #include "host/config_error.h"
+#include "host/tracker/tag_dictionary.h"
+#include "host/tracker/tag_patterns.h"
 
 namespace tagwrench {
 namespace {
@@ -16,16 +18,10 @@ namespace {
 /// While nothing is found, every so many frames the image is tried the other way round.
 constexpr unsigned kFlipEvery = 4;
 
-/// OpenCV's dictionaries in the order of TagFamily.
-constexpr std::array<int, kTagFamilies> kDictionaries = {
-    cv::aruco::DICT_ARUCO_ORIGINAL, cv::aruco::DICT_4X4_50,         cv::aruco::DICT_4X4_100,
-    cv::aruco::DICT_4X4_250,        cv::aruco::DICT_4X4_1000,       cv::aruco::DICT_5X5_50,
-    cv::aruco::DICT_5X5_100,        cv::aruco::DICT_5X5_250,        cv::aruco::DICT_5X5_1000,
-    cv::aruco::DICT_6X6_50,         cv::aruco::DICT_6X6_100,        cv::aruco::DICT_6X6_250,
-    cv::aruco::DICT_6X6_1000,       cv::aruco::DICT_7X7_50,         cv::aruco::DICT_7X7_100,
-    cv::aruco::DICT_7X7_250,        cv::aruco::DICT_7X7_1000,       cv::aruco::DICT_APRILTAG_16h5,
-    cv::aruco::DICT_APRILTAG_25h9,  cv::aruco::DICT_APRILTAG_36h10, cv::aruco::DICT_APRILTAG_36h11,
-};
+/// Families of so many cells a side are looked for in a sharpened image too.
+constexpr int kFineCells = 8;
+constexpr double kUnsharpSigma_px = 1.5;
+constexpr double kUnsharpAmount = 2.0;
 
 void check(const TargetDescription& target) {
   if (target.tags.empty()) throw ConfigError("target.tags: is empty; list at least one tag id");
@@ -47,26 +43,6 @@ void check(const TargetDescription& target) {
                         " is listed twice; give each tag its own");
     }
   }
-}
-
-TagPattern pattern_of(const cv::aruco::Dictionary& dictionary, const TargetDescription& target,
-                      int id) {
-  const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
-      dictionary.bytesList.rowRange(id, id + 1), dictionary.markerSize);
-  TagPattern pattern;
-  pattern.id = id;
-  pattern.cells = dictionary.markerSize + 2;
-  pattern.size = target.tag_size;
-  pattern.border = target.border;
-  pattern.white.assign(
-      static_cast<std::size_t>(pattern.cells) * static_cast<std::size_t>(pattern.cells), 0);
-  for (int row = 0; row < bits.rows; ++row) {
-    for (int column = 0; column < bits.cols; ++column) {
-      pattern.white[static_cast<std::size_t>((row + 1) * pattern.cells + column + 1)] =
-          bits.at<std::uint8_t>(row, column);
-    }
-  }
-  return pattern;
 }
 
 cv::Point2f centre(const std::vector<cv::Point2f>& square) {
@@ -106,8 +82,7 @@ struct Acquirer::Detector {
       square;  // in the order and with the axes (y up, z out of the paper) of IPPE_SQUARE
 
   Detector(const CameraModel& camera, const TargetDescription& target)
-      : dictionary(cv::aruco::getPredefinedDictionary(
-            kDictionaries[static_cast<std::size_t>(target.family)])),
+      : dictionary(tag_dictionary(target.family)),
         matrix(camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1),
         distortion(1, 5, CV_64F) {
     cv::setNumThreads(1);
@@ -141,10 +116,36 @@ struct Acquirer::Detector {
     return out;
   }
 
+  /// Blur as wide as a third of a cell hides the bits from OpenCV's thresholds: tags not yet listed
+  /// are looked for in a sharpened image (unsharp mask).
+  void add_sharpened(const cv::Mat& image, const TargetDescription& target,
+                     std::vector<std::vector<cv::Point2f>>& corners, std::vector<int>& ids) const {
+    const auto listed = [&ids](int id) {
+      return std::find(ids.begin(), ids.end(), id) != ids.end();
+    };
+    if (std::all_of(target.tags.begin(), target.tags.end(),
+                    [&](const Tag& tag) { return listed(tag.id); })) {
+      return;
+    }
+    cv::Mat sharp;
+    cv::GaussianBlur(image, sharp, {}, kUnsharpSigma_px);
+    cv::addWeighted(image, 1 + kUnsharpAmount, sharp, -kUnsharpAmount, 0, sharp);
+    std::vector<std::vector<cv::Point2f>> more_corners;
+    std::vector<int> more_ids;
+    cv::aruco::detectMarkers(sharp, dictionary, more_corners, more_ids, parameters);
+    const std::vector<int> first = ids;
+    for (std::size_t i = 0; i < more_ids.size(); ++i) {
+      if (std::find(first.begin(), first.end(), more_ids[i]) != first.end()) continue;
+      ids.push_back(more_ids[i]);
+      corners.push_back(more_corners[i]);
+    }
+  }
+
   std::vector<FoundTag> detect(const cv::Mat& image, const TargetDescription& target) const {
     std::vector<std::vector<cv::Point2f>> corners;
     std::vector<int> ids;
     cv::aruco::detectMarkers(image, dictionary, corners, ids, parameters);
+    if (dictionary->markerSize >= kFineCells) add_sharpened(image, target, corners, ids);
     std::vector<FoundTag> found;
     for (std::size_t t = 0; t < target.tags.size(); ++t) {
       const std::optional<std::size_t> seen = only(target.tags[t].id, ids, corners);
@@ -165,7 +166,7 @@ Acquirer::Acquirer(const CameraModel& camera, const TargetDescription& target)
   check(target);
   detector_ = std::make_unique<Detector>(camera, target);
   for (const Tag& tag : target.tags)
-    patterns_.push_back(pattern_of(*detector_->dictionary, target, tag.id));
+    patterns_.push_back(tag_pattern(target.family, tag.id, target.tag_size, target.border));
 }
 
 Acquirer::~Acquirer() = default;

@@ -10,6 +10,8 @@ namespace tagwrench {
 namespace {
 
 constexpr double kHalf_px = 6.0;  // as the fine stage of the refinement
+/// Of the pose: longer profiles reach the paper's edge and take the tag for tilted.
+constexpr double kPoseHalf_px = 3.5;
 constexpr int kSpreadIterations = 15;
 constexpr int kOffsetPasses = 3;
 constexpr double kLargestOffset_px = 2.0;
@@ -29,7 +31,7 @@ Measurements measure_all(const EdgeMeter& meter, const PixelView<float>& image,
   Measurements all;
   for (const EdgeTag& tag : target.tags) {
     all.emplace_back(tag.points.size());
-    meter.measure(image, tag, pose, kHalf_px, false, all.back());
+    meter.measure(image, tag, pose, kPoseHalf_px, false, all.back());
   }
   return all;
 }
@@ -79,7 +81,7 @@ double common_gain(const std::vector<EdgeMeasurement>& tag) {
 }  // namespace
 
 bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, EdgeTarget& target,
-                         Eigen::Isometry3d& camera_T_platform) {
+                         Eigen::Isometry3d& camera_T_platform, Matrix6& covariance) {
   const auto tags = static_cast<Eigen::Index>(target.tags.size());
   Eigen::VectorXd units(6 + tags);
   units << Eigen::Vector3d::Constant(kLengthScale), Eigen::Vector3d::Ones(),
@@ -90,6 +92,8 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(6 + tags, 6 + tags);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(6 + tags);
     Eigen::VectorXd row(6 + tags);
+    double squares = 0;
+    double weights = 0;
     for (Eigen::Index t = 0; t < tags; ++t) {
       const auto& tag = all[static_cast<std::size_t>(t)];
       const double gain = common_gain(tag);
@@ -103,6 +107,8 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
         row.array() *= units.array();
         normal += weight * row * row.transpose();
         right += weight * (m.offset_px / gain) * row;
+        squares += weight * (m.offset_px / gain) * (m.offset_px / gain);
+        weights += weight;
       }
     }
     for (Eigen::Index t = 0; t < tags; ++t) {
@@ -116,6 +122,11 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
     const Eigen::VectorXd step = ldlt.solve(right).cwiseProduct(units);
     if (!step.allFinite()) return false;
     camera_T_platform = moved(camera_T_platform, step.head<6>());
+    const auto spread = static_cast<double>(6 + tags);
+    covariance = squares / std::max(1.0, weights - spread) *
+                 (units.head<6>().asDiagonal() *
+                  ldlt.solve(Eigen::MatrixXd::Identity(6 + tags, 6 + tags)).topLeftCorner<6, 6>() *
+                  units.head<6>().asDiagonal());
     for (Eigen::Index t = 0; t < tags; ++t) {
       for (EdgePoint& point : target.tags[static_cast<std::size_t>(t)].points)
         shift(point, step[6 + t]);

@@ -16,6 +16,8 @@ struct CameraModel {
   /// The image is flipped left to right, as many camera modules deliver it. All other parameters
   /// describe the image after it has been flipped back.
   bool mirrored = false;
+  /// Of a rolling shutter, from the first row to the last, s. 0: all rows are exposed at once.
+  double readout = 0;
 };
 
 }  // namespace tagwrench

@@ -33,6 +33,19 @@ class Motion {
   }
 
   const Eigen::Isometry3d& last() const { return last_; }
+  /// Between the last two frames.
+  const Vector6& step() const { return step_; }
+  Duration period() const { return period_; }
+
+  /// Motion per second when the platform is at `pose` at `time`: the mean since the last frame, and
+  /// what it has gained over the frames before. Zero when there is nothing to go by.
+  Vector6 velocity(TimePoint time, const Eigen::Isometry3d& pose) const {
+    const Duration gap = time - time_;
+    if (period_ <= Duration::zero() || gap <= Duration::zero()) return Vector6::Zero();
+    const auto seconds = [](Duration d) { return std::chrono::duration<double>(d).count(); };
+    const Vector6 now = motion_between(last_, pose) / seconds(gap);
+    return 1.5 * now - 0.5 * step_ / seconds(period_);
+  }
 
  private:
   Eigen::Isometry3d last_ = Eigen::Isometry3d::Identity();

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/LU>
+#include <cmath>
+#include <optional>
 
 #include "host/tracker/camera_model.h"
 
@@ -42,6 +45,26 @@ inline ProjectedPoint project(const CameraModel& camera, const Eigen::Vector3d& 
       dyx * iz, dyy * iz, -(dyx * x + dyy * y) * iz;
   out.valid = true;
   return out;
+}
+
+/// The point at z = 1 that projects to `pixel`: Newton's method from the undistorted guess. Empty
+/// where the distortion polynomial cannot be inverted (far outside of the image).
+inline std::optional<Eigen::Vector3d> unproject(const CameraModel& camera,
+                                                const Eigen::Vector2d& pixel) {
+  constexpr int kSteps = 20;
+  constexpr double kClose_px = 1e-9;
+  Eigen::Vector3d ray((pixel.x() - camera.cx_px) / camera.fx_px,
+                      (pixel.y() - camera.cy_px) / camera.fy_px, 1.0);
+  for (int i = 0; i < kSteps; ++i) {
+    const ProjectedPoint at = project(camera, ray);
+    const Eigen::Vector2d miss = pixel - at.pixel;
+    if (!miss.allFinite()) break;
+    if (miss.norm() < kClose_px) return ray;
+    const Eigen::Matrix2d jacobian = at.jacobian.leftCols<2>();
+    if (!(std::abs(jacobian.determinant()) > 0)) break;
+    ray.head<2>() += jacobian.inverse() * miss;
+  }
+  return std::nullopt;
 }
 
 }  // namespace tagwrench

@@ -1,5 +1,6 @@
 #include "host/tracker/rest.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -119,12 +120,22 @@ bool RestLearner::place(const std::vector<Eigen::Isometry3d>& camera_T_tag) {
 
 void RestLearner::accumulate(const ImageView& image) {
   const auto width = static_cast<std::size_t>(image.width);
-  if (frames_ == 0) sum_.assign(width * static_cast<std::size_t>(image.height), 0.0F);
+  const std::size_t pixels = width * static_cast<std::size_t>(image.height);
+  if (frames_ == 0) {
+    sum_.assign(pixels, 0.0F);
+    squares_.assign(pixels, 0.0F);
+    previous_.assign(pixels, 0);
+  }
   for (int row = 0; row < image.height; ++row) {
     const std::uint8_t* from = image.pixels + static_cast<std::ptrdiff_t>(row) * image.stride;
-    float* to = sum_.data() + static_cast<std::size_t>(row) * width;
-    for (std::size_t column = 0; column < width; ++column)
-      to[column] += static_cast<float>(from[column]);
+    const std::size_t first = static_cast<std::size_t>(row) * width;
+    for (std::size_t column = 0; column < width; ++column) {
+      const auto level = static_cast<float>(from[column]);
+      const float change = level - static_cast<float>(previous_[first + column]);
+      sum_[first + column] += level;
+      if (frames_ > 0) squares_[first + column] += change * change;
+      previous_[first + column] = from[column];
+    }
   }
   ++frames_;
 }
@@ -146,18 +157,59 @@ double RestLearner::motion_px(const Eigen::Isometry3d& camera_T_platform) const 
   return std::sqrt(squares / std::max(1.0, count));
 }
 
+/// Variance against level: medians over bins of levels, so that what moved counts little, and a
+/// straight line through them.
+PixelNoise RestLearner::measure_noise() const {
+  constexpr std::size_t kBins = 16;
+  constexpr std::size_t kLeast = 100;         // pixels in a bin
+  constexpr double kMedianToMean = 1.03;      // of a chi-squared with some 20 degrees of freedom
+  constexpr std::size_t kEvery = 7;           // pixels looked at
+  if (frames_ < 4) return {};
+  std::array<std::vector<double>, kBins> bins;
+  for (std::size_t i = 0; i < sum_.size(); i += kEvery) {
+    const double level = sum_[i];
+    const auto bin = static_cast<std::size_t>(level / (256.0 / kBins));
+    bins[std::min(bin, kBins - 1)].push_back(squares_[i] / (2.0 * (frames_ - 1)));
+  }
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  for (std::size_t b = 0; b + 1 < kBins; ++b) {  // the last one saturates
+    if (bins[b].size() < kLeast) continue;
+    const auto middle = bins[b].begin() + static_cast<std::ptrdiff_t>(bins[b].size() / 2);
+    std::nth_element(bins[b].begin(), middle, bins[b].end());
+    const double variance = kMedianToMean * *middle;
+    const Eigen::Vector2d row(1, (static_cast<double>(b) + 0.5) * (256.0 / kBins));
+    const auto weight = static_cast<double>(bins[b].size());
+    normal += weight * row * row.transpose();
+    right += weight * variance * row;
+  }
+  if (!(normal(0, 0) > 0)) return {};
+  PixelNoise noise{right[0] / normal(0, 0), 0};
+  if (normal.determinant() > 1e-6 * normal(0, 0) * normal(1, 1)) {
+    const Eigen::Vector2d line = normal.inverse() * right;
+    if (line[0] > 0 && line[1] > 0) noise = {line[0], line[1]};
+  }
+  return noise;
+}
+
 bool RestLearner::finish() {
   const float scale = 1.0F / static_cast<float>(frames_);
   for (float& level : sum_) level *= scale;
+  learned_.noise = measure_noise();
   const PixelView<float> mean{sum_.data(), camera_.width_px, camera_.height_px, camera_.width_px};
 
   // Every tag by itself, from where the joint fit has it.
   std::vector<Eigen::Isometry3d> camera_T_tag;
   std::vector<EdgeTag> spread;
+  std::vector<Matrix6> tag_covariance;
   for (std::size_t t = 0; t < patterns_.size(); ++t) {
     Eigen::Isometry3d pose = last_pose_ * joint_.target().tags[t].platform_T_tag;
     EdgeTarget alone{{make_edge_tag(patterns_[t], Eigen::Isometry3d::Identity())}, 0};
-    if (!fit_pose_and_spread(meter_, mean, alone, pose)) return false;
+    Matrix6 covariance;
+    if (!fit_pose_and_spread(meter_, mean, alone, pose, covariance)) return false;
+    if (description_.tags[t].platform_T_tag)
+      covariance = description_.tags[t].sigma.cwiseAbs2().asDiagonal();
+    tag_covariance.push_back(covariance);
     camera_T_tag.push_back(pose);
     spread.push_back(std::move(alone.tags.front()));
   }
@@ -176,7 +228,8 @@ bool RestLearner::finish() {
       if (description_.tags[t].platform_T_tag) given.tags.push_back(learned_.target.tags[t]);
     }
     fitted = last_pose_;
-    if (!fit_pose_and_spread(meter_, mean, given, fitted)) return false;
+    Matrix6 unused;
+    if (!fit_pose_and_spread(meter_, mean, given, fitted, unused)) return false;
     if (!options_.camera_T_platform) learned_.camera_T_platform = fitted;
     for (std::size_t t = 0; t < patterns_.size(); ++t) {
       if (!description_.tags[t].platform_T_tag) {
@@ -184,7 +237,11 @@ bool RestLearner::finish() {
       }
     }
   }
-  return learn_appearance(meter_, mean, learned_.target, fitted);
+  if (!learn_appearance(meter_, mean, learned_.target, fitted)) return false;
+  learned_.tag_covariance = std::move(tag_covariance);
+  learned_.seen_from = fitted;
+  learned_.image = {mean.width, mean.height, frames_, std::move(sum_)};
+  return true;
 }
 
 }  // namespace tagwrench

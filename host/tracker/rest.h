@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host/tracker/acquire.h"
+#include "host/tracker/pixel_template.h"
 #include "host/tracker/refine.h"
 
 namespace tagwrench {
@@ -13,6 +14,11 @@ namespace tagwrench {
 struct LearnedRest {
   Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
   EdgeTarget target;
+  Eigen::Isometry3d seen_from = Eigen::Isometry3d::Identity();  ///< camera_T_platform in `image`
+  RestImage image;   ///< the average of the rest frames, as delivered
+  PixelNoise noise;  ///< of one frame
+  /// How well each tag's pose is known: of its motion, camera axes, m and rad.
+  std::vector<Matrix6> tag_covariance;
 };
 
 /// Feed it frames until it is done. It averages them, so that one careful fit at the end sees
@@ -45,6 +51,7 @@ class RestLearner {
   void accumulate(const ImageView& image);
   double motion_px(const Eigen::Isometry3d& camera_T_platform) const;
   bool finish();
+  PixelNoise measure_noise() const;
 
   CameraModel camera_;
   TargetDescription description_;
@@ -58,6 +65,8 @@ class RestLearner {
   Eigen::Isometry3d first_pose_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d last_pose_ = Eigen::Isometry3d::Identity();
   std::vector<float> sum_;
+  std::vector<float> squares_;           // of differences between successive frames
+  std::vector<std::uint8_t> previous_;
   LearnedRest learned_;
 };
 

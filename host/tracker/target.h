@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "host/types.h"
+
 namespace tagwrench {
 
 // clang-format off
@@ -18,15 +20,17 @@ enum class TagFamily : std::uint8_t {
   aruco_6x6_50, aruco_6x6_100, aruco_6x6_250, aruco_6x6_1000,
   aruco_7x7_50, aruco_7x7_100, aruco_7x7_250, aruco_7x7_1000,
   apriltag_16h5, apriltag_25h9, apriltag_36h10, apriltag_36h11,
+  grid_10x10,
 };
 // clang-format on
 
-constexpr int kTagFamilies = 21;
+constexpr int kTagFamilies = 22;
 
 /// A target may carry at most this many tags.
 constexpr int kMaxTags = 8;
 
-/// The family's name as sensor.yaml writes it: "aruco_original", "aruco_4x4_50", "apriltag_36h11".
+/// The family's name as sensor.yaml writes it: "aruco_original", "aruco_4x4_50", "apriltag_36h11",
+/// "grid_10x10" (host/grid_tags.h).
 std::string_view name(TagFamily family);
 
 /// The inverse of name(); empty for a name that is not in the table.
@@ -41,6 +45,9 @@ int id_count(TagFamily family);
 struct Tag {
   int id = 0;
   std::optional<Eigen::Isometry3d> platform_T_tag;  ///< learned at rest when absent
+  /// One standard deviation of platform_T_tag: position (m), then a small rotation of the tag along
+  /// the platform's axes (rad). Zero when not known.
+  Vector6 sigma = Vector6::Zero();
 };
 
 struct TargetDescription {
@@ -50,10 +57,19 @@ struct TargetDescription {
   std::vector<Tag> tags = {{5, {}}, {2, {}}};
 };
 
+/// The averaged picture of the sensor at rest, flipped or not as the camera delivers it.
+struct RestImage {
+  int width = 0;
+  int height = 0;
+  int frames = 0;            ///< averaged
+  std::vector<float> level;  ///< grey levels 0..255, row by row, no padding
+};
+
 struct RestOptions {
   int frames = 25;  ///< the first frames, taken at rest
   std::optional<Eigen::Isometry3d>
       camera_T_platform;  ///< known rest pose; learned from the rest frames when absent
+  std::optional<RestImage> appearance;  ///< as calibrated, seen from camera_T_platform
 };
 
 }  // namespace tagwrench

@@ -7,12 +7,35 @@
 #include "host/config_error.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/corner_pose.h"
+#include "host/tracker/geometry_uncertainty.h"
 #include "host/tracker/motion.h"
+#include "host/tracker/photometric.h"
 #include "host/tracker/refine.h"
 #include "host/tracker/rest.h"
 
 namespace tagwrench {
 namespace {
+
+/// A fit that believes less of the template than this is doubted.
+constexpr double kLeastGood = 0.3;
+/// As is one that leaves residuals of this part of the contrast, or that needs a blur beyond what
+/// its expansion describes, px^2.
+constexpr double kMostResidualPart = 0.10;
+constexpr double kMostBlur = 1.2;
+/// Standard deviations beyond these are of no use for a force: m, rad.
+constexpr double kDoubtTranslation = 0.3e-3;
+constexpr double kDoubtRotation = 0.03;
+
+/// Around the place where the target is expected: a motion this large between frames is followed
+/// without the whole frame, px.
+constexpr int kMargin_px = 40;
+
+/// Frames in a row that a loaded picture of the target may fail to fit before it is called wrong.
+constexpr int kMisfits = 15;
+
+/// While the platform moves less than this per frame, its picture may be learned, m and rad.
+constexpr double kStill = 3e-6;
+constexpr double kStillAngle = 0.3e-3;
 
 /// Covariance of the rotation vector r of exp(r), from that of a small rotation after it: the
 /// inverse of the left Jacobian of SO(3) to second order (Sola, "A micro Lie theory", arXiv
@@ -28,25 +51,36 @@ PixelView<std::uint8_t> view(const ImageView& image) {
   return {image.pixels, image.width, image.height, image.stride};
 }
 
+bool trusted(const PhotometricFit& fit, const PhotometricState& state) {
+  const Vector6 sigma = fit.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  return fit.good >= kLeastGood && fit.residual_part < kMostResidualPart &&
+         std::abs(state.blur[0]) < kMostBlur && sigma.head<3>().maxCoeff() < kDoubtTranslation &&
+         sigma.tail<3>().maxCoeff() < kDoubtRotation;
+}
+
 }  // namespace
 
 struct Tracker::State {
   State(const CameraModel& model, const TargetDescription& description, const RestOptions& options)
       : camera(model),
         tag_size(description.tag_size),
+        rest_given(options.camera_T_platform.has_value()),
         acquirer(model, description),
         refiner(model),
         learner(model, description, options, acquirer.patterns()) {
     const bool placed = std::all_of(description.tags.begin(), description.tags.end(),
                                     [](const Tag& tag) { return tag.platform_T_tag.has_value(); });
-    if (placed && options.camera_T_platform) {
-      LearnedRest given{*options.camera_T_platform, {}};
-      for (std::size_t t = 0; t < description.tags.size(); ++t) {
-        given.target.tags.push_back(
-            make_edge_tag(acquirer.patterns()[t], *description.tags[t].platform_T_tag));
-      }
-      adopt(given);
+    if (!placed || !rest_given) return;
+    LearnedRest given;
+    given.camera_T_platform = given.seen_from = *options.camera_T_platform;
+    for (std::size_t t = 0; t < description.tags.size(); ++t) {
+      const Tag& tag = description.tags[t];
+      given.target.tags.push_back(make_edge_tag(acquirer.patterns()[t], *tag.platform_T_tag));
+      given.tag_covariance.emplace_back(tag.sigma.cwiseAbs2().asDiagonal());
     }
+    if (options.appearance) given.image = *options.appearance;
+    appearance_loaded = options.appearance.has_value();
+    adopt(given);
   }
 
   void adopt(const LearnedRest& learned) {
@@ -56,6 +90,15 @@ struct Tracker::State {
     for (const EdgeTag& tag : learned.target.tags) platform_T_tag.push_back(tag.platform_T_tag);
     motion.start({}, rest);
     rest_known = true;
+    const RestImage& image = learned.image;
+    if (image.level.empty() || image.width != camera.width_px || image.height != camera.height_px)
+      return;
+    aligner.set_template(make_pixel_template(
+        camera, {image.level.data(), image.width, image.height, image.width},
+        std::max(1, image.frames), learned.noise, acquirer.patterns(), learned.target,
+        learned.seen_from, {}));
+    geometry.set(aligner, learned.seen_from, learned.tag_covariance, !rest_given);
+    light = {};
   }
 
   bool readable(const ImageView& image) const {
@@ -69,20 +112,31 @@ struct Tracker::State {
 
   Track learn(const Frame& frame);
   Track follow(const Frame& frame) noexcept;
+  void learn_picture(const Frame& frame);
+  Refinement find(const Frame& frame, Track& track) noexcept;
   Refinement reacquire(const Frame& frame, Track& track);
   Refinement refine_within_reach(const Frame& frame, const Eigen::Isometry3d& start) noexcept;
+  PhotometricFit align(const Frame& frame, const Eigen::Isometry3d& start) noexcept;
+  Region region(TimePoint time) const noexcept;
+  void say_misfit(bool fits, Track& track) noexcept;
 
   CameraModel camera;
   double tag_size;
+  bool rest_given;
   Acquirer acquirer;
   Refiner refiner;
   RestLearner learner;
   bool rest_known = false;
+  bool appearance_loaded = false;
   Eigen::Isometry3d rest = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Isometry3d> platform_T_tag;
   bool had_target = false;
   bool holding = false;
+  int misfits = 0;
   Motion motion;
+  PhotometricAligner aligner;
+  PhotometricState light;
+  GeometryUncertainty geometry;
 };
 
 Track Tracker::State::learn(const Frame& frame) {
@@ -99,6 +153,16 @@ Track Tracker::State::learn(const Frame& frame) {
     track.hint = Hint::rest_learned;
   }
   return track;
+}
+
+/// Where rest and placement are given but no picture is, one is taken as soon as the platform
+/// stands still, wherever that is.
+void Tracker::State::learn_picture(const Frame& frame) {
+  const Finding finding = learner.wants_finding() ? acquirer.find(frame.image) : Finding{};
+  if (learner.add(frame.image, finding) != RestLearner::Progress::done) return;
+  const Eigen::Isometry3d now = motion.last();
+  adopt(learner.learned());
+  motion.start(frame.capture_time, now);
 }
 
 Refinement Tracker::State::refine_within_reach(const Frame& frame,
@@ -118,40 +182,109 @@ Refinement Tracker::State::reacquire(const Frame& frame, Track& track) {
   return refine_within_reach(frame, *start);
 }
 
-Track Tracker::State::follow(const Frame& frame) noexcept {
-  Track track;
-  track.status = had_target ? Status::lost : Status::acquiring;
+/// The edges find a target that is further away than alignment reaches.
+Refinement Tracker::State::find(const Frame& frame, Track& track) noexcept {
   Refinement fit;
-  const bool followed = holding;
   if (holding) {
     fit = refine_within_reach(frame, motion.predict(frame.capture_time));
     // A motion that stops dead is nearer to where it was than to where it was going.
     if (fit.verdict == Verdict::lost) fit = refine_within_reach(frame, motion.last());
   }
-  bool found_again = false;
-  if (fit.verdict == Verdict::lost) {
-    try {
-      fit = reacquire(frame, track);
-      found_again = true;
-    } catch (const std::exception&) {
-      fit = {};  // out of memory: try again with the next frame
+  if (fit.verdict != Verdict::lost) return fit;
+  try {
+    return reacquire(frame, track);
+  } catch (const std::exception&) {
+    return {};  // out of memory: try again with the next frame
+  }
+}
+
+PhotometricFit Tracker::State::align(const Frame& frame, const Eigen::Isometry3d& start) noexcept {
+  const Region part = frame.readable();
+  const PixelWindow window{frame.image.pixels,    frame.image.stride,     part.x, part.y,
+                           part.x + part.width, part.y + part.height};
+  PhotometricFit fit = aligner.align(window, start, motion.velocity(frame.capture_time, start),
+                                     light);
+  if (fit.converged && camera.readout > 0) {
+    fit = aligner.align(window, fit.camera_T_platform,
+                        motion.velocity(frame.capture_time, fit.camera_T_platform), light);
+  }
+  if (fit.converged && !within_reach(rest, fit.camera_T_platform)) fit.converged = false;
+  return fit;
+}
+
+/// What the next frame must show, supposing that it comes after the same time as this one.
+Region Tracker::State::region(TimePoint time) const noexcept {
+  return aligner.region(motion.predict(time + motion.period()), kMargin_px);
+}
+
+/// Once, when a picture of the target that was loaded does not show what the camera sees.
+void Tracker::State::say_misfit(bool fits, Track& track) noexcept {
+  if (!appearance_loaded) return;
+  misfits = fits ? 0 : misfits + 1;
+  if (misfits >= kMisfits && track.hint == Hint::none) track.hint = Hint::appearance_does_not_fit;
+}
+
+Track Tracker::State::follow(const Frame& frame) noexcept {
+  Track track;
+  track.status = had_target ? Status::lost : Status::acquiring;
+  const Region whole{0, 0, frame.image.width, frame.image.height};
+  const bool partial = !frame.readable().contains(whole);
+
+  PhotometricFit fit;
+  bool followed = false;
+  if (holding && aligner.ready()) {
+    fit = align(frame, motion.predict(frame.capture_time));
+    followed = fit.converged && trusted(fit, light);
+  }
+  Refinement edges;
+  if (!followed) {
+    if (partial) {
+      track.needs_whole_frame = true;
+      return track;
+    }
+    const bool held = holding;
+    edges = find(frame, track);
+    holding = edges.verdict != Verdict::lost;
+    if (!holding) {
+      light = {};
+      return track;
+    }
+    followed = held;
+    if (aligner.ready()) {
+      fit = align(frame, edges.camera_T_platform);
+    } else {
+      fit.camera_T_platform = edges.camera_T_platform;
+      fit.covariance = edges.covariance;
+      fit.tags_held = edges.tags_held;
+      fit.converged = edges.verdict == Verdict::held;
     }
   }
-  holding = fit.verdict != Verdict::lost;
-  if (!holding) return track;
-  had_target = true;
-  if (followed && !found_again) {
-    motion.add(frame.capture_time, fit.camera_T_platform);
+  holding = had_target = true;
+  const bool believed = fit.converged && (!aligner.ready() || trusted(fit, light));
+  const Eigen::Isometry3d& pose = fit.converged ? fit.camera_T_platform : edges.camera_T_platform;
+  if (followed) {
+    motion.add(frame.capture_time, pose);
   } else {
-    motion.start(frame.capture_time, fit.camera_T_platform);
+    motion.start(frame.capture_time, pose);
   }
-  track.residual_px = fit.residual_px;
-  track.tags_held = fit.tags_held;
+  track.tags_held = fit.converged ? fit.tags_held : edges.tags_held;
+  track.residual_px = edges.residual_px;
   track.status = Status::doubtful;
-  if (fit.verdict != Verdict::held) return track;
+  say_misfit(believed, track);
+  if (!believed) return track;
   track.status = Status::ok;
-  track.displacement = motion_between(rest, fit.camera_T_platform);
-  track.covariance = displacement_covariance(fit.covariance, track.displacement);
+  track.displacement = motion_between(rest, pose);
+  track.covariance = displacement_covariance(fit.covariance, track.displacement) +
+                     geometry.covariance(track.displacement);
+  if (aligner.ready()) track.wanted = region(frame.capture_time);
+  if (!aligner.ready() && motion.step().head<3>().norm() < kStill &&
+      motion.step().tail<3>().norm() < kStillAngle) {
+    try {
+      learn_picture(frame);
+    } catch (const std::exception&) {
+      return track;  // out of memory: edges alone will do
+    }
+  }
   return track;
 }
 

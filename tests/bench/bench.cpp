@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
 #include <opencv2/aruco.hpp>
 #include <opencv2/core/utility.hpp>
@@ -41,9 +42,13 @@ double percentile99_us(std::vector<Duration> times) {
   return static_cast<double>(times[times.size() * 99 / 100].count()) / 1e3;
 }
 
-sim::Scenario scenario_of(int width, int height) {
+/// The tags fill the same part of the picture whatever its size, or have the same size in pixels.
+enum class Tags : std::uint8_t { scaled, same_pixels };
+
+sim::Scenario scenario_of(int width, int height, Tags tags) {
   sim::Scenario scenario;
-  const double scale = static_cast<double>(height) / scenario.camera.height_px;
+  const double scale =
+      tags == Tags::scaled ? static_cast<double>(height) / scenario.camera.height_px : 1.0;
   scenario.camera.width_px = width;
   scenario.camera.height_px = height;
   scenario.camera.fx_px *= scale;
@@ -53,12 +58,30 @@ sim::Scenario scenario_of(int width, int height) {
   return scenario;
 }
 
+/// Both tags at rest and 10 px around them, at the focal length of the paper's camera; in
+/// proportion at another.
+Region around_the_tags(const sim::Scenario& scenario) {
+  constexpr double kFocal_px = 805, kWidth_px = 170, kHeight_px = 260;
+  const sim::Camera& camera = scenario.camera;
+  const Eigen::Vector3d& rest = scenario.target.rest_position;
+  const double scale = camera.fx_px / kFocal_px;
+  const double x = camera.cx_px + camera.fx_px * rest.x() / rest.z();
+  const double y = camera.cy_px + camera.fy_px * rest.y() / rest.z();
+  return {static_cast<int>(x - scale * kWidth_px / 2), static_cast<int>(y - scale * kHeight_px / 2),
+          static_cast<int>(scale * kWidth_px), static_cast<int>(scale * kHeight_px)};
+}
+
 using Bytes = std::vector<std::uint8_t>;
 
+/// Whether a JPEG has markers at which its parsing can begin; many webcams send them.
+enum class Restarts : std::uint8_t { none, every_row };
+
 /// A grey picture as a camera would send it.
-Bytes encoded(const ImageView& grey, PixelFormat format) {
+Bytes encoded(const ImageView& grey, PixelFormat format, Restarts restarts) {
   Bytes out;
   if (format == PixelFormat::mjpg) {
+    // The library takes it from the environment alone: a marker after every row of blocks.
+    ::setenv("TJ_RESTART", restarts == Restarts::every_row ? "1" : "", 1);
     const std::unique_ptr<void, int (*)(tjhandle)> jpeg(tjInitCompress(), tjDestroy);
     Bytes yuv(static_cast<std::size_t>(grey.width) * grey.height * 2,
               128);  // 4:2:2, as webcams send it
@@ -82,12 +105,13 @@ struct Clip {
   SensorConfig sensor;
   std::vector<Bytes> frames;
   std::vector<TimePoint> times;
+  Region tags;
   double render_us = 0;
 };
 
-Clip render(int width, int height, PixelFormat format, int count) {
-  const sim::Scenario scenario = scenario_of(width, height);
+Clip render(const sim::Scenario& scenario, PixelFormat format, Restarts restarts, int count) {
   Clip clip;
+  clip.tags = around_the_tags(scenario);
   clip.sensor = parse_sensor(sim::sensor_yaml(scenario), "bench");
   SimulatorSource source(scenario, /*live=*/false);
   std::vector<Duration> times;
@@ -96,7 +120,7 @@ Clip render(int width, int height, PixelFormat format, int count) {
     const TimePoint begin = Clock::now();
     source.read(frame);
     times.push_back(Clock::now() - begin);
-    clip.frames.push_back(encoded(frame.image, format));
+    clip.frames.push_back(encoded(frame.image, format, restarts));
     clip.times.push_back(frame.capture_time);
   }
   clip.render_us = median_us(times);
@@ -133,9 +157,43 @@ class UsualWay {
   std::vector<cv::Vec3d> rotations_, translations_;
 };
 
-void bench(const char* title, int width, int height, PixelFormat format, int count) {
-  const Clip clip = render(width, height, format, count);
-  Decoder decoder(format, width, height, 0);
+struct DecodeCost {
+  double median_us = 0;
+  double allocations = 0;  ///< per frame
+};
+
+DecodeCost decode_cost(const Clip& clip, PixelFormat format, const Region& region) {
+  Decoder decoder(format, clip.sensor.camera.width_px, clip.sensor.camera.height_px, 0);
+  std::vector<Duration> times;
+  long allocations = 0;
+  for (const Bytes& bytes : clip.frames) {
+    ImageView image;
+    Region decoded;
+    test::start_counting_allocations();
+    const TimePoint begin = Clock::now();
+    decoder.decode(bytes, bytes.size(), region, image, decoded);
+    const TimePoint end = Clock::now();
+    allocations += test::stop_counting_allocations();
+    times.push_back(end - begin);
+  }
+  return {median_us(times), static_cast<double>(allocations) / static_cast<double>(times.size())};
+}
+
+/// A row of the second table.
+std::string decode_row(const char* title, const Clip& clip, PixelFormat format) {
+  const DecodeCost whole = decode_cost(clip, format, {});
+  const DecodeCost part = decode_cost(clip, format, clip.tags);
+  return fmt::format("{:<22} {:>4}x{:<4} {:>8.1f} {:>8.1f} {:>8.1f}x {:>9.1f} {:>9.1f}\n", title,
+                     clip.tags.width, clip.tags.height, whole.median_us, part.median_us,
+                     whole.median_us / part.median_us, whole.allocations, part.allocations);
+}
+
+/// Prints a row of the first table, returns one of the second.
+std::string bench(const char* title, const sim::Scenario& scenario, PixelFormat format,
+                  Restarts restarts, int count) {
+  const Clip clip = render(scenario, format, restarts, count);
+  Decoder decoder(format, scenario.camera.width_px, scenario.camera.height_px, 0);
+  Decoder whole_decoder(format, scenario.camera.width_px, scenario.camera.height_px, 0);
   Acquirer acquirer(clip.sensor.camera, clip.sensor.target);
   UsualWay usual_way(clip.sensor);
   Tracker tracker(clip.sensor.camera, clip.sensor.target, clip.sensor.rest);
@@ -147,15 +205,22 @@ void bench(const char* title, int width, int height, PixelFormat format, int cou
   long allocations = 0;
   int held = 0;
   Counts6 last{};
+  Region wanted;
   for (std::size_t i = 0; i < clip.frames.size(); ++i) {
     Frame frame;
     frame.capture_time = frame.latency_origin = clip.times[i];
     frame.sequence = i;
     test::start_counting_allocations();
     const TimePoint t0 = Clock::now();
-    if (!decoder.decode(clip.frames[i], clip.frames[i].size(), frame.image)) continue;
+    const Bytes& bytes = clip.frames[i];
+    if (!decoder.decode(bytes, bytes.size(), wanted, frame.image, frame.decoded)) continue;
     const TimePoint t1 = Clock::now();
-    const Track tracked = tracker.track(frame);
+    Track tracked = tracker.track(frame);
+    if (tracked.needs_whole_frame &&
+        decoder.decode(bytes, bytes.size(), {}, frame.image, frame.decoded)) {
+      tracked = tracker.track(frame);
+    }
+    wanted = tracked.wanted;
     const TimePoint t2 = Clock::now();
     Sample sample{
         .sequence = i, .capture_time = frame.capture_time, .latency_origin = frame.latency_origin};
@@ -180,25 +245,28 @@ void bench(const char* title, int width, int height, PixelFormat format, int cou
     report.push_back(t4 - t3);
     write.push_back(t5 - t4);
     total.push_back(t5 - t0);
+    ImageView whole;
+    whole_decoder.decode(bytes, bytes.size(), whole);
     const TimePoint a = Clock::now();
-    acquirer.find(frame.image);
+    acquirer.find(whole);
     const TimePoint b = Clock::now();
-    usual_way.track(frame.image);
+    usual_way.track(whole);
     usual.push_back(Clock::now() - b);
     acquire.push_back(b - a);
   }
   if (held == 0) {
-    fmt::print("{:<16} the target was never held\n", title);
-    return;
+    fmt::print("{:<22} the target was never held\n", title);
+    return decode_row(title, clip, format);
   }
   fmt::print(
-      "{:<16} {:>7.1f} {:>8.1f} {:>8.1f} {:>7.1f} {:>7.2f} {:>7.2f} {:>7.2f} {:>8.1f} {:>8.1f} "
+      "{:<22} {:>7.1f} {:>8.1f} {:>8.1f} {:>7.1f} {:>7.2f} {:>7.2f} {:>7.2f} {:>8.1f} {:>8.1f} "
       "{:>8.1f}x {:>7.2f} "
       "{:>8.0f}\n",
       title, median_us(decode), median_us(usual), median_us(acquire), median_us(track),
       median_us(wrench), median_us(report), median_us(write), median_us(total),
       percentile99_us(total), median_us(usual) / median_us(track),
       static_cast<double>(allocations) / held, 1e6 / clip.render_us);
+  return decode_row(title, clip, format);
 }
 
 }  // namespace
@@ -206,6 +274,9 @@ void bench(const char* title, int width, int height, PixelFormat format, int cou
 
 int main() {
   using tagwrench::PixelFormat;
+  using tagwrench::Restarts;
+  using tagwrench::scenario_of;
+  using tagwrench::Tags;
   cv::setNumThreads(1);
   fmt::print(
       "Medians over moving frames, us; one run, one core.\n"
@@ -213,15 +284,41 @@ int main() {
       "track.\n"
       "acquire = our detection, once at the start and after a loss; all to the right of it happens "
       "in every frame.\n"
-      "total = decode to device write.\n\n"
-      "{:<16} {:>7} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8} {:>9} {:>7} {:>8}\n",
+      "decode = of the part that the tracker asks for; total = decode to device write.\n"
+      "far = the camera sees more around tags of the same size in pixels as at 640x480; RST = "
+      "with restart markers.\n\n"
+      "{:<22} {:>7} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8} {:>9} {:>7} {:>8}\n",
       "frame", "decode", "usual", "acquire", "track", "wrench", "report", "write", "total", "p99",
       "ratio", "allocs", "sim fps");
-  tagwrench::bench("640x480 GREY", 640, 480, PixelFormat::grey, 300);
-  tagwrench::bench("640x480 YUYV", 640, 480, PixelFormat::yuyv, 300);
-  tagwrench::bench("640x480 MJPG", 640, 480, PixelFormat::mjpg, 300);
-  tagwrench::bench("1920x1080 GREY", 1920, 1080, PixelFormat::grey, 100);
-  tagwrench::bench("1920x1080 YUYV", 1920, 1080, PixelFormat::yuyv, 100);
-  tagwrench::bench("1920x1080 MJPG", 1920, 1080, PixelFormat::mjpg, 100);
-  fmt::print("\nallocs = heap allocations per tracked frame; those of MJPG are libjpeg's own.\n");
+  const struct {
+    const char* title;
+    int width, height;
+    Tags tags;
+    PixelFormat format;
+    int frames;
+    Restarts restarts = Restarts::none;
+  } rows[] = {
+      {"640x480 GREY", 640, 480, Tags::scaled, PixelFormat::grey, 300},
+      {"640x480 YUYV", 640, 480, Tags::scaled, PixelFormat::yuyv, 300},
+      {"640x480 MJPG", 640, 480, Tags::scaled, PixelFormat::mjpg, 300},
+      {"640x480 MJPG RST", 640, 480, Tags::scaled, PixelFormat::mjpg, 300, Restarts::every_row},
+      {"1920x1080 GREY", 1920, 1080, Tags::scaled, PixelFormat::grey, 100},
+      {"1920x1080 YUYV", 1920, 1080, Tags::scaled, PixelFormat::yuyv, 100},
+      {"1920x1080 MJPG", 1920, 1080, Tags::scaled, PixelFormat::mjpg, 100},
+      {"1920x1080 GREY far", 1920, 1080, Tags::same_pixels, PixelFormat::grey, 100},
+      {"1920x1080 YUYV far", 1920, 1080, Tags::same_pixels, PixelFormat::yuyv, 100},
+      {"1920x1080 MJPG far", 1920, 1080, Tags::same_pixels, PixelFormat::mjpg, 100},
+      {"1920x1080 MJPG RST far", 1920, 1080, Tags::same_pixels, PixelFormat::mjpg, 100,
+       Restarts::every_row},
+  };
+  std::string decoding;
+  for (const auto& row : rows) {
+    decoding += tagwrench::bench(row.title, scenario_of(row.width, row.height, row.tags),
+                                 row.format, row.restarts, row.frames);
+  }
+  fmt::print(
+      "\nDecoding the whole frame, and only a region around the tags.\n\n"
+      "{:<22} {:>9} {:>8} {:>8} {:>9} {:>9} {:>9}\n{}",
+      "frame", "region", "whole", "region", "ratio", "allocs", "in region", decoding);
+  fmt::print("\nallocs = heap allocations per frame; those of MJPG are libjpeg's own.\n");
 }

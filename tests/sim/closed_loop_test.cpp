@@ -135,6 +135,7 @@ TEST_P(ClosedLoop, DisplacementAndWrenchFollowTheTruth) {
 INSTANTIATE_TEST_SUITE_P(Scenarios, ClosedLoop,
                          testing::Values(Case{"Default", ""}, Case{"OneTag", "one_tag.yaml"},
                                          Case{"AprilTag", "apriltag.yaml"},
+                                         Case{"Grid", "grid.yaml"},
                                          Case{"Mirrored", "mirrored.yaml"}),
                          [](const auto& param) { return std::string(param.param.name); });
 

@@ -14,6 +14,11 @@ struct Offset {
 };
 constexpr Offset kOffsets[4] = {{-0.25F, -0.25F}, {0.25F, -0.25F}, {-0.25F, 0.25F}, {0.25F, 0.25F}};
 
+// Along a side of the pixel, where the exposure is even: with 2 an edge's place in the picture
+// depends on its place in the pixel by some hundredths of a pixel, which is the size of what a good
+// tracker leaves.
+constexpr int kEvenSamples = 5;
+
 // Which quarter of the exposure each sample of a pixel sees. One order cannot be free of a drift
 // across both axes of the pixel (a moving edge would reach one half of every pixel first and be
 // seen displaced), so four orders take turns whose drifts cancel over neighbours: up, right, down,
@@ -44,8 +49,8 @@ void find_texels(const std::array<float, 9>& h, const float* x, const float* y, 
 
 }  // namespace
 
-void Renderer::draw_opaque(const Layer& layer, const View& view, int row) noexcept {
-  const Texture& t = layer.texture;
+void Renderer::draw_opaque(const View& view, int row) noexcept {
+  const Texture& t = *view.texture;
   const int width = camera_.width_px;
   const float* texels = t.reflectance.data();
   float* u = scratch_.u.data();
@@ -61,9 +66,8 @@ void Renderer::draw_opaque(const Layer& layer, const View& view, int row) noexce
   }
 }
 
-void Renderer::add_samples(const Layer& layer, const TexelFromRay& h, int count, int first,
+void Renderer::add_samples(const Texture& t, const TexelFromRay& h, int count, int first,
                            int stride) noexcept {
-  const Texture& t = layer.texture;
   float* u = scratch_.u.data();
   float* v = scratch_.v.data();
   find_texels(h, scratch_.x.data(), scratch_.y.data(), count, static_cast<float>(t.width) - 1.01F,
@@ -82,18 +86,18 @@ void Renderer::add_samples(const Layer& layer, const TexelFromRay& h, int count,
   }
 }
 
-void Renderer::draw_coarse(const Layer& layer, const View& view, int row) noexcept {
+void Renderer::draw_coarse(const View& view, int row) noexcept {
   const int count = view.right - view.left;
   if (count <= 0) return;
   std::copy_n(rays_.x(row) + view.left, count, scratch_.x.begin());
   std::copy_n(rays_.y(row) + view.left, count, scratch_.y.begin());
   std::fill_n(scratch_.reflectance.begin(), count, 0.0F);
   std::fill_n(scratch_.coverage.begin(), count, 0.0F);
-  add_samples(layer, view.instants[0], count, 0, 1);
+  add_samples(*view.texture, view.instants[0], count, 0, 1);
   composite(view, row, 1.0F);
 }
 
-void Renderer::draw_fine(const Layer& layer, const View& view, int row) noexcept {
+void Renderer::draw_fine(const View& view, int row) noexcept {
   const int count = view.right - view.left;
   if (count <= 0) return;
   std::fill_n(scratch_.reflectance.begin(), count, 0.0F);
@@ -124,11 +128,38 @@ void Renderer::draw_fine(const Layer& layer, const View& view, int row) noexcept
         const int step = pass * kRowPhases + ((row / 4) & (kRowPhases - 1));
         const int instants[4] = {quarter - 1 - step, 2 * quarter - 1 - step, 2 * quarter + step,
                                  3 * quarter + step};
-        add_samples(layer, view.instants[static_cast<std::size_t>(instants[turn])], run, parity, 2);
+        add_samples(*view.texture, view.instants[static_cast<std::size_t>(instants[turn])], run,
+                    parity, 2);
       }
     }
   }
   composite(view, row, 1.0F / static_cast<float>(4 * passes));
+}
+
+void Renderer::draw_even(const View& view, int row) noexcept {
+  const int count = view.right - view.left;
+  if (count <= 0) return;
+  std::fill_n(scratch_.reflectance.begin(), count, 0.0F);
+  std::fill_n(scratch_.coverage.begin(), count, 0.0F);
+  const float* x = rays_.x(row) + view.left;
+  const float* y = rays_.y(row) + view.left;
+  const auto row_step = rays_.x(1) - rays_.x(0);
+  const auto place = [](int step) {
+    return (static_cast<float>(step) + 0.5F) / static_cast<float>(kEvenSamples) - 0.5F;
+  };
+  for (int sample = 0; sample < kEvenSamples * kEvenSamples; ++sample) {
+    const float dx = 0.5F * place(sample % kEvenSamples);
+    const float dy = 0.5F * place(sample / kEvenSamples);
+    for (int i = 0; i < count; ++i) {
+      const auto to = static_cast<std::size_t>(i);
+      scratch_.x[to] = x[i] + dx * (x[i + 1] - x[i - 1]) + dy * (x[i + row_step] - x[i - row_step]);
+      scratch_.y[to] = y[i] + dx * (y[i + 1] - y[i - 1]) + dy * (y[i + row_step] - y[i - row_step]);
+    }
+    for (int i = 0; i < view.instant_count; ++i) {
+      add_samples(*view.texture, view.instants[static_cast<std::size_t>(i)], count, 0, 1);
+    }
+  }
+  composite(view, row, 1.0F / static_cast<float>(kEvenSamples * kEvenSamples * view.instant_count));
 }
 
 void Renderer::composite(const View& view, int row, float weight) noexcept {
@@ -164,7 +195,7 @@ void Renderer::blur_rows() noexcept {
   }
 }
 
-void Renderer::expose_row(int row, Random& random, std::uint8_t* pixels) noexcept {
+void Renderer::expose_row(int row, double time, Random& random, std::uint8_t* pixels) noexcept {
   const auto width = static_cast<std::size_t>(camera_.width_px);
   const auto index = static_cast<std::size_t>(row);
   const auto blurred_row = [&](int r) {
@@ -182,13 +213,12 @@ void Renderer::expose_row(int row, Random& random, std::uint8_t* pixels) noexcep
     for (std::size_t i = 0; i < width; ++i) light[i] += weight * (above[i] + below[i]);
   }
 
+  light_row(row, time, light);
   const float* normals = normals_.data() + random.next() % kNormals;
-  const float* gain = gain_.data() + index * width;
-  const float* glare = glare_.data() + index * width;
   const auto read_variance = static_cast<float>(noise_.read_counts * noise_.read_counts);
   const auto shot = static_cast<float>(noise_.shot_counts_per_count);
   for (std::size_t i = 0; i < width; ++i) {
-    const float level = light[i] * gain[i] + glare[i];
+    const float level = light[i];
     const float noisy = level + std::sqrt(read_variance + shot * level) * normals[i];
     light[i] = std::min(std::max(noisy + 0.5F, 0.0F), 255.0F);
   }

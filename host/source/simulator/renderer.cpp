@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "host/config_error.h"
+#include "host/source/simulator/dirt_print.h"
 #include "host/source/simulator/platform_print.h"
 #include "host/source/simulator/tag_print.h"
 
@@ -15,6 +16,10 @@ constexpr int kRollingBandRows = 8;
 constexpr double kPlateMargin = 3.5e-3;  // m, how far the platform may move before the plate ends
 constexpr double kPadMargin = 0.7e-3;    // m
 constexpr double kBlurPerPass_px = 3.0;
+constexpr double kStill_px = 2e-3;
+constexpr double kEvenInstantsPerPixel = 3;
+constexpr int kFewestEvenInstants = 4;
+constexpr int kMostEvenInstants = 32;
 constexpr double kLightSlant = 0.35;  // of the LED's direction against the optical axis
 constexpr double kNearest = 1e-3;     // m, nothing is drawn nearer to the lens
 
@@ -33,7 +38,10 @@ Renderer::Renderer(const Scenario& scenario)
       target_(scenario.target),
       seed_(scenario.seed),
       tags_(placed_tags(scenario)),
-      rays_(scenario.camera) {
+      rays_(scenario.camera),
+      disturbances_(scenario.disturbances, scenario.seed, scenario.camera.width_px,
+                    static_cast<int>(scenario.target.tags.size())),
+      visible_(scenario.target.tags.size()) {
   const std::size_t pixels = pixel_count(camera_);
   const auto rows = static_cast<std::size_t>(camera_.height_px);
   const auto columns = static_cast<std::size_t>(camera_.width_px);
@@ -73,13 +81,19 @@ void Renderer::build_layers(const Scenario& scenario) {
         print_pad(half_paper, kPadMargin, texels_per_m, seed_ + static_cast<std::uint64_t>(tag.id));
     layers_.push_back(std::move(pad));
   }
-  for (const PlacedTag& tag : tags_) {
+  const std::size_t first_paper = layers_.size();
+  for (std::size_t i = 0; i < tags_.size(); ++i) {
     Layer paper;
-    paper.platform_T_plane = tag.platform_T_tag;
-    paper.texture = print_tag(target_, tag_cells(target_.family, tag.id), 2 * texels_per_m,
-                              seed_ + static_cast<std::uint64_t>(tag.id));
+    paper.platform_T_plane = tags_[i].platform_T_tag;
+    paper.texture = print_tag(target_, tag_cells(target_.family, tags_[i].id), 2 * texels_per_m,
+                              seed_ + static_cast<std::uint64_t>(tags_[i].id));
     paper.fine = true;
+    paper.tag = i;
     layers_.push_back(std::move(paper));
+  }
+  for (const Dirt& dirt : disturbances_.dirt()) {
+    const Layer& paper = layers_[first_paper + static_cast<std::size_t>(dirt.tag)];
+    dirty_.push_back(with_dirt(paper.texture, dirt, target_.tag_size, seed_, dirty_.size()));
   }
   for (Layer& layer : layers_) {
     layer.half_x = 0.5 * layer.texture.width / layer.texture.texels_per_m;
@@ -117,39 +131,62 @@ double Renderer::half_window() const noexcept {
 
 void Renderer::render(const PlatformMotion& motion, double middle_time, std::uint64_t sequence,
                       std::uint8_t* pixels) noexcept {
+  happening_ = disturbances_.between(middle_time - half_window(), middle_time + half_window());
   const int band = exposure_.rolling_readout > 0 ? kRollingBandRows : camera_.height_px;
   for (int first = 0; first < camera_.height_px; first += band) {
     const int last = std::min(first + band, camera_.height_px);
     view_band(motion, middle_time, first, last);
     for (int row = first; row < last; ++row) {
-      draw_opaque(layers_.front(), views_.front(), row);
+      draw_opaque(views_.front(), row);
       for (std::size_t i = 1; i < layers_.size(); ++i) {
         if (row < views_[i].top || row >= views_[i].bottom) continue;
-        if (layers_[i].fine) {
-          draw_fine(layers_[i], views_[i], row);
+        if (!layers_[i].fine) {
+          draw_coarse(views_[i], row);
+        } else if (exposure_.even) {
+          draw_even(views_[i], row);
         } else {
-          draw_coarse(layers_[i], views_[i], row);
+          draw_fine(views_[i], row);
         }
       }
     }
   }
-  middle_pose_ = platform_pose(target_, motion.at(middle_time).displacement);
-  choose_point_spread();
+  draw_occluders(middle_time);
+  const auto pose_at = [&](double time) {
+    return platform_pose(target_, motion.at(time).displacement);
+  };
+  middle_pose_ = pose_at(middle_time);
+  smear_px_ = farthest_px(pose_at(middle_time - 0.5 * exposure_.time),
+                          pose_at(middle_time + 0.5 * exposure_.time));
+  choose_point_spread(optics_.focus_distance + focus_shift(happening_, middle_time));
   blur_rows();
-  Random random(seed_ * 0x100000001b3ULL + sequence, kNoiseOffsets);
-  for (int row = 0; row < camera_.height_px; ++row) expose_row(row, random, pixels);
+  Random random = Random::numbered(seed_, kNoiseOffsets, sequence);
+  for (int row = 0; row < camera_.height_px; ++row) {
+    expose_row(row, row_time(row, middle_time), random, pixels);
+  }
+  judge_visibility(middle_time);
+}
+
+// The middle of a row's exposure.
+double Renderer::row_time(double row, double middle_time) const noexcept {
+  const double middle_row = 0.5 * (camera_.height_px - 1);
+  return middle_time + (row - middle_row) / camera_.height_px * exposure_.rolling_readout;
+}
+
+const Texture& Renderer::seen(const Layer& layer) const noexcept {
+  if (!layer.fine) return layer.texture;
+  for (const DirtShown& shown : happening_.dirt) {
+    if (shown.tag == layer.tag) return dirty_[shown.dirt];
+  }
+  return layer.texture;
 }
 
 void Renderer::view_band(const PlatformMotion& motion, double middle_time, int first_row,
                          int last_row) noexcept {
-  const double row = 0.5 * (first_row + last_row - 1);
-  const double middle_row = 0.5 * (camera_.height_px - 1);
-  const double time =
-      middle_time + (row - middle_row) / camera_.height_px * exposure_.rolling_readout;
+  const double time = row_time(0.5 * (first_row + last_row - 1), middle_time);
   const auto pose_at = [&](double share) {
     return platform_pose(target_, motion.at(time + share * exposure_.time).displacement);
   };
-  instant_count_ = kInstantsPerPass * kRowPhases * passes_for(pose_at(-0.5), pose_at(0.5));
+  instant_count_ = instants_for(pose_at(-0.5), pose_at(0), pose_at(0.5));
   for (int i = 0; i < instant_count_; ++i) {
     poses_[static_cast<std::size_t>(i)] = pose_at((i + 0.5) / instant_count_ - 0.5);
   }
@@ -158,19 +195,35 @@ void Renderer::view_band(const PlatformMotion& motion, double middle_time, int f
 }
 
 // Enough instants that the samples of a moving edge lie closer than the point spread is wide.
-int Renderer::passes_for(const RigidPose& first, const RigidPose& last) const noexcept {
-  double farthest_px = 0;
+int Renderer::instants_for(const RigidPose& first, const RigidPose& middle,
+                           const RigidPose& last) const noexcept {
+  if (exposure_.even) {
+    const double way_px = farthest_px(first, middle) + farthest_px(middle, last);
+    if (way_px < kStill_px) return 1;
+    return std::clamp(static_cast<int>(std::ceil(kEvenInstantsPerPixel * way_px)),
+                      kFewestEvenInstants, kMostEvenInstants);
+  }
+  const double blur_px = farthest_px(first, last);
+  const int passes =
+      std::clamp(static_cast<int>(std::ceil(blur_px / kBlurPerPass_px)), 1, kMaxPasses);
+  return kInstantsPerPass * kRowPhases * passes;
+}
+
+// The longest way of a tag's centre between two poses, px.
+double Renderer::farthest_px(const RigidPose& first, const RigidPose& last) const noexcept {
+  double farthest = 0;
   for (const PlacedTag& tag : tags_) {
     const Eigen::Vector3d a = first * tag.platform_T_tag.position;
     const Eigen::Vector3d b = last * tag.platform_T_tag.position;
     if (a.z() < kNearest || b.z() < kNearest) continue;
     const Eigen::Vector2d moved = b.head<2>() / b.z() - a.head<2>() / a.z();
-    farthest_px = std::max(farthest_px, camera_.fx_px * moved.norm());
+    farthest = std::max(farthest, camera_.fx_px * moved.norm());
   }
-  return std::clamp(static_cast<int>(std::ceil(farthest_px / kBlurPerPass_px)), 1, kMaxPasses);
+  return farthest;
 }
 
 void Renderer::view_layer(const Layer& layer, View& view) noexcept {
+  view.texture = &seen(layer);
   view.instant_count = layer.fine ? instant_count_ : 1;
   view.shade = shade(layer, middle_pose_);
   double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
@@ -251,9 +304,9 @@ double Renderer::depth_at_row(int row) const noexcept {
                     2.0 * target_.rest_position.z());
 }
 
-void Renderer::choose_point_spread() noexcept {
+void Renderer::choose_point_spread(double focus_distance) noexcept {
   for (int row = 0; row < camera_.height_px; ++row) {
-    const double defocus = optics_.defocus_px_per_m * (depth_at_row(row) - optics_.focus_distance);
+    const double defocus = optics_.defocus_px_per_m * (depth_at_row(row) - focus_distance);
     const double sigma = std::min(std::hypot(optics_.psf_sigma_px, defocus), kMaxRadius / 3.0);
     const int radius = static_cast<int>(std::ceil(3.0 * sigma));
     float* weights = kernels_.data() + static_cast<std::size_t>(row) * (kMaxRadius + 1);

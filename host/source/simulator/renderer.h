@@ -1,14 +1,15 @@
 // Platform motion -> 8-bit picture: planes seen through rays, light, point spread, noise.
 //
 // Order of one frame: plate (one sample a pixel), pads (one), tags (2 x 2 samples a pixel, spread
-// over the exposure), Gaussian point spread whose width follows the depth of the scene row by row,
-// light and glare, noise, rounding.
+// over the exposure), what passes before the lens, Gaussian point spread whose width follows the
+// depth of the scene row by row, light and glare, noise, rounding.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
+#include "host/source/simulator/disturbance_player.h"
 #include "host/source/simulator/lens.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/random.h"
@@ -33,6 +34,14 @@ class Renderer {
 
   const std::vector<PlacedTag>& tags() const noexcept { return tags_; }
 
+  /// Of the frame last rendered: what disturbed it, ...
+  const Happening& happening() const noexcept { return happening_; }
+  /// ... the longest way that a tag's centre went in the image during the exposure, px, ...
+  double smear_px() const noexcept { return smear_px_; }
+  /// ... and of each tag's black square the share (0..1) in which paper and ink could be told
+  /// apart: inside of the image, not covered, neither dark nor blown out.
+  const std::vector<double>& visible() const noexcept { return visible_; }
+
  private:
   static constexpr int kInstantsPerPass = 4;  ///< one for each of a pixel's 2 x 2 samples
   static constexpr int kMaxPasses = 8;
@@ -49,8 +58,10 @@ class Renderer {
     Texture texture;
     double half_x = 0, half_y = 0;  ///< m, where coverage ends
     bool fine = false;              ///< sampled 2 x 2 over the exposure
+    std::size_t tag = 0;            ///< of a fine layer: position in tags()
   };
-  struct View {  ///< of one layer in one band of rows
+  struct View {                        ///< of one layer in one band of rows
+    const Texture* texture = nullptr;  ///< clean or with dirt
     std::array<TexelFromRay, kMaxInstants> instants{};
     int instant_count = 1;
     float shade = 1;
@@ -66,22 +77,34 @@ class Renderer {
   void view_band(const PlatformMotion& motion, double middle_time, int first_row,
                  int last_row) noexcept;
   void view_layer(const Layer& layer, View& view) noexcept;
-  int passes_for(const RigidPose& first, const RigidPose& last) const noexcept;
+  const Texture& seen(const Layer& layer) const noexcept;
+  double row_time(double row, double middle_time) const noexcept;
+  double farthest_px(const RigidPose& first, const RigidPose& last) const noexcept;
+  int instants_for(const RigidPose& first, const RigidPose& middle,
+                   const RigidPose& last) const noexcept;
   float shade(const Layer& layer, const RigidPose& camera_T_platform) const noexcept;
   TexelFromRay texel_from_ray(const Layer& layer,
                               const RigidPose& camera_T_platform) const noexcept;
 
-  void draw_opaque(const Layer& layer, const View& view, int row) noexcept;
-  void draw_coarse(const Layer& layer, const View& view, int row) noexcept;
-  void draw_fine(const Layer& layer, const View& view, int row) noexcept;
-  void add_samples(const Layer& layer, const TexelFromRay& h, int count, int first,
+  void draw_opaque(const View& view, int row) noexcept;
+  void draw_coarse(const View& view, int row) noexcept;
+  void draw_fine(const View& view, int row) noexcept;
+  void draw_even(const View& view, int row) noexcept;
+  void add_samples(const Texture& t, const TexelFromRay& h, int count, int first,
                    int stride) noexcept;
   void composite(const View& view, int row, float weight) noexcept;
 
-  void choose_point_spread() noexcept;
+  void draw_occluders(double middle_time) noexcept;
+  void draw_occluder_row(const Going<Occluder>& occluder, int row, double time) noexcept;
+  void judge_visibility(double middle_time) noexcept;
+  double contrast_at(const Eigen::Vector2d& pixel, double middle_time) const noexcept;
+  Eigen::Vector2d from_centre(double column, double row) const noexcept;
+
+  void choose_point_spread(double focus_distance) noexcept;
   double depth_at_row(int row) const noexcept;
   void blur_rows() noexcept;
-  void expose_row(int row, Random& random, std::uint8_t* pixels) noexcept;
+  void light_row(int row, double time, float* light) noexcept;
+  void expose_row(int row, double time, Random& random, std::uint8_t* pixels) noexcept;
 
   Camera camera_;
   Optics optics_;
@@ -105,6 +128,12 @@ class Renderer {
   std::vector<float> padded_, row_;
   std::vector<float> normals_;  ///< standard normal numbers, entered at random places
   Scratch scratch_;
+
+  DisturbancePlayer disturbances_;
+  std::vector<Texture> dirty_;  ///< tags with dirt on, as disturbances_.dirt() orders them
+  Happening happening_;
+  double smear_px_ = 0;
+  std::vector<double> visible_;
 };
 
 }  // namespace tagwrench::sim

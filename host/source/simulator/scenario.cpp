@@ -126,6 +126,7 @@ std::string problem(const Scenario& s) {
                      {"trajectory.sweep_from_hz", j.sweep_from},
                      {"trajectory.sweep_to_hz", j.sweep_to},
                      {"trajectory.sweep_s", j.sweep_time},
+                     {"trajectory.event_s", j.event_time},
                      {"optics.focus_mm", s.optics.focus_distance}}),
        outside({{"camera.fps", s.camera.frame_rate}}, 0.1, 2000),
        outside({{"mechanics.damping_ratio", m.damping_ratio},
@@ -154,7 +155,7 @@ std::string problem(const Scenario& s) {
        outside({{"target.ink_grain", s.target.ink_grain},
                 {"target.rotation_error_rad", s.target.rotation_error}},
                0, 0.5),
-       target_problem(s.target)});
+       target_problem(s.target), problem(s.disturbances, static_cast<int>(s.target.tags.size()))});
   if (found.empty() && window * s.camera.frame_rate > 1.0) {
     found = "exposure: time and readout together are longer than a frame period of camera.fps";
   }

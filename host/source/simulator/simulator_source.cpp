@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <sys/timerfd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "host/config_error.h"
 
@@ -13,6 +15,7 @@ namespace tagwrench {
 namespace {
 
 constexpr double kWarmUp = 0.05;  // s, simulated before the first frame
+constexpr int kExposureSteps = 16;
 
 const sim::Scenario& checked(const sim::Scenario& scenario) {
   const std::string problem = sim::problem(scenario);
@@ -46,6 +49,8 @@ UniqueFd start_timer(TimePoint start, Duration period) {
 
 SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live)
     : scenario_(checked(scenario)),
+      disturbances_(scenario.disturbances, scenario.seed, scenario.camera.width_px,
+                    static_cast<int>(scenario.target.tags.size())),
       player_(scenario.trajectory, scenario.seed),
       renderer_(scenario),
       motion_(scenario.mechanics, player_, -renderer_.half_window() - kWarmUp,
@@ -61,6 +66,7 @@ SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live)
                                     camera.height_px, camera.frame_rate, scenario_.target.family,
                                     scenario_.target.tags.size() == 1 ? "tag" : "tags");
   truth_.tags = renderer_.tags();
+  truth_.visible = renderer_.visible();
   truth_.rest_position = scenario_.target.rest_position;
   if (live) {
     start_ = std::chrono::steady_clock::now();
@@ -73,13 +79,23 @@ ReadStatus SimulatorSource::read(Frame& frame) noexcept {
   if (timer_ && ::read(timer_.get(), &ticks, sizeof ticks) != sizeof ticks)
     return ReadStatus::nothing;
   if (ticks == 0) return ReadStatus::nothing;
-  const std::uint64_t sequence = next_sequence_ + ticks - 1;
+  std::uint64_t sequence = next_sequence_ + ticks - 1;
+  lost_ += static_cast<std::uint32_t>(ticks - 1);
+  while (disturbances_.frame_lost(sequence)) {
+    ++lost_;
+    ++sequence;
+    if (timer_) {
+      next_sequence_ = sequence;
+      return ReadStatus::nothing;
+    }
+  }
   next_sequence_ = sequence + 1;
   render(sequence);
 
   frame.image = {pixels_.data(), format_.width, format_.height, format_.width};
+  frame.decoded = {};
   frame.sequence = sequence;
-  frame.dropped = static_cast<std::uint32_t>(ticks - 1);
+  frame.dropped = std::exchange(lost_, 0);
   // The first tick came one period after the start.
   frame.capture_time = timer_ ? start_ + format_.period + truth_.time : TimePoint(truth_.time);
   frame.latency_origin = timer_ ? frame.capture_time : std::chrono::steady_clock::now();
@@ -94,8 +110,17 @@ void SimulatorSource::render(std::uint64_t sequence) noexcept {
   renderer_.render(motion_, time, sequence, pixels_.data());
   jpeg_.apply(pixels_.data());
   truth_.displacement = motion_.at(time).displacement;
+  truth_.exposed_displacement.setZero();
+  for (int i = 0; i < kExposureSteps; ++i) {
+    const double share = (i + 0.5) / kExposureSteps - 0.5;
+    truth_.exposed_displacement +=
+        motion_.at(time + share * scenario_.exposure.time).displacement / kExposureSteps;
+  }
   truth_.wrench = player_.applied_wrench(time);
   truth_.camera_T_platform = sim::platform_pose(scenario_.target, truth_.displacement);
+  truth_.disturbances = renderer_.happening().kinds;
+  std::copy(renderer_.visible().begin(), renderer_.visible().end(), truth_.visible.begin());
+  truth_.smear_px = renderer_.smear_px();
 }
 
 }  // namespace tagwrench

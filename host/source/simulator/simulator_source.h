@@ -20,11 +20,18 @@ struct Truth {
   std::uint64_t sequence = 0;
   Duration time{};                         ///< since the simulation began
   Vector6 displacement = Vector6::Zero();  ///< of the platform from rest, m and rad
-  Vector6 wrench = Vector6::Zero();        ///< that the user applies to the platform, N and N m
-  RigidPose camera_T_platform;             ///< at that instant
+  Vector6 exposed_displacement =
+      Vector6::Zero();  ///< mean of displacement over that exposure, which is what the picture
+                        ///< shows; a ringing platform may be 20 um away from it in the middle
+  Vector6 wrench = Vector6::Zero();  ///< that the user applies to the platform, N and N m
+  RigidPose camera_T_platform;       ///< at that instant
   Eigen::Vector3d rest_position =
       Eigen::Vector3d::Zero();  ///< of the platform in the camera frame, m
   std::vector<PlacedTag> tags;  ///< as glued
+  std::uint32_t disturbances =
+      0;                        ///< bit() of each DisturbanceKind that is there; the motion is none
+  std::vector<double> visible;  ///< per tag, share of the black square that can be seen, 0..1
+  double smear_px = 0;          ///< way of a tag's centre in the image during the exposure
 };
 
 }  // namespace tagwrench::sim
@@ -34,6 +41,7 @@ namespace tagwrench {
 /// Two clocks. Live: a timer ticks at the frame rate, each picture shows the platform as of the
 /// tick, and ticks that passed while nobody read are dropped and counted. Not live: a virtual
 /// clock, every read() gives the next frame, as fast as it can be rendered. Both go on for ever.
+/// Frames that the scenario loses are skipped and counted on either clock.
 class SimulatorSource final : public FrameSource {
  public:
   /// Throws ConfigError if the scenario cannot be simulated.
@@ -53,6 +61,8 @@ class SimulatorSource final : public FrameSource {
   UniqueFd timer_;  ///< none on the virtual clock
   TimePoint start_{};
   std::uint64_t next_sequence_ = 0;
+  std::uint32_t lost_ = 0;  ///< frames since the last one that was delivered
+  sim::DisturbancePlayer disturbances_;
   sim::TrajectoryPlayer player_;
   sim::Renderer renderer_;
   sim::PlatformMotion motion_;

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "host/grid_tags.h"
+
 namespace tagwrench::sim {
 namespace {
 
@@ -41,10 +43,27 @@ constexpr double kInkEdgeSize = 45e-6;      // m, correlation length of the ink'
 constexpr double kCutSize = 140e-6;         // m, correlation length of the scissors' edge
 constexpr double kLargestRaggedness = 3.0;  // standard deviations; the texture ends there
 
+constexpr std::string_view kGrid = "grid_10x10";  // host/grid_tags.h
+
 const Family* find_family(const std::string& name) {
   const auto* found = std::find_if(kFamilies.begin(), kFamilies.end(),
                                    [&](const Family& f) { return f.first == name; });
   return found == kFamilies.end() ? nullptr : found;
+}
+
+// The black frame around across x across cells.
+template <typename IsWhite>
+TagCells framed(int across, const IsWhite& is_white) {
+  TagCells cells;
+  cells.across = across + 2;
+  cells.black.assign(static_cast<std::size_t>(cells.across * cells.across), true);
+  for (int row = 0; row < across; ++row) {
+    for (int column = 0; column < across; ++column) {
+      cells.black[static_cast<std::size_t>((row + 1) * cells.across + column + 1)] =
+          !is_white(row, column);
+    }
+  }
+  return cells;
 }
 
 double overlap(double a0, double a1, double b0, double b1) {
@@ -113,27 +132,25 @@ class InkCoverage {
 
 }  // namespace
 
-bool family_exists(const std::string& family) { return find_family(family) != nullptr; }
+bool family_exists(const std::string& family) {
+  return family == kGrid || find_family(family) != nullptr;
+}
 
 int family_size(const std::string& family) {
+  if (family == kGrid) return kGridIds;
   const Family* found = find_family(family);
   return found == nullptr ? 0 : cv::aruco::getPredefinedDictionary(found->second)->bytesList.rows;
 }
 
 TagCells tag_cells(const std::string& family, int id) {
+  if (family == kGrid) {
+    return framed(kGridCells, [id](int row, int column) { return grid_is_white(id, row, column); });
+  }
   const auto dictionary = cv::aruco::getPredefinedDictionary(find_family(family)->second);
   const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
       dictionary->bytesList.rowRange(id, id + 1), dictionary->markerSize);
-  TagCells cells;
-  cells.across = bits.cols + 2;
-  cells.black.assign(static_cast<std::size_t>(cells.across * cells.across), true);
-  for (int row = 0; row < bits.rows; ++row) {
-    for (int column = 0; column < bits.cols; ++column) {
-      cells.black[static_cast<std::size_t>((row + 1) * cells.across + column + 1)] =
-          bits.at<std::uint8_t>(row, column) == 0;
-    }
-  }
-  return cells;
+  return framed(bits.cols,
+                [&bits](int row, int column) { return bits.at<std::uint8_t>(row, column) != 0; });
 }
 
 Texture print_tag(const Target& target, const TagCells& cells, double texels_per_m,

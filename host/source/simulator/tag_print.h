@@ -19,7 +19,7 @@ struct TagCells {
   }
 };
 
-/// Families as in sensor.yaml: aruco_original, aruco_4x4_50 ... apriltag_36h11.
+/// Families as in sensor.yaml: aruco_original, aruco_4x4_50 ... apriltag_36h11, grid_10x10.
 bool family_exists(const std::string& family);
 /// Number of ids in a family.
 int family_size(const std::string& family);

@@ -21,6 +21,10 @@ constexpr double kDropEvery = 3.0;         // s
 constexpr double kFallTime = 0.35;         // s, from about 60 cm
 constexpr double kImpactTime = 3.0e-3;     // s
 constexpr double kImpactPeak = 30 * 9.81;  // m/s^2, half a sine
+constexpr double kShoveShare = 0.3;        // of the amplitude, at once
+constexpr double kFullSway = 1.5;          // Hz; faster ones are smaller, so that speeds stay alike
+// Times the amplitude; what is stiffer takes a harder tap to move as far.
+constexpr double kHardTapGain[6] = {0.4, 0.4, 2.0, 0.5, 0.5, 0.5};
 
 // Rises from 0 to 1 over [0, length] with no jump in the first two derivatives.
 double smooth_step(double time, double length) {
@@ -32,6 +36,14 @@ double half_sine(double time, double length) {
   return time < 0 || time > length ? 0.0 : std::sin(kPi * time / length);
 }
 
+// Acceleration of something that is let go at 0 and lands. The camera looks up: gravity points
+// along -z. Rest includes gravity, so falling is seen as -g.
+Eigen::Vector3d falling(double time) {
+  const double fall = time >= 0 && time < kFallTime ? -kGravity : 0.0;
+  const double impact = kImpactPeak * half_sine(time - kFallTime, kImpactTime);
+  return {0.15 * impact, -0.1 * impact, fall + impact};
+}
+
 double held(double time, double hold_time) {
   const double on = smooth_step(time, kRampTime);
   return hold_time > 0 ? on - smooth_step(time - kRampTime - hold_time, kRampTime) : on;
@@ -40,7 +52,7 @@ double held(double time, double hold_time) {
 }  // namespace
 
 TrajectoryPlayer::TrajectoryPlayer(const Trajectory& trajectory, std::uint64_t seed)
-    : trajectory_(trajectory) {
+    : trajectory_(trajectory), seed_(seed) {
   Random random(seed, kMotion);
   for (auto& axis : tones_) {
     double sum = 0;
@@ -116,6 +128,8 @@ Vector6 TrajectoryPlayer::applied_wrench(double absolute_time) const noexcept {
       return tap(time);
     case Motion::compound:
       return compound(time);
+    case Motion::hard:
+      return hard(time);
     case Motion::hold:
       return 0.5 * held(time, trajectory_.hold_time) * Vector6::Map(trajectory_.amplitude.data());
     case Motion::rest:
@@ -127,12 +141,66 @@ Vector6 TrajectoryPlayer::applied_wrench(double absolute_time) const noexcept {
 
 Eigen::Vector3d TrajectoryPlayer::base_acceleration(double absolute_time) const noexcept {
   const double time = absolute_time - trajectory_.rest_time;
-  if (trajectory_.motion != Motion::drop || time < 0) return Eigen::Vector3d::Zero();
-  // The camera looks up: gravity points along -z. Rest includes gravity, so falling is seen as -g.
-  const double local = std::fmod(time, kDropEvery);
-  const double fall = local < kFallTime ? -kGravity : 0.0;
-  const double impact = kImpactPeak * half_sine(local - kFallTime, kImpactTime);
-  return {0.15 * impact, -0.1 * impact, fall + impact};
+  if (time < 0) return Eigen::Vector3d::Zero();
+  if (trajectory_.motion == Motion::drop) return falling(std::fmod(time, kDropEvery));
+  if (trajectory_.motion != Motion::hard) return Eigen::Vector3d::Zero();
+  const HardEvent event = hard_event(time);
+  return event.what == Event::drop ? falling(time - event.begin) : Eigen::Vector3d::Zero();
+}
+
+// Each event has a period of its own, begins in its first quarter and is over by its last tenth.
+TrajectoryPlayer::HardEvent TrajectoryPlayer::hard_event(double time) const noexcept {
+  const double period = trajectory_.event_time;
+  const auto number = static_cast<std::uint64_t>(time / period);
+  Random random = Random::numbered(seed_, kHardMotion, number);
+  HardEvent event;
+  event.what = kHardEvents[static_cast<std::size_t>(
+      Random::shuffled(seed_, kHardMotionOrder, number, kHardEvents.size()))];
+  event.begin = period * (static_cast<double>(number) + random.uniform(0, 0.25));
+  event.length = period * random.uniform(0.3, 0.65);
+  for (int axis = 0; axis < 6; ++axis) {
+    event.wrench[axis] = trajectory_.amplitude[axis] * random.uniform(-1, 1);
+  }
+  switch (event.what) {
+    case Event::sway:
+      event.frequency = random.uniform(0.5, 8.0);
+      event.wrench *= std::min(1.0, kFullSway / event.frequency);
+      break;
+    case Event::shove:
+      event.wrench *= kShoveShare;
+      break;
+    case Event::tap:
+      event.frequency = random.uniform(2.0, 8.0);
+      event.wrench = event.wrench.cwiseProduct(Vector6::Map(kHardTapGain));
+      break;
+    case Event::rest:
+    case Event::hold:
+    case Event::drop:
+      break;
+  }
+  return event;
+}
+
+Vector6 TrajectoryPlayer::hard(double time) const noexcept {
+  const HardEvent event = hard_event(time);
+  const double local = time - event.begin;
+  const double left = event.length - local;
+  if (local < 0 || left < 0) return Vector6::Zero();
+  const double eased = smooth_step(local, kRampTime) * smooth_step(left, kRampTime);
+  switch (event.what) {
+    case Event::hold:
+      return eased * event.wrench;
+    case Event::sway:
+      return eased * std::sin(2 * kPi * event.frequency * local) * event.wrench;
+    case Event::shove:
+      return event.wrench;
+    case Event::tap:
+      return half_sine(std::fmod(local, 1 / event.frequency), kTapTime) * event.wrench;
+    case Event::rest:
+    case Event::drop:
+      break;
+  }
+  return Vector6::Zero();
 }
 
 }  // namespace tagwrench::sim

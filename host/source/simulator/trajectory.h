@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 
 #include "host/source/simulator/scenario.h"
 #include "host/types.h"
@@ -27,6 +28,20 @@ class TrajectoryPlayer {
     double frequency, phase, weight;
   };
 
+  enum class Event : std::uint8_t { rest, hold, sway, shove, tap, drop };
+  static constexpr std::array<Event, 10> kHardEvents = {
+      Event::rest, Event::hold,  Event::hold, Event::hold, Event::sway,
+      Event::sway, Event::shove, Event::tap,  Event::tap,  Event::drop};  ///< of one round
+  /// One event of Motion::hard: what happens, when, and how.
+  struct HardEvent {
+    Event what = Event::rest;
+    double begin = 0, length = 0;      ///< s, since the end of the first rest
+    Vector6 wrench = Vector6::Zero();  ///< its largest, N and N m
+    double frequency = 0;              ///< Hz: of a sway, or of taps
+  };
+  HardEvent hard_event(double time) const noexcept;
+  Vector6 hard(double time) const noexcept;
+
   Vector6 steps(double time) const noexcept;
   Vector6 sweep(double time) const noexcept;
   Vector6 tap(double time) const noexcept;
@@ -34,6 +49,7 @@ class TrajectoryPlayer {
   Vector6 on_axis(double value) const noexcept;
 
   Trajectory trajectory_;
+  std::uint64_t seed_;
   std::array<std::array<Tone, kTones>, 6> tones_{};
 };
 

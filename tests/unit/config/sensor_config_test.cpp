@@ -54,11 +54,33 @@ TEST(SensorConfig, ReadsAFreshlyBuiltSensor) {
   EXPECT_EQ(s.spacemouse.vendor, 0x256f);
 }
 
+TEST(SensorConfig, RemembersTheCalibrationOfTheCamera) {
+  const auto with = [](const std::string& record) {
+    return replaced(kGood, "cy: 239.5}", "cy: 239.5, calibrated: " + record + "}");
+  };
+  const SensorConfig s =
+      parse_sensor(with("{date: 2026-05-02, views: 24, rms_px: 0.021}"), "sensor.yaml");
+  ASSERT_TRUE(s.camera_calibrated);
+  EXPECT_EQ(s.camera_calibrated->date, "2026-05-02");
+  EXPECT_EQ(s.camera_calibrated->views, 24);
+  EXPECT_EQ(s.camera_calibrated->rms_px, 0.021);
+  EXPECT_FALSE(parse_sensor(kGood, "sensor.yaml").camera_calibrated);
+  for (const char* bad :
+       {"{date: May, views: 24, rms_px: 0.02}", "{views: 24, rms_px: 0.02}",
+        "{date: 2026-05-02, views: 0, rms_px: 0.02}", "{date: 2026-05-02, views: 24, rms_px: -1}",
+        "{date: 2026-05-02, views: 24, rms_px: 1, by: me}", "yes"}) {
+    EXPECT_NE(complaint(with(bad)).find("sensor.yaml:1: camera.calibrated"), std::string::npos)
+        << complaint(with(bad));
+  }
+}
+
 TEST(SensorConfig, ReadsEveryOptionalKey) {
   const SensorConfig s = parse_sensor(
       replaced(
           replaced(kGood, "{id: 5}",
-                   "{id: 5, position_mm: [1, 2, 3], rotation_rad: [0, 0, 1.5707963267948966]}"),
+                   "{id: 5, position_mm: [1, 2, 3], rotation_rad: [0, 0, 1.5707963267948966], "
+                   "position_sigma_mm: [0.004, 0.005, 0.006], rotation_sigma_rad: [0.001, 0.002, "
+                   "0.003]}"),
           "fy: 806.0,", "fy: 806.0, distortion: [1, 2, 3, 4, 5], mirrored: true,") +
           "  range_n: [1, 2, 3]\n"
           "  range_nm: [0.01, 0.02, 0.03]\n"
@@ -74,6 +96,9 @@ TEST(SensorConfig, ReadsEveryOptionalKey) {
   // The tag's x axis lies along platform y.
   EXPECT_TRUE((*s.target.tags[0].platform_T_tag * Eigen::Vector3d(1e-3, 0, 0))
                   .isApprox(Eigen::Vector3d(1e-3, 3e-3, 3e-3)));
+  EXPECT_DOUBLE_EQ(s.target.tags[0].sigma[2], 6e-6);  // m
+  EXPECT_DOUBLE_EQ(s.target.tags[0].sigma[3], 1e-3);  // rad
+  EXPECT_TRUE(s.target.tags[1].sigma.isZero());
   EXPECT_EQ(s.wrench.range[5], 0.03);
   EXPECT_DOUBLE_EQ(s.wrench.wrench_origin.z(), 0.02);
   EXPECT_TRUE(s.wrench.camera_R_wrench_frame.col(0).isApprox(Eigen::Vector3d::UnitY()));
@@ -109,6 +134,15 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"UnknownTopLevelKey", "rest: ", "rets: ", "sensor.yaml:8: rets:", "unknown key"},
         BadCase{"UnknownKeyInATag", "{id: 2}", "{id: 2, size: 3}",
                 "sensor.yaml:7: target.tags[1].size:", "unknown key"},
+        BadCase{"SigmaWithoutAPose", "{id: 2}",
+                "{id: 2, position_sigma_mm: [1, 1, 1], rotation_sigma_rad: [1, 1, 1]}",
+                "sensor.yaml:7: target.tags[1].position_sigma_mm:", "no pose"},
+        BadCase{"HalfASigma", "{id: 2}", "{id: 2, rotation_sigma_rad: [1, 1, 1]}",
+                "sensor.yaml:7: target.tags[1].rotation_sigma_rad:", "belong together"},
+        BadCase{"NegativeSigma", "{id: 2}",
+                "{id: 2, position_mm: [1, 2, 3], rotation_rad: [0, 0, 0], position_sigma_mm: [1, "
+                "1, -1], rotation_sigma_rad: [1, 1, 1]}",
+                "sensor.yaml:7: target.tags[1].position_sigma_mm:", "negative"},
         BadCase{"KeyTwice", "  tag_size_mm: 3.8", "  tag_size_mm: 3.8\n  tag_size_mm: 4",
                 "sensor.yaml:5: target.tag_size_mm:", "twice"},
         BadCase{"WrongType", "width: 640", "width: wide",

@@ -49,6 +49,56 @@ TEST(ScenarioConfig, ValuesAreConvertedToSi) {
   EXPECT_DOUBLE_EQ(s.camera.fx_px, 805);  // untouched
 }
 
+TEST(ScenarioConfig, DisturbancesAreListsOfTheirKinds) {
+  const sim::Scenario s = parse_scenario(
+      "exposure: {even: true}\n"
+      "trajectory: {motion: hard, event_s: 3}\n"
+      "disturbances:\n"
+      "  occluders: [{shape: disc, width_px: 80, aim_px: [3, -4], start_s: 5, length_s: 2}]\n"
+      "  glare: [{peak_counts: 90}, {sigma_px: 12, fade_s: 0.5}]\n"
+      "  light: [{factor: 0, every_s: 7}]\n"
+      "  flicker: [{depth: 0.2, mains_hz: 60}]\n"
+      "  turning_light: [{turn_s: 9}]\n"
+      "  dirt: [{tag: 1, specks: 2, scratches: 3, size_mm: 0.1}]\n"
+      "  focus: [{shift_mm: -2, hunt_hz: 3}]\n"
+      "  lost_frames: {share: 0.1, most_in_a_row: 4}\n"
+      "  random: {start_s: 8, every_s: 4}\n",
+      "s.yaml");
+  const sim::Disturbances& d = s.disturbances;
+  EXPECT_TRUE(s.exposure.even);
+  EXPECT_EQ(s.trajectory.motion, sim::Motion::hard);
+  EXPECT_EQ(s.trajectory.event_time, 3);
+  ASSERT_EQ(d.occluders.size(), 1U);
+  EXPECT_EQ(d.occluders[0].shape, sim::OccluderShape::disc);
+  EXPECT_EQ(d.occluders[0].aim_px, Eigen::Vector2d(3, -4));
+  EXPECT_EQ(d.occluders[0].when.start, 5);
+  EXPECT_EQ(d.occluders[0].when.length, 2);
+  ASSERT_EQ(d.glare.size(), 2U);
+  EXPECT_EQ(d.glare[1].sigma_px, 12);
+  EXPECT_EQ(d.light.at(0).when.every, 7);
+  EXPECT_EQ(d.flicker.at(0).mains_hz, 60);
+  EXPECT_EQ(d.turning_light.at(0).turn, 9);
+  EXPECT_DOUBLE_EQ(d.dirt.at(0).size, 0.1e-3);
+  EXPECT_DOUBLE_EQ(d.focus.at(0).shift, -2e-3);
+  EXPECT_EQ(d.lost_frames.most_in_a_row, 4);
+  EXPECT_EQ(d.random.start, 8);
+}
+
+TEST(ScenarioConfig, ImpossibleDisturbancesNameFileLineAndKey) {
+  const std::string head = "seed: 1\ndisturbances:\n";
+  EXPECT_EQ(complaint(head + "  glare: [{radius: 3}]\n").rfind("s.yaml:3: disturbances.glare", 0),
+            0U);
+  EXPECT_EQ(complaint(head + "  dirt: [{tag: 2}]\n").rfind("s.yaml:3: disturbances.dirt", 0), 0U);
+  EXPECT_EQ(complaint(head + "  light: [{length_s: 3, every_s: 1}]\n")
+                .rfind("s.yaml:3: disturbances.light: ", 0),
+            0U);
+  EXPECT_NE(complaint(head + "  flicker: [{depth: 2}]\n").find("depth must lie between 0 and 1"),
+            std::string::npos);
+  EXPECT_EQ(complaint(head + "  random: {every_s: 2}\n").rfind("s.yaml:3: disturbances.random", 0),
+            0U);
+  EXPECT_NE(complaint(head + "  lost_frames: {share: 0.9}\n"), "accepted");
+}
+
 TEST(ScenarioConfig, OneTagLiesOnASlopeThroughTheOrigin) {
   const sim::Scenario s = parse_scenario("target: {tags: [{id: 7}]}\n", "s.yaml");
   ASSERT_EQ(s.target.tags.size(), 1U);

@@ -220,5 +220,64 @@ TEST_F(Images, OnePictureIsEnough) {
   EXPECT_EQ(wait_and_read(source, frame), ReadStatus::end);
 }
 
+/// Grey levels of a 160 x 120 JPEG in `region`.
+std::vector<int> levels(const Frame& frame, const Region& region) {
+  std::vector<int> out;
+  for (int y = region.y; y < region.y + region.height; ++y) {
+    for (int x = region.x; x < region.x + region.width; ++x) {
+      out.push_back(frame.image.pixels[y * frame.image.stride + x]);
+    }
+  }
+  return out;
+}
+
+TEST_F(Images, OnlyTheWantedPartOfAJpegIsDecodedUntilTheRestIsAskedFor) {
+  const auto jpeg = jpeg_of(pattern(160, 120), 160, 120);
+  write("a.jpg", std::string(jpeg.begin(), jpeg.end()));
+  write("b.jpg", std::string(jpeg.begin(), jpeg.end()));
+  ImagesSource source(dir(), true);
+  const Region whole{0, 0, 160, 120}, wanted{50, 30, 40, 40};
+  Frame all, part;
+  ASSERT_EQ(source.read(all), ReadStatus::frame);
+  EXPECT_EQ(all.readable(), whole);
+  const std::vector<int> truth = levels(all, whole);
+  const std::vector<int> truth_of_part = levels(all, wanted);
+  source.want(wanted);
+  ASSERT_EQ(source.read(part), ReadStatus::frame);
+  EXPECT_TRUE(part.readable().contains(wanted));
+  EXPECT_LT(part.readable().width, 80);
+  EXPECT_EQ(levels(part, wanted), truth_of_part);
+  ASSERT_TRUE(source.complete(part));
+  EXPECT_EQ(part.readable(), whole);
+  EXPECT_EQ(levels(part, whole), truth);
+  EXPECT_TRUE(source.complete(part)) << "of a whole frame is nothing to do";
+}
+
+TEST_F(Images, AJpegCutOffBelowTheWantedPartIsGoodButCannotBeCompleted) {
+  const auto jpeg = jpeg_of(pattern(160, 120), 160, 120);
+  write("a.jpg", std::string(jpeg.begin(), jpeg.end() - 200));
+  ImagesSource source(dir(), true);
+  const Region wanted{50, 30, 40, 40};
+  source.want(wanted);
+  Frame frame;
+  ASSERT_EQ(source.read(frame), ReadStatus::frame);
+  const Region decoded = frame.decoded;
+  const std::vector<int> before = levels(frame, wanted);
+  EXPECT_FALSE(source.complete(frame));
+  EXPECT_EQ(frame.decoded, decoded);
+  EXPECT_EQ(levels(frame, wanted), before);
+}
+
+TEST_F(Images, APngIsWholeWhateverIsWanted) {
+  picture("a.png", 10);
+  ImagesSource source(dir(), true);
+  source.want({2, 2, 3, 3});
+  Frame frame;
+  frame.decoded = {1, 1, 1, 1};  // left by another frame
+  ASSERT_EQ(source.read(frame), ReadStatus::frame);
+  EXPECT_EQ(frame.readable(), (Region{0, 0, 16, 12}));
+  EXPECT_TRUE(source.complete(frame));
+}
+
 }  // namespace
 }  // namespace tagwrench

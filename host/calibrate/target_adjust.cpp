@@ -1,0 +1,388 @@
+#include "host/calibrate/target_adjust.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "host/calibrate/target_normal.h"
+#include "host/calibrate/target_print.h"
+#include "host/tracker/projection.h"
+#include "host/tracker/rotation.h"
+
+namespace tagwrench {
+namespace {
+
+/// Half length of the profiles: short, for the paper's edge beyond the white margin comes near when
+/// a tag leans away, and its blur would pull at the outer edges.
+constexpr double kHalf_px = 3.5;
+constexpr int kMostIterations = 12;
+constexpr double kStillPosition = 3e-8;  // m; a step of the tags below these is the end
+constexpr double kStillRotation = 1e-5;  // rad
+constexpr double kStillFocal = 1e-5;     // of the ratio
+constexpr double kLargestFocalStep = 0.03;
+
+constexpr double kTukey = 4.685;  // Holland and Welsch 1977
+constexpr double kMadToSigma = 1.4826;
+constexpr double kLeastNoise_px = 0.01;
+constexpr double kLeastNoisePart = 0.5;  // of a point, to the median of all
+constexpr int kFewSeen = 8;              // frames that show too little of a point's noise
+constexpr double kRestFloor_px = 0.01;   // the averaged rest image has errors that do not average
+/// What keeps the offsets of all frames together from being better than this, however many there
+/// are: shading, change of blur.
+constexpr double kModel_px = 0.004;
+/// And the same for the focal length, as a part of it.
+constexpr double kFocalModel = 0.002;
+constexpr double kReadoutPrior = 30e-3;     // s, a rolling shutter's
+constexpr double kSpreadPrior = 50e-6;      // m
+constexpr double kLeastContrastPart = 0.3;  // of the tag's median, for a point to be used
+
+double median(std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double tukey(double offset, double sigma) {
+  const double q = offset / (kTukey * sigma);
+  return q * q < 1 ? (1 - q * q) * (1 - q * q) : 0;
+}
+
+CameraModel with_focal(CameraModel camera, double ratio) {
+  camera.fx_px *= ratio;
+  camera.fy_px *= ratio;
+  return camera;
+}
+
+struct Observation {
+  bool valid = false;
+  double by_readout = 0;  // px/s
+  double offset = 0;      // px, true to scale
+  EdgeDerivatives by;
+};
+
+}  // namespace
+
+EdgeDerivatives edge_derivatives(const CameraModel& camera, const EdgeMeasurement& measurement,
+                                 const Eigen::Isometry3d& camera_T_platform,
+                                 const Eigen::Isometry3d& rest_camera_T_platform,
+                                 const Eigen::Isometry3d& camera_T_tag,
+                                 const Eigen::Vector3d& point) {
+  EdgeDerivatives by;
+  by.frame = measurement.row;
+  by.normal = measurement.px_per_m;
+  // A motion (t, r) of the tag at rest moves the point by t + r x arm at rest, and by that turned
+  // in the picture.
+  const Eigen::Matrix3d turn =
+      camera_T_platform.linear() * rest_camera_T_platform.linear().transpose();
+  const Eigen::Vector3d pull = turn.transpose() * measurement.row.head<3>();
+  const Eigen::Vector3d arm = camera_T_tag.linear() * point;
+  by.tag << pull, arm.cross(pull);
+  // measurement.row begins with J^T n, n the direction of the profile and J the projection's
+  // derivative; the image grows about the principal point.
+  const Eigen::Vector3d p =
+      camera_T_platform * (rest_camera_T_platform.inverse() * (camera_T_tag * point));
+  const ProjectedPoint seen = project(camera, p);
+  const Eigen::Matrix2d square = seen.jacobian * seen.jacobian.transpose();
+  const Eigen::Vector2d direction = square.inverse() * (seen.jacobian * measurement.row.head<3>());
+  by.focal = direction.dot(seen.pixel - Eigen::Vector2d(camera.cx_px, camera.cy_px));
+  by.row_px = seen.pixel.y();
+  return by;
+}
+
+struct TargetAdjuster::Problem {
+  // What moves while iterating.
+  struct State {
+    std::vector<Eigen::Isometry3d> camera_T_tag;
+    std::vector<double> spread;
+    Eigen::VectorXd shift;  // of each point, toward white, m
+    std::vector<Eigen::Isometry3d> poses;
+    double readout = 0;  // s
+    double focal_ratio = 1;
+  };
+
+  explicit Problem(TargetAtRest given) : rest(std::move(given)) {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (const Eigen::Isometry3d& pose : rest.camera_T_tag) centre += pose.translation();
+    rest_pose.translation() = centre / static_cast<double>(rest.camera_T_tag.size());
+    for (const TagPattern& pattern : rest.patterns) {
+      printed.push_back(make_edge_tag(pattern, Eigen::Isometry3d::Identity()));
+    }
+    keep_visible();
+  }
+
+  PixelView<float> rest_view() const {
+    return {rest.image.level.data(), rest.image.width, rest.image.height, rest.image.width};
+  }
+
+  void keep_visible();
+  EdgeTag edges(const State& state, std::size_t tag) const;
+  template <class Pixel>
+  void observe(const EdgeMeter& meter, const PixelView<Pixel>& image, const State& state,
+               const Eigen::Isometry3d& pose, std::vector<Observation>& out) const;
+  void observe_all(const std::vector<Keyframe>& frames, const State& state);
+  void learn_noise();
+  TargetNormal equations(const State& state, bool at_rest_only) const;
+  bool iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal);
+
+  TargetAtRest rest;
+  Eigen::Isometry3d rest_pose = Eigen::Isometry3d::Identity();
+  std::vector<EdgeTag> printed;
+  std::vector<Eigen::Index> first;  // point of each tag, and the end
+  Eigen::Index points = 0;
+
+  std::vector<Observation> at_rest;              // of each point
+  std::vector<std::vector<Observation>> moving;  // of each keyframe and point
+  Eigen::VectorXd noise_px;                      // of each point in one keyframe
+  PrintScatter scatter;
+};
+
+/// Leaves out the points that have no clear edge in the rest image.
+void TargetAdjuster::Problem::keep_visible() {
+  const EdgeMeter meter(rest.camera);
+  first.assign(1, 0);
+  for (std::size_t t = 0; t < printed.size(); ++t) {
+    EdgeTag& tag = printed[t];
+    tag.platform_T_tag = rest_pose.inverse() * rest.camera_T_tag[t];
+    std::vector<EdgeMeasurement> seen(tag.points.size());
+    meter.measure(rest_view(), tag, rest_pose, kHalf_px, false, seen);
+    std::vector<double> contrasts;
+    for (const EdgeMeasurement& m : seen) {
+      if (m.valid) contrasts.push_back(m.contrast);
+    }
+    const double least = kLeastContrastPart * median(contrasts);
+    std::vector<EdgePoint> kept;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (!seen[i].valid || seen[i].contrast < least) continue;
+      kept.push_back(tag.points[i]);
+      kept.back().contrast = static_cast<float>(seen[i].contrast);
+    }
+    tag.points = std::move(kept);
+    first.push_back(first.back() + static_cast<Eigen::Index>(tag.points.size()));
+  }
+  points = first.back();
+}
+
+EdgeTag TargetAdjuster::Problem::edges(const State& state, std::size_t tag) const {
+  EdgeTag out = printed[tag];
+  out.platform_T_tag = rest_pose.inverse() * state.camera_T_tag[tag];
+  for (std::size_t i = 0; i < out.points.size(); ++i) {
+    out.points[i] = shifted(out.points[i], state.shift[first[tag] + static_cast<Eigen::Index>(i)]);
+  }
+  return out;
+}
+
+template <class Pixel>
+void TargetAdjuster::Problem::observe(const EdgeMeter& meter, const PixelView<Pixel>& image,
+                                      const State& state, const Eigen::Isometry3d& pose,
+                                      std::vector<Observation>& out) const {
+  out.assign(static_cast<std::size_t>(points), {});
+  for (std::size_t t = 0; t < printed.size(); ++t) {
+    const EdgeTag tag = edges(state, t);
+    std::vector<EdgeMeasurement> measured(tag.points.size());
+    meter.measure(image, tag, pose, kHalf_px, false, measured);
+    std::vector<double> gains;
+    for (const EdgeMeasurement& m : measured) {
+      if (m.valid) gains.push_back(m.gain);
+    }
+    const double gain = std::clamp(median(gains), 0.3, 1.3);
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      if (!measured[i].valid) continue;
+      Observation& seen = out[static_cast<std::size_t>(first[t]) + i];
+      seen.valid = true;
+      seen.by = edge_derivatives(meter.camera(), measured[i], pose, rest_pose,
+                                 state.camera_T_tag[t], {tag.points[i].x, tag.points[i].y, 0});
+      seen.offset = measured[i].offset_px / gain;
+    }
+  }
+}
+
+void TargetAdjuster::Problem::observe_all(const std::vector<Keyframe>& frames, const State& state) {
+  observe(EdgeMeter(with_focal(rest.camera, state.focal_ratio)), rest_view(), state, rest_pose,
+          at_rest);
+  moving.resize(frames.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const Keyframe& frame = frames[k];
+    observe(EdgeMeter(with_focal(frame.camera, state.focal_ratio)), frame.view(), state,
+            state.poses[k], moving[k]);
+    // A row is read before or after the middle one, by its part of the read-out time.
+    const double middle = 0.5 * (frame.image_rows - 1) - frame.first_row;
+    for (Observation& seen : moving[k]) {
+      seen.by_readout =
+          seen.by.frame.dot(frame.velocity) * (seen.by.row_px - middle) / frame.image_rows;
+      seen.offset -= seen.by_readout * state.readout;
+    }
+  }
+}
+
+/// Of each point, from its own offsets in all keyframes: points differ in contrast and in the
+/// length of their profiles.
+void TargetAdjuster::Problem::learn_noise() {
+  noise_px = Eigen::VectorXd::Zero(points);
+  std::vector<double> all;
+  std::vector<double> offsets;
+  for (Eigen::Index p = 0; p < points; ++p) {
+    offsets.clear();
+    for (const auto& frame : moving) {
+      const Observation& seen = frame[static_cast<std::size_t>(p)];
+      if (seen.valid) offsets.push_back(std::abs(seen.offset));
+    }
+    if (offsets.size() < kFewSeen) continue;
+    noise_px[p] = kMadToSigma * median(offsets);
+    all.push_back(noise_px[p]);
+  }
+  const double typical = std::max(kLeastNoise_px, median(all));
+  for (double& noise : noise_px) {
+    noise = noise > 0 ? std::max(noise, kLeastNoisePart * typical) : typical;
+  }
+}
+
+TargetNormal TargetAdjuster::Problem::equations(const State& state, bool at_rest_only) const {
+  const int frames = at_rest_only ? 0 : static_cast<int>(moving.size());
+  TargetNormal normal(frames, static_cast<int>(printed.size()), points);
+  normal.add_readout(-state.readout, 1 / (kReadoutPrior * kReadoutPrior));
+  for (std::size_t t = 0; t < printed.size(); ++t) {
+    const int tag = static_cast<int>(t);
+    normal.add_spread(tag, -state.spread[t], 1 / (kSpreadPrior * kSpreadPrior));
+    for (Eigen::Index p = first[t]; p < first[t + 1]; ++p) {
+      const double off_print = state.shift[p] - state.spread[t];
+      const double print =
+          tukey(off_print, scatter.robust) / (scatter.effective * scatter.effective);
+      // A point off the print tells nothing of the scale, but still of the motion.
+      normal.add_print(p, tag, -off_print, std::max(print, 1 / (kSpreadPrior * kSpreadPrior)));
+      EdgeEquation equation;
+      equation.tag = tag;
+      equation.point = p;
+      const double variance = noise_px[p] * noise_px[p];
+      const auto add = [&](const Observation& seen, int frame, double weight) {
+        if (!seen.valid || !(weight > 0)) return;
+        equation.frame = frame;
+        equation.by_frame = seen.by.frame;
+        equation.by_tag = seen.by.tag;
+        equation.by_normal = seen.by.normal;
+        equation.by_readout = seen.by_readout;
+        equation.by_focal = seen.by.focal;
+        equation.offset = seen.offset;
+        equation.weight = weight;
+        normal.add(equation);
+      };
+      add(at_rest[static_cast<std::size_t>(p)], -1,
+          1 / (variance / std::max(1, rest.image.frames) + kRestFloor_px * kRestFloor_px));
+      for (int k = 0; k < frames; ++k) {
+        const Observation& seen = moving[static_cast<std::size_t>(k)][static_cast<std::size_t>(p)];
+        add(seen, k, tukey(seen.offset, noise_px[p]) / (variance + frames * kModel_px * kModel_px));
+      }
+    }
+  }
+  return normal;
+}
+
+/// One step; true once it is so small that another would change nothing. Throws nothing; a step
+/// without a solution leaves NaN in the state.
+bool TargetAdjuster::Problem::iterate(const std::vector<Keyframe>& frames, State& state,
+                                      bool free_focal) {
+  observe_all(frames, state);
+  learn_noise();
+  scatter = print_scatter(printed, first, state.shift, state.spread);
+  TargetNormal normal = equations(state, false);
+  const Eigen::VectorXd shared =
+      normal.reduce() ? normal.shared_step(free_focal) : Eigen::VectorXd();
+  if (shared.size() == 0) {
+    state.focal_ratio = std::nan("");
+    return true;
+  }
+  const Eigen::VectorXd moved_frames = normal.frame_steps(shared);
+  state.shift += normal.point_steps(shared, moved_frames);
+  for (std::size_t k = 0; k < state.poses.size(); ++k) {
+    state.poses[k] =
+        moved(state.poses[k], moved_frames.segment<6>(6 * static_cast<Eigen::Index>(k)));
+    renormalise(state.poses[k]);
+  }
+  bool still = true;
+  for (std::size_t t = 0; t < state.camera_T_tag.size(); ++t) {
+    const Vector6 step = shared.segment<6>(6 * static_cast<Eigen::Index>(t));
+    state.camera_T_tag[t] = moved(state.camera_T_tag[t], step);
+    renormalise(state.camera_T_tag[t]);
+    state.spread[t] += shared[normal.spread_index(static_cast<int>(t))];
+    still =
+        still && step.head<3>().norm() < kStillPosition && step.tail<3>().norm() < kStillRotation;
+  }
+  state.readout += shared[normal.readout_index()];
+  const double zoom =
+      std::clamp(shared[normal.focal_index()], -kLargestFocalStep, kLargestFocalStep);
+  state.focal_ratio *= std::exp(zoom);
+  return still && std::abs(zoom) < kStillFocal;
+}
+
+TargetAdjuster::TargetAdjuster(TargetAtRest rest)
+    : problem_(std::make_unique<Problem>(std::move(rest))) {}
+
+TargetAdjuster::~TargetAdjuster() = default;
+
+TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
+                                      const std::function<bool(double)>& progress) {
+  Problem& problem = *problem_;
+  Problem::State state;
+  state.camera_T_tag = problem.rest.camera_T_tag;
+  state.spread.assign(state.camera_T_tag.size(), 0.0);
+  state.shift = Eigen::VectorXd::Zero(problem.points);
+  for (const Keyframe& frame : frames)
+    state.poses.push_back(moved(problem.rest_pose, frame.displacement));
+
+  int steps = 0;
+  const auto settle = [&](Problem::State& from, bool free_focal) {
+    for (int i = 0; i < kMostIterations; ++i) {
+      const bool still = problem.iterate(frames, from, free_focal);
+      if (progress && !progress(++steps / (2.0 * kMostIterations))) return false;
+      if (still) break;
+    }
+    return std::isfinite(from.focal_ratio);
+  };
+  TargetEstimate estimate;
+  estimate.points = static_cast<int>(problem.points);
+  Problem::State zoomed;
+  if (!settle(state, false)) return estimate;
+  zoomed = state;
+  if (!settle(zoomed, true)) return estimate;
+  estimate.focal_ratio = zoomed.focal_ratio;
+
+  problem.observe_all(frames, state);
+  problem.learn_noise();
+  TargetNormal normal = problem.equations(state, false);
+  TargetNormal alone = problem.equations(state, true);
+  if (!normal.reduce() || !alone.reduce()) return estimate;
+  const Eigen::Index all = normal.shared_count() - 1;  // without the focal length
+  const auto tags = static_cast<Eigen::Index>(6 * state.camera_T_tag.size());
+  const auto inverse = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
+    return information.ldlt().solve(
+        Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+  };
+  estimate.covariance =
+      inverse(normal.information().topLeftCorner(all, all)).topLeftCorner(tags, tags);
+  estimate.covariance_at_rest =
+      inverse(alone.information().topLeftCorner(all, all)).topLeftCorner(tags, tags);
+  estimate.focal_sigma =
+      std::hypot(kFocalModel, std::sqrt(inverse(normal.information())(all, all)));
+  estimate.readout = state.readout;
+  estimate.camera_T_tag = state.camera_T_tag;
+  estimate.ink_spread = state.spread;
+  estimate.print_scatter = problem.scatter.robust;
+  std::vector<double> noise(problem.noise_px.begin(), problem.noise_px.end());
+  estimate.noise_px = median(noise);
+  double squares = 0;
+  double count = 0;
+  for (const auto& frame : problem.moving) {
+    for (const Observation& seen : frame) {
+      if (!seen.valid) continue;
+      squares += seen.offset * seen.offset;
+      count += 1;
+    }
+  }
+  estimate.residual_px = std::sqrt(squares / std::max(1.0, count));
+  estimate.solved = estimate.covariance.allFinite() && estimate.covariance_at_rest.allFinite() &&
+                    std::isfinite(estimate.focal_sigma);
+  return estimate;
+}
+
+}  // namespace tagwrench

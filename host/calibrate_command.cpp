@@ -1,0 +1,56 @@
+#include "host/calibrate_command.h"
+
+namespace tagwrench {
+
+CalibrateCommand::CalibrateCommand(CLI::App& app)
+    : verb_(app.add_subcommand("calibrate", "measure this sensor and write it to its sensor.yaml")),
+      camera_(verb_->add_subcommand(
+          "camera", "the lens, from a printed board shown to the camera (tagwrench tags --board)")),
+      target_(verb_->add_subcommand("target",
+                                    "where the tags sit, from the platform at rest and then "
+                                    "moved about")) {
+  verb_->require_subcommand(1);
+  auto* source = camera_->add_option("--source", camera_options_.source,
+                                     "the camera: v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or "
+                                     "images:DIR");
+  auto* images =
+      camera_->add_option("--images", camera_options_.folders, "folders of pictures of the board");
+  source->excludes(images);
+  camera_
+      ->add_option("--board", camera_options_.board,
+                   "charuco:COLUMNSxROWS:SQUAREmm:MARKERmm:DICTIONARY or "
+                   "checkerboard:COLUMNSxROWS:SQUAREmm, counted in squares")
+      ->required();
+  camera_->add_option("--sensor", camera_options_.sensor, "sensor.yaml whose camera this is");
+  camera_->add_option("--out", camera_options_.out,
+                      "sensor.yaml to write; without it --sensor is edited in place");
+  camera_
+      ->add_option(
+          "--views", camera_options_.views,
+          "views of the board to use: as many at least from a camera, at most from folders")
+      ->check(CLI::Range(kFewestCameraViews, kMostCameraViews));
+  camera_
+      ->add_option("--seconds", camera_options_.seconds,
+                   "look at a camera no longer than this, then use what there is")
+      ->check(CLI::Range(1.0, 1e6));
+  target_->add_option("--sensor", target_options_.sensor, "sensor.yaml of this sensor")->required();
+  target_
+      ->add_option("--source", target_options_.source,
+                   "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
+      ->required();
+  target_->add_option("--out", target_options_.out,
+                      "sensor.yaml to write; without it --sensor is edited in place");
+  target_->add_option("--frames", target_options_.frames, "use no more than N frames")
+      ->check(CLI::PositiveNumber);
+  target_
+      ->add_option("--seconds", target_options_.seconds,
+                   "use no more than S seconds; without it a folder is used up and anything else "
+                   "for 30 s")
+      ->check(CLI::Range(1.0, 1e6));
+}
+
+int CalibrateCommand::run() const {
+  return target_->parsed() ? calibrate_target(target_options_) : calibrate_camera(camera_options_);
+}
+
+}  // namespace tagwrench

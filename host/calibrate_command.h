@@ -1,0 +1,29 @@
+// `tagwrench calibrate`: the verb, its sub-commands and their options.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "host/calibrate_camera_command.h"
+#include "host/calibrate_target_command.h"
+
+namespace tagwrench {
+
+/// Declares itself on the command line; must outlive the parsing.
+class CalibrateCommand {
+ public:
+  explicit CalibrateCommand(CLI::App& app);
+
+  bool parsed() const { return verb_->parsed(); }
+  /// Runs the sub-command that was given; returns the exit status. Throws ConfigError if it cannot
+  /// start or refuses what it was shown.
+  int run() const;
+
+ private:
+  CLI::App* verb_;
+  CLI::App* camera_;
+  CLI::App* target_;
+  CalibrateCameraOptions camera_options_;
+  CalibrateTargetOptions target_options_;
+};
+
+}  // namespace tagwrench

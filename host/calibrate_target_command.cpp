@@ -1,0 +1,204 @@
+#include "host/calibrate_target_command.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <chrono>
+#include <filesystem>
+#include <limits>
+#include <system_error>
+
+#include "host/calibrate/target_recorder.h"
+#include "host/calibrate/target_verdict.h"
+#include "host/config/appearance_file.h"
+#include "host/config/sensor_edit.h"
+#include "host/config_error.h"
+#include "host/input.h"
+#include "host/tell.h"
+#include "host/tracker/rotation.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kStopped = 1;
+constexpr std::size_t kMostKeyframes = 150;
+constexpr double kSecondsFromCamera = 30;
+constexpr Duration kSayEvery = std::chrono::seconds(2);
+
+bool signalled(const UniqueFd& stop) {
+  pollfd entry{stop.get(), POLLIN, 0};
+  return ::poll(&entry, 1, 0) > 0;
+}
+
+/// Says what to do, and every two seconds how far it is.
+class Guide {
+ public:
+  void say(const TargetRecorder& record, const Track& track) {
+    if (track.hint == Hint::moved_while_learning)
+      tell("the platform moved: hands off until the rest is learned");
+    if (record.rest_known() && !told_to_move_) {
+      told_to_move_ = true;
+      tell("rest learned; now tilt and push the platform slowly, every way");
+    }
+    if (Clock::now() - said_ < kSayEvery) return;
+    said_ = Clock::now();
+    if (!record.rest_known()) {
+      tell(fmt::format("{} frames; waiting for all tags, at rest", record.counts().frames));
+      return;
+    }
+    const Vector6 range = record.range();
+    tell(fmt::format(
+        "{} frames, {} different pictures; x {:.2f} y {:.2f} z {:.2f} mm, about x {:.1f} y {:.1f} "
+        "z "
+        "{:.1f} degrees{}",
+        record.counts().frames, record.keyframes().size(), range[0] * 1e3, range[1] * 1e3,
+        range[2] * 1e3, range[3] * 57.29578, range[4] * 57.29578, range[5] * 57.29578,
+        track.status == Status::ok ? "" : "; the tags are not held"));
+  }
+
+ private:
+  bool told_to_move_ = false;
+  TimePoint said_ = Clock::now();
+};
+
+/// Until the source ends, enough was seen (true) or a signal came (false).
+bool watch(FrameSource& source, const CalibrateTargetOptions& options, const UniqueFd& stop,
+           TargetRecorder& record) {
+  const bool ends = split_spec(options.source).kind == "images";
+  const double seconds = options.seconds.value_or(
+      ends || options.frames ? std::numeric_limits<double>::infinity() : kSecondsFromCamera);
+  std::optional<TimePoint> first;
+  Guide guide;
+  while (!options.frames || record.counts().frames < *options.frames) {
+    pollfd fds[2] = {{source.poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};
+    ::poll(fds, 2, source.poll_fd() < 0 ? 0 : 200);
+    if (fds[1].revents != 0) return false;
+    Frame frame;
+    const ReadStatus status = source.read(frame);
+    if (status == ReadStatus::end) break;
+    if (status == ReadStatus::disconnected || status == ReadStatus::reconnected)
+      tell(source.detail());
+    if (status != ReadStatus::frame) continue;
+    if (!first) first = frame.capture_time;
+    if (std::chrono::duration<double>(frame.capture_time - *first).count() >= seconds) break;
+    guide.say(record, record.add(frame));
+  }
+  if (const std::string bad = source.unusable(); !bad.empty()) tell(bad);
+  return true;
+}
+
+std::string list(const Eigen::Vector3d& v, int digits) {
+  return fmt::format("[{:.{}f}, {:.{}f}, {:.{}f}]", v.x(), digits, v.y(), digits, v.z(), digits);
+}
+
+SectionEdit target_section(const TargetEstimate& estimate, const TargetDescription& target) {
+  const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+  const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
+  std::string tags;
+  for (std::size_t t = 0; t < target.tags.size(); ++t) {
+    const Eigen::Isometry3d pose = platform.inverse() * estimate.camera_T_tag[t];
+    tags += fmt::format(
+        "{}{{id: {}, position_mm: {}, rotation_rad: {},\n  position_sigma_mm: {}, "
+        "rotation_sigma_rad: {}}}",
+        t == 0 ? "[" : ",\n ", target.tags[t].id, list(pose.translation() * 1e3, 6),
+        list(rotation_to_vector(pose.linear()), 7), list(sigmas[t].head<3>() * 1e3, 6),
+        list(sigmas[t].tail<3>(), 7));
+  }
+  return {"target", {{"tags", tags + "]"}}};
+}
+
+/// Beside the sensor.yaml, whatever links to it. Not .png: the folder may be one of frames.
+fs::path appearance_of(const fs::path& sensor) {
+  std::error_code error;
+  fs::path real = fs::is_symlink(sensor, error) ? fs::weakly_canonical(sensor) : sensor;
+  return real += ".rest";
+}
+
+/// As sensor.yaml names it: relative to itself, unless it is known under a link elsewhere.
+std::string appearance_name(const fs::path& sensor, const fs::path& appearance) {
+  const bool beside = appearance.parent_path() == sensor.parent_path();
+  std::string name = "'";
+  for (const char c : (beside ? appearance.filename() : fs::absolute(appearance)).string())
+    name += c == '\'' ? std::string("''") : std::string(1, c);
+  return name + "'";
+}
+
+SectionEdit rest_section(const TargetEstimate& estimate, const RestImage& image,
+                         const std::string& appearance) {
+  const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+  return {"rest",
+          {{"frames", fmt::format("{}", image.frames)},
+           {"position_mm", list(platform.translation() * 1e3, 6)},
+           {"rotation_rad", "[0, 0, 0]"},
+           {"appearance", appearance}}};
+}
+
+/// Both files or neither: the picture belongs to the poses.
+void write(const fs::path& sensor, const std::string& text, const fs::path& appearance,
+           const TargetEstimate& estimate, const TargetDescription& target,
+           const RestImage& image) {
+  std::error_code error;
+  std::optional<std::string> before;
+  if (fs::exists(appearance, error)) before = read_text(appearance);
+  save_rest_image(appearance, image);
+  try {
+    write_sensor(text,
+                 {target_section(estimate, target),
+                  rest_section(estimate, image, appearance_name(sensor, appearance))},
+                 sensor);
+  } catch (...) {
+    if (before) {
+      write_atomically(appearance, *before);
+    } else {
+      fs::remove(appearance, error);
+    }
+    throw;
+  }
+}
+
+int stopped() {
+  tell("stopped; nothing was written");
+  return kStopped;
+}
+
+}  // namespace
+
+int calibrate_target(const CalibrateTargetOptions& options) {
+  const fs::path sensor_file = options.out.empty() ? options.sensor : options.out;
+  const fs::path appearance = appearance_of(sensor_file);
+  const std::string text = read_text(options.sensor);
+  check_replaceable(sensor_file);
+  check_replaceable(appearance);
+  const Input input = open_input({options.sensor, options.source, true});
+  check_size(input);
+  const SensorConfig& sensor = input.sensor;
+  const UniqueFd stop = signals_as_fd();
+  TargetRecorder record(sensor.camera, sensor.target, sensor.rest, kMostKeyframes);
+  tell("source: " + input.source->format().description);
+  tell(fmt::format("hands off until {} frames at rest are taken", sensor.rest.frames));
+  if (!watch(*input.source, options, stop, record)) return stopped();
+  check_record(record, sensor.target, sensor.rest);
+
+  tell(fmt::format("adjusting to {} pictures", record.keyframes().size()));
+  TimePoint said = Clock::now();
+  const TargetEstimate estimate =
+      TargetAdjuster(record.at_rest()).adjust(record.keyframes(), [&](double share) {
+        if (Clock::now() - said >= kSayEvery) {
+          said = Clock::now();
+          tell(fmt::format("{:.0f} %", 100 * share));
+        }
+        return !signalled(stop);
+      });
+  if (signalled(stop)) return stopped();
+  check_estimate(estimate, sensor.camera);
+  write(sensor_file, text, appearance, estimate, sensor.target, record.at_rest().image);
+  for (const std::string& line : describe(record, estimate, sensor.target, sensor.camera))
+    tell(line);
+  tell(fmt::format("written: {} and {}", sensor_file.string(), appearance.string()));
+  return 0;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,21 @@
+// What the sensor looks like at rest, as a picture file: 16-bit grey PNG, 256 counts for each grey
+// level, the size of the camera's frames, under any name. The number of frames that it averages is
+// sensor.yaml's rest.frames.
+#pragma once
+
+#include <filesystem>
+
+#include "host/tracker/camera_model.h"
+#include "host/tracker/target.h"
+
+namespace tagwrench {
+
+/// Leaves `frames` at zero. Throws ConfigError, one line with path and remedy: no such file, no
+/// PNG, damaged, not 16-bit grey, not of the camera's size.
+RestImage load_rest_image(const std::filesystem::path& path, const CameraModel& camera);
+
+/// Replaces the file as a whole or not at all. Throws std::runtime_error if it cannot be written,
+/// std::invalid_argument for an image whose size and levels do not agree.
+void save_rest_image(const std::filesystem::path& path, const RestImage& image);
+
+}  // namespace tagwrench

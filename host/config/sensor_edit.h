@@ -1,0 +1,47 @@
+// What calibration learned, written back into a sensor.yaml that people wrote: the keys that
+// changed are replaced in the text, everything else (comments, order, other sections) stays byte
+// for byte.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tagwrench {
+
+struct YamlEntry {
+  std::string key;
+  /// YAML flow notation: `805.0`, `[1, 2]`, `{a: 1}`. Further lines of a list or mapping are
+  /// indented to fit.
+  std::string value;
+};
+
+/// The keys of one top-level section that are to have new values.
+struct SectionEdit {
+  std::string section;
+  std::vector<YamlEntry> entries;
+};
+
+/// `yaml` with the entries of `edit` in place of, or beside, those that its section has; a section
+/// that is missing is added at the end. Works on block and flow notation. Throws ConfigError,
+/// naming `name`, if the text is not a YAML mapping or the section is no mapping.
+std::string with_keys(std::string_view yaml, const SectionEdit& edit, const std::string& name);
+
+/// Throws ConfigError unless `path` (or what it links to) is a regular file that can be replaced,
+/// or a new name in a folder that can be written.
+void check_replaceable(const std::filesystem::path& path);
+
+/// Replaces the file as a whole: a reader sees the old text or the new one, never a part. Follows a
+/// symbolic link and keeps the permissions. Throws std::runtime_error, and leaves the old file.
+void write_atomically(const std::filesystem::path& path, std::string_view text);
+
+/// The edited text of sensor.yaml, checked as load_sensor would check it at `to`, then written
+/// there. Throws ConfigError (nothing written) if the result would not be a usable sensor.yaml.
+void write_sensor(std::string yaml, const std::vector<SectionEdit>& edits,
+                  const std::filesystem::path& to);
+
+/// The text of a file, whatever it holds. Throws ConfigError if it cannot be read.
+std::string read_text(const std::filesystem::path& path);
+
+}  // namespace tagwrench

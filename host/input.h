@@ -1,0 +1,47 @@
+// Where the frames of a command come from: SRC and sensor.yaml to the objects, and the signals that
+// end a command.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "host/config/sensor_config.h"
+#include "host/os/unique_fd.h"
+#include "host/source/frame_source.h"
+
+namespace tagwrench {
+
+struct Spec {
+  std::string kind;
+  std::string argument;
+};
+
+/// "kind:argument", or "kind".
+Spec split_spec(const std::string& spec);
+
+struct InputOptions {
+  std::string sensor;  ///< path of sensor.yaml; empty: what the source suggests
+  std::string source;  ///< SRC
+  bool fast = false;   ///< sources that are not live run as fast as they can, no frame dropped
+};
+
+/// A source and the sensor that it shows.
+struct Input {
+  SensorConfig sensor;
+  std::unique_ptr<FrameSource> source;
+};
+
+/// Throws ConfigError if the source is none, cannot be opened, or the sensor cannot be used.
+Input open_input(const InputOptions& options);
+
+/// sensor.yaml of the paper's sensor with nominal lens: what a fresh build comes closest to.
+std::string paper_sensor_yaml();
+
+/// Throws ConfigError unless the source's frames have the size that the sensor's camera has.
+void check_size(const Input& input);
+
+/// Ctrl-C, kill and a closed terminal no longer end the program at once; the descriptor is readable
+/// once one of them has come.
+UniqueFd signals_as_fd();
+
+}  // namespace tagwrench

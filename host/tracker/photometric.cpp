@@ -1,0 +1,350 @@
+#include "host/tracker/photometric.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "host/tracker/projection.h"
+#include "host/tracker/rotation.h"
+
+namespace tagwrench {
+namespace {
+
+/// Tukey's biweight, cut at this many standard deviations, and what it makes of normal errors: the
+/// mean weight, the mean of weight times square, and the variance of the estimate relative to least
+/// squares (all by numerical integration).
+constexpr double kTukey = 6.0;
+constexpr double kMeanWeight = 0.9468;
+constexpr double kMeanWeightedSquare = 0.8449;
+constexpr double kVarianceFactor = 1.0193;
+
+/// A patch is believed when its residuals are at most this many times the typical ones and most of
+/// its pixels count.
+constexpr double kWorstPatch = 3.0;
+constexpr float kLeastWeights = 0.7F;
+constexpr float kLeastInside = 0.7F;
+/// A tag is held when this part of its pixels is believed.
+constexpr double kLeastTagPart = 0.35;
+/// The typical patch is the one at this rank from below: more than half of them may be covered.
+constexpr double kTypicalRank = 0.3;
+
+constexpr int kMostSteps = 10;
+/// Squared sizes of steps, in standard deviations, all parameters together. A step shrinks to a few
+/// percent of the one before, squared: after one as small as kSmallStep there is nothing left to
+/// gain. Below kNearStep residuals tell which patches to believe; below kKeepStep pairs of pixels
+/// stay.
+constexpr double kSmallStep = 0.3;
+constexpr double kNearStep = 400;
+constexpr double kKeepStep = 1000;
+
+/// How far light and blur may stray before the fit is pulled back: standard deviations of gain, its
+/// slopes, offset (grey levels), blur (px^2) and its slope (px^2 per kDepthUnit).
+constexpr double kGainPrior = 0.5;
+constexpr double kGainSlopePrior = 0.2;
+constexpr double kOffsetPrior = 30;
+constexpr double kBlurPrior = 1.0;
+constexpr double kBlurSlopePrior = 0.5;
+
+constexpr double squared(double v) { return v * v; }
+
+Eigen::Matrix<double, kLightParameters, 1> light_prior() {
+  return {1 / squared(kGainPrior), 1 / squared(kGainSlopePrior), 1 / squared(kGainSlopePrior),
+          1 / squared(kOffsetPrior)};
+}
+
+}  // namespace
+
+void PhotometricAligner::set_template(PixelTemplate pixels) {
+  template_ = std::move(pixels);
+  const std::size_t patches = template_.patches.size();
+  views_.assign(patches, {});
+  sums_.assign(patches, {});
+  pairs_ = PixelPairs(template_.size());
+  good_.assign(patches, 1);
+  scratch_.assign(patches, 0);
+  pixel_motion_.assign(patches, Eigen::Matrix<double, 2, kMotionParameters>::Zero());
+  template_per_image_.assign(patches, Eigen::Matrix2d::Identity());
+}
+
+void PhotometricAligner::view_patches(const Eigen::Isometry3d& pose, const Vector6& velocity,
+                                      const PhotometricState& state) noexcept {
+  const bool rolling = template_.readout > 0;
+  Eigen::Isometry3d at = pose;
+  for (std::size_t n = 0; n < views_.size(); ++n) {
+    const PixelPatch& patch = template_.patches[n];
+    if (rolling) {
+      const double row = project(template_.camera, pose * patch.middle).pixel.y();
+      const double delay = template_.readout * (row / template_.camera.height_px - 0.5);
+      at = moved(pose, delay * velocity);
+    }
+    PatchView& view = views_[n];
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c)
+        view.camera_R_platform[static_cast<std::size_t>(3 * r + c)] =
+            static_cast<float>(at.linear()(r, c));
+      view.camera_t_platform[static_cast<std::size_t>(r)] =
+          static_cast<float>(at.translation()[r]);
+    }
+    const PhotometricState::Light& light = state.light[patch.tag];
+    for (std::size_t k = 0; k < 3; ++k) view.gain[k] = static_cast<float>(light.gain[k]);
+    view.offset = static_cast<float>(light.offset);
+    for (std::size_t k = 0; k < 2; ++k) view.blur[k] = static_cast<float>(state.blur[k]);
+
+    const ProjectedPoint seen = project(template_.camera, at * patch.middle);
+    Eigen::Matrix2d image_per_template;
+    image_per_template << project(template_.camera, at * patch.right).pixel - seen.pixel,
+        project(template_.camera, at * patch.below).pixel - seen.pixel;
+    const double area = image_per_template.determinant();
+    const bool sensible = area > 0.1 && area < 10;
+    const Eigen::Matrix2d back =
+        sensible ? Eigen::Matrix2d(image_per_template.inverse()) : Eigen::Matrix2d::Identity();
+    template_per_image_[n] = back;
+    view.template_per_image = {static_cast<float>(back(0, 0)), static_cast<float>(back(0, 1)),
+                               static_cast<float>(back(1, 0)), static_cast<float>(back(1, 1))};
+    const Eigen::Vector3d lever = at.linear() * patch.middle;
+    pixel_motion_[n].leftCols<3>() = back * seen.jacobian;
+    pixel_motion_[n].rightCols<3>() = -pixel_motion_[n].leftCols<3>() * cross_matrix(lever);
+  }
+}
+
+/// RMS of whitened residuals in a patch that is as it should be; 0 when none is in view.
+double PhotometricAligner::typical_residual() noexcept {
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    if (sums_[n].inside >= kLeastInside * static_cast<float>(template_.patches[n].pixels))
+      scratch_[count++] = sums_[n].squares / std::max(1.0F, sums_[n].weights);
+  }
+  if (count == 0) return 0;
+  const auto at = scratch_.begin() +
+                  static_cast<std::ptrdiff_t>(kTypicalRank * static_cast<double>(count - 1));
+  std::nth_element(scratch_.begin(), at, scratch_.begin() + static_cast<std::ptrdiff_t>(count));
+  return std::sqrt(static_cast<double>(*at));
+}
+
+/// A covered or dazzled patch is left out, and so is a tag of which little is left.
+void PhotometricAligner::judge_patches(double typical, bool near) noexcept {
+  const auto worst = static_cast<float>(squared(kWorstPatch * std::max(1.0, typical)));
+  std::array<double, kMaxTags> all{};
+  std::array<double, kMaxTags> believed{};
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    const PatchSums& s = sums_[n];
+    const PixelPatch& patch = template_.patches[n];
+    bool good = s.inside >= kLeastInside * static_cast<float>(patch.pixels);
+    if (near && good)
+      good = s.squares < worst * s.weights && s.weights > kLeastWeights * s.inside;
+    good_[n] = good ? 1 : 0;
+    all[patch.tag] += static_cast<double>(patch.pixels);
+    if (good) believed[patch.tag] += static_cast<double>(patch.pixels);
+  }
+  if (!near) return;
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    const std::size_t tag = template_.patches[n].tag;
+    if (believed[tag] < kLeastTagPart * all[tag]) good_[n] = 0;
+  }
+}
+
+/// The normal equations of the good patches at the pose and with the weights of the last look,
+/// light eliminated tag by tag. False when they do not determine the motion.
+bool PhotometricAligner::factorise() noexcept {
+  std::array<PatchMatrix, kMaxTags> sums;
+  for (std::size_t t = 0; t < template_.tags; ++t) sums[t].setZero();
+  for (std::size_t n = 0; n < good_.size(); ++n) {
+    if (good_[n] == 0) continue;
+    const PixelPatch& patch = template_.patches[n];
+    const double weight = sums_[n].weights / static_cast<double>(patch.pixels);
+    const Eigen::Matrix<double, 2, kMotionParameters>& motion = pixel_motion_[n];
+    PatchMatrix& sum = sums[patch.tag];
+    sum.topLeftCorner<kMotionParameters, kMotionParameters>() +=
+        weight * (motion.transpose() * patch.gradient * motion);
+    sum.topRightCorner<kMotionParameters, kNuisanceParameters>() +=
+        weight * (motion.transpose() * patch.gradient_nuisance);
+    sum.bottomRightCorner<kNuisanceParameters, kNuisanceParameters>() += weight * patch.nuisance;
+  }
+  SharedMatrix shared = SharedMatrix::Zero();
+  shared(6, 6) = 1 / squared(kBlurPrior);
+  shared(7, 7) = 1 / squared(kBlurSlopePrior);
+  for (std::size_t t = 0; t < template_.tags; ++t) {
+    PatchMatrix& all = sums[t];
+    all.bottomLeftCorner<kNuisanceParameters, kMotionParameters>() =
+        all.topRightCorner<kMotionParameters, kNuisanceParameters>().transpose();
+    TagSystem& tag = tag_systems_[t];
+    LightMatrix light = all.bottomRightCorner<kLightParameters, kLightParameters>();
+    light.diagonal() += light_prior();
+    tag.light_inverse = light.ldlt().solve(LightMatrix::Identity());
+    tag.coupling = all.topRightCorner<kSharedParameters, kLightParameters>();
+    tag.eliminate = tag.coupling * tag.light_inverse;
+    shared += all.topLeftCorner<kSharedParameters, kSharedParameters>() -
+              tag.eliminate * tag.coupling.transpose();
+  }
+  SharedVector unit;  // metres and radians to like size
+  unit << 1e-3, 1e-3, 1e-3, 0.05, 0.05, 0.05, 1, 1;
+  const SharedMatrix scaled = unit.asDiagonal() * shared * unit.asDiagonal();
+  const Eigen::LDLT<SharedMatrix> ldlt(scaled);
+  if (ldlt.info() != Eigen::Success || !ldlt.isPositive() || !(ldlt.rcond() > 1e-12)) return false;
+  inverse_ = unit.asDiagonal() * ldlt.solve(SharedMatrix::Identity()) * unit.asDiagonal();
+  return inverse_.allFinite();
+}
+
+PhotometricAligner::Step PhotometricAligner::step(PhotometricFit& fit,
+                                                  PhotometricState& state) noexcept {
+  std::array<PatchVector, kMaxTags> right;
+  for (std::size_t t = 0; t < template_.tags; ++t) right[t].setZero();
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    if (good_[n] == 0) continue;
+    right[template_.patches[n].tag] +=
+        Eigen::Map<const Eigen::Matrix<float, kPatchParameters, 1>>(sums_[n].right.data())
+            .cast<double>();
+  }
+  SharedVector shared = SharedVector::Zero();
+  shared[6] = -state.blur[0] / squared(kBlurPrior);
+  shared[7] = -state.blur[1] / squared(kBlurSlopePrior);
+  for (std::size_t t = 0; t < template_.tags; ++t) {
+    const PhotometricState::Light& light = state.light[t];
+    const LightVector stray(light.gain[0] - 1, light.gain[1], light.gain[2], light.offset);
+    right[t].tail<kLightParameters>() += light_prior().cwiseProduct(stray);
+    shared += right[t].head<kSharedParameters>() -
+              tag_systems_[t].eliminate * right[t].tail<kLightParameters>();
+  }
+  const SharedVector delta = inverse_ * shared;
+  if (!delta.allFinite()) return {};
+  for (std::size_t t = 0; t < template_.tags; ++t) {
+    // Light acts on the image here, and in the equations on the template: hence the sign.
+    const LightVector light =
+        tag_systems_[t].light_inverse *
+        (right[t].tail<kLightParameters>() - tag_systems_[t].coupling.transpose() * delta);
+    for (int k = 0; k < 3; ++k) state.light[t].gain[static_cast<std::size_t>(k)] -= light[k];
+    state.light[t].offset -= light[3];
+  }
+  state.blur[0] += delta[6];
+  state.blur[1] += delta[7];
+  // The template moved by delta would look like the image: the platform has moved the other way.
+  fit.camera_T_platform = moved(fit.camera_T_platform, -delta.head<6>());
+  return {fit.camera_T_platform.matrix().allFinite(), shared.dot(delta)};
+}
+
+PhotometricFit PhotometricAligner::align(const PixelWindow& image,
+                                         const Eigen::Isometry3d& predicted,
+                                         const Vector6& velocity,
+                                         PhotometricState& state) noexcept {
+  PhotometricFit fit;
+  fit.camera_T_platform = predicted;
+  if (!ready()) return fit;
+  PhotometricState now = state;
+  float inverse_cut = 0;
+  double step_size = 1e30;
+  for (int i = 0; i < kMostSteps; ++i) {
+    view_patches(fit.camera_T_platform, velocity, now);
+    sum_patches(template_, image, views_, inverse_cut, step_size < kKeepStep, pairs_, sums_);
+    const double typical = typical_residual();
+    if (!(typical > 0)) return fit;
+    judge_patches(typical, step_size < kNearStep);
+    if (!factorise()) return fit;
+    const Step taken = step(fit, now);
+    if (!taken.solved) return fit;
+    // Two small looks in a row: the patches were judged, and the judgement was used.
+    const bool judged = step_size < kNearStep;
+    step_size = taken.squared_size;
+    inverse_cut = static_cast<float>(1.0 / (kTukey * std::max(1.0, typical)));
+    if (judged && step_size < kSmallStep) {
+      fit.converged = true;
+      break;
+    }
+  }
+  if (!fit.converged) return fit;
+  state = now;
+  renormalise(fit.camera_T_platform);
+  conclude(fit);
+  return fit;
+}
+
+/// Covariance and quality from the last look.
+///
+/// White noise would give variance * inverse. Residuals that are alike over a patch (unmodelled
+/// texture, light, blur) move the fit more: each patch's pull on the motion is added up as the
+/// sandwich estimator for clustered errors does (Liang and Zeger, Biometrika 73(1), 1986), and the
+/// covariance grows by the mean ratio, which is far less noisy than the sandwich itself.
+void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
+  double squares = 0, weights = 0, inside = 0, all = 0, believed = 0, noise = 0;
+  std::array<bool, kMaxTags> held{};
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    const PixelPatch& patch = template_.patches[n];
+    all += static_cast<double>(patch.pixels);
+    if (good_[n] == 0) continue;
+    believed += static_cast<double>(patch.pixels);
+    squares += sums_[n].squares;
+    weights += sums_[n].weights;
+    inside += sums_[n].inside;
+    noise += patch.mean_noise * sums_[n].inside;
+    held[patch.tag] = true;
+  }
+  fit.good = believed / all;
+  fit.residual = std::sqrt(squares / inside / kMeanWeightedSquare);
+  fit.residual_part = fit.residual * (noise / inside) / template_.contrast;
+  for (const bool h : held) fit.tags_held = static_cast<std::uint8_t>(fit.tags_held + (h ? 1 : 0));
+
+  const double variance = std::max(1.0, squared(fit.residual)) * (1.0 + 1.0 / template_.frames);
+  // inverse_ is of the weighted equations.
+  const Matrix6 white =
+      variance * kVarianceFactor * kMeanWeight * inverse_.topLeftCorner<6, 6>();
+  const Matrix6 information = white.inverse();
+  double ratio = 0;
+  double patches = 0;
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    if (good_[n] == 0) continue;
+    const PatchVector right =
+        Eigen::Map<const Eigen::Matrix<float, kPatchParameters, 1>>(sums_[n].right.data())
+            .cast<double>();
+    const TagSystem& tag = tag_systems_[template_.patches[n].tag];
+    const SharedVector pull = right.head<kSharedParameters>() -
+                              tag.eliminate * right.tail<kLightParameters>();
+    const Vector6 moves = inverse_.topRows<6>() * pull;
+    ratio += moves.dot(information * moves) / 6.0;
+    ++patches;
+  }
+  // The fit has taken its own part out of the residuals.
+  if (patches > kSharedParameters) ratio *= patches / (patches - kSharedParameters);
+  fit.covariance = std::max(1.0, ratio) * white;
+  if (!fit.covariance.allFinite()) fit.converged = false;
+}
+
+Region PhotometricAligner::region(const Eigen::Isometry3d& pose, int margin_px) const noexcept {
+  double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
+  for (const PixelPatch& patch : template_.patches) {
+    const ProjectedPoint p = project(template_.camera, pose * patch.middle);
+    if (!p.valid || !p.pixel.allFinite()) return {};
+    left = std::min(left, p.pixel.x() - patch.reach_px);
+    right = std::max(right, p.pixel.x() + patch.reach_px);
+    top = std::min(top, p.pixel.y() - patch.reach_px);
+    bottom = std::max(bottom, p.pixel.y() + patch.reach_px);
+  }
+  const auto whole = [&](double v, int most) {
+    return static_cast<int>(std::clamp(v, 0.0, static_cast<double>(most)));
+  };
+  Region out;
+  out.x = whole(std::floor(left) - margin_px, template_.camera.width_px);
+  out.y = whole(std::floor(top) - margin_px, template_.camera.height_px);
+  out.width = whole(std::ceil(right) + margin_px + 1, template_.camera.width_px) - out.x;
+  out.height = whole(std::ceil(bottom) + margin_px + 1, template_.camera.height_px) - out.y;
+  return out;
+}
+
+Vector6 PhotometricAligner::motion_of(const Eigen::Isometry3d& pose,
+                                      std::span<const Eigen::Vector2d> shifts) {
+  view_patches(pose, Vector6::Zero(), {});
+  Matrix6 normal = Matrix6::Zero();
+  Vector6 right = Vector6::Zero();
+  for (std::size_t n = 0; n < template_.patches.size(); ++n) {
+    const Eigen::Matrix2d& gradient = template_.patches[n].gradient;
+    const Eigen::Vector2d shift = template_per_image_[n] * shifts[n];
+    normal += pixel_motion_[n].transpose() * gradient * pixel_motion_[n];
+    right += pixel_motion_[n].transpose() * gradient * shift;
+  }
+  Vector6 unit;
+  unit << 1e-3, 1e-3, 1e-3, 0.05, 0.05, 0.05;
+  const Matrix6 scaled = unit.asDiagonal() * normal * unit.asDiagonal();
+  return unit.asDiagonal() * scaled.ldlt().solve(unit.asDiagonal() * right);
+}
+
+}  // namespace tagwrench

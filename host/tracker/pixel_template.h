@@ -1,0 +1,109 @@
+// What the target looked like at rest, pixel by pixel: those pixels of the averaged rest image that
+// tell something about the pose, as points on the tags' planes with all that one step of alignment
+// needs, laid out for vector units.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <span>
+#include <vector>
+
+#include "host/tracker/camera_model.h"
+#include "host/tracker/edge_measure.h"
+#include "host/tracker/edges.h"
+#include "host/types.h"
+
+namespace tagwrench {
+
+/// Parameters of the linear model of one patch, in this order: motion of the platform (camera axes,
+/// m and rad; see rotation.h), blur (2), light of the patch's tag (4). The residual image
+/// is explained by
+///   motion   gradient times image motion,
+///   blur     the Laplacian, times 1 and times depth: a Gaussian point spread whose variance grows
+///            by 2 b adds b times the Laplacian (heat equation) and, to second order, b^2 / 2 times
+///            the Laplacian of that; defocus changes the variance in proportion to depth,
+///   light    gain times (1, x, y) over the tag, and an offset. An offset with slopes would cost a
+///            fifth of the precision.
+constexpr int kMotionParameters = 6;
+constexpr int kBlurParameters = 2;
+constexpr int kLightParameters = 4;
+constexpr int kSharedParameters = kMotionParameters + kBlurParameters;
+constexpr int kPatchParameters = kSharedParameters + kLightParameters;
+
+constexpr int kNuisanceParameters = kBlurParameters + kLightParameters;
+
+using PatchVector = Eigen::Matrix<double, kPatchParameters, 1>;
+using PatchMatrix = Eigen::Matrix<double, kPatchParameters, kPatchParameters>;
+
+/// Variance of a pixel's noise, grey levels squared: constant + slope * level.
+struct PixelNoise {
+  double constant = 4.0;
+  double slope = 0.0;
+  double variance(double level) const;
+};
+
+/// Of the depth on which blur depends, m.
+constexpr double kDepthUnit = 1e-3;
+
+/// Runs of pixels start and end at multiples of this; padding has weight 0.
+constexpr std::size_t kRun = 16;
+
+/// One number for each pixel.
+using PixelArray = std::vector<float>;
+
+struct PixelPatch {
+  std::size_t first = 0;  ///< pixel
+  std::size_t count = 0;  ///< multiple of kRun
+  std::size_t pixels = 0; ///< of these, not padding
+  std::size_t tag = 0;
+  double reach_px = 0;    ///< of the pixels from the middle one, along either axis
+  double mean_noise = 0;  ///< standard deviation, grey levels
+  /// On the tag's plane, platform frame: what the patch's middle pixel shows, and the pixels one to
+  /// its right and one below.
+  Eigen::Vector3d middle, right, below;
+  /// Sums of products of whitened columns: of the gradient (2), from which the motion's follow for
+  /// any pose, and of blur and light.
+  Eigen::Matrix2d gradient = Eigen::Matrix2d::Zero();
+  Eigen::Matrix<double, 2, kNuisanceParameters> gradient_nuisance =
+      Eigen::Matrix<double, 2, kNuisanceParameters>::Zero();
+  Eigen::Matrix<double, kNuisanceParameters, kNuisanceParameters> nuisance =
+      Eigen::Matrix<double, kNuisanceParameters, kNuisanceParameters>::Zero();
+};
+
+struct PixelTemplate {
+  CameraModel camera;  ///< of the raw image: fx is negative in a mirrored one
+  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();  ///< when it was learned
+  int frames = 1;                                                       ///< averaged
+  double readout = 0;   ///< of a rolling shutter, from the first to the last row, s
+  double contrast = 0;  ///< between the darkest and the brightest pixels, grey levels
+  std::size_t tags = 0;
+  std::vector<PixelPatch> patches;
+
+  PixelArray x, y, z;                   ///< platform frame, m
+  std::array<PixelArray, 10> level;     ///< PixelPolynomial, grey levels
+  PixelArray weight;                    ///< 1 / standard deviation of the noise
+  PixelArray depth;                     ///< at rest, from the platform's origin, kDepthUnit
+  PixelArray bilaplacian;               ///< Laplacian of the Laplacian, of the smoothed image
+  PixelArray across, down;              ///< place on the tag, -1..1
+
+  std::size_t size() const { return x.size(); }
+};
+
+/// The camera of the image as it is delivered, flipped or not.
+CameraModel raw_camera(const CameraModel& camera);
+
+struct PixelTemplateOptions {
+  std::size_t most_pixels = 8192;
+  double least_information = 0.98;  ///< stop choosing pixels when they carry this part
+};
+
+/// Chooses the pixels. `mean` is the averaged rest image as delivered (not flipped).
+/// The planes come from `target`, whose pose at rest is camera_T_platform. Empty patches when
+/// nothing is visible.
+PixelTemplate make_pixel_template(const CameraModel& camera, const PixelView<float>& mean,
+                                  int frames, const PixelNoise& noise,
+                                  std::span<const TagPattern> patterns, const EdgeTarget& target,
+                                  const Eigen::Isometry3d& camera_T_platform,
+                                  const PixelTemplateOptions& options);
+
+}  // namespace tagwrench

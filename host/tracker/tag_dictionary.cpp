@@ -1,0 +1,63 @@
+#include "host/tracker/tag_dictionary.h"
+
+#include <array>
+
+#include "host/grid_tags.h"
+#include "host/tracker/tag_patterns.h"
+
+namespace tagwrench {
+namespace {
+
+/// OpenCV's dictionaries in the order of TagFamily; its last, grid_10x10, is ours.
+constexpr std::array<cv::aruco::PREDEFINED_DICTIONARY_NAME, kTagFamilies - 1> kPredefined = {
+    cv::aruco::DICT_ARUCO_ORIGINAL, cv::aruco::DICT_4X4_50,         cv::aruco::DICT_4X4_100,
+    cv::aruco::DICT_4X4_250,        cv::aruco::DICT_4X4_1000,       cv::aruco::DICT_5X5_50,
+    cv::aruco::DICT_5X5_100,        cv::aruco::DICT_5X5_250,        cv::aruco::DICT_5X5_1000,
+    cv::aruco::DICT_6X6_50,         cv::aruco::DICT_6X6_100,        cv::aruco::DICT_6X6_250,
+    cv::aruco::DICT_6X6_1000,       cv::aruco::DICT_7X7_50,         cv::aruco::DICT_7X7_100,
+    cv::aruco::DICT_7X7_250,        cv::aruco::DICT_7X7_1000,       cv::aruco::DICT_APRILTAG_16h5,
+    cv::aruco::DICT_APRILTAG_25h9,  cv::aruco::DICT_APRILTAG_36h10, cv::aruco::DICT_APRILTAG_36h11,
+};
+
+cv::Ptr<cv::aruco::Dictionary> grid_dictionary() {
+  cv::Mat bytes;
+  for (int id = 0; id < kGridIds; ++id) {
+    cv::Mat bits(kGridCells, kGridCells, CV_8UC1);
+    for (int row = 0; row < kGridCells; ++row) {
+      for (int column = 0; column < kGridCells; ++column) {
+        bits.at<std::uint8_t>(row, column) = grid_is_white(id, row, column) ? 1 : 0;
+      }
+    }
+    bytes.push_back(cv::aruco::Dictionary::getByteListFromBits(bits));
+  }
+  return cv::makePtr<cv::aruco::Dictionary>(bytes, kGridCells, (kGridDistance - 1) / 2);
+}
+
+}  // namespace
+
+cv::Ptr<cv::aruco::Dictionary> tag_dictionary(TagFamily family) {
+  if (family == TagFamily::grid_10x10) return grid_dictionary();
+  return cv::aruco::getPredefinedDictionary(kPredefined[static_cast<std::size_t>(family)]);
+}
+
+TagPattern tag_pattern(TagFamily family, int id, double size, double border) {
+  const cv::Ptr<cv::aruco::Dictionary> dictionary = tag_dictionary(family);
+  const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
+      dictionary->bytesList.rowRange(id, id + 1), dictionary->markerSize);
+  TagPattern pattern;
+  pattern.id = id;
+  pattern.cells = dictionary->markerSize + 2;
+  pattern.size = size;
+  pattern.border = border;
+  pattern.white.assign(
+      static_cast<std::size_t>(pattern.cells) * static_cast<std::size_t>(pattern.cells), 0);
+  for (int row = 0; row < bits.rows; ++row) {
+    for (int column = 0; column < bits.cols; ++column) {
+      pattern.white[static_cast<std::size_t>((row + 1) * pattern.cells + column + 1)] =
+          bits.at<std::uint8_t>(row, column);
+    }
+  }
+  return pattern;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,13 @@
+// The cells of a tag as printed. Uses OpenCV inside, for its tables of bits.
+#pragma once
+
+#include "host/tracker/edges.h"
+#include "host/tracker/target.h"
+
+namespace tagwrench {
+
+/// The tag of this id, `size` (edge of the black square) and `border` (white margin) in m. The id
+/// must be one of the family's: 0 to id_count(family) - 1.
+TagPattern tag_pattern(TagFamily family, int id, double size, double border);
+
+}  // namespace tagwrench

@@ -1,0 +1,100 @@
+// `tagwrench calibrate target` as its users run it.
+#include <gtest/gtest.h>
+
+#include "host/config/sensor_config.h"
+#include "tests/cli/bridge.h"
+
+namespace tagwrench::test {
+namespace {
+
+class CalibrateTarget : public testing::Test {
+ protected:
+  // A rendered folder, and a sensor.yaml of its owner's beside it.
+  void render(const std::string& scenario, int frames) {
+    write_file(temporary_ / "scenario.yaml", scenario);
+    const Outcome sim = run_bridge({"sim", "--scenario", temporary_ / "scenario.yaml", "--out",
+                                    temporary_ / "frames", "--frames", std::to_string(frames)});
+    ASSERT_EQ(sim.status, 0) << sim.err;
+    write_file(sensor_, "# mine\n" + read_file(temporary_ / "frames" / "sensor.yaml"));
+  }
+  Outcome calibrate(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {
+        "calibrate", "target",   "--sensor",
+        sensor_,     "--source", "images:" + (temporary_ / "frames").string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_bridge(arguments);
+  }
+  void expect_refused(const Outcome& outcome, const std::string& part) {
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    const std::size_t last = outcome.err.rfind("tagwrench: ");
+    ASSERT_NE(last, std::string::npos);
+    EXPECT_NE(outcome.err.find(part, last), std::string::npos)
+        << "no '" << part << "' in the last line of: " << outcome.err;
+    EXPECT_EQ(read_file(sensor_), before_);
+    EXPECT_FALSE(std::filesystem::exists(temporary_ / "sensor.yaml.rest"));
+  }
+
+  TemporaryFolder temporary_;
+  std::filesystem::path sensor_ = temporary_ / "sensor.yaml";
+  std::string before_;
+};
+
+TEST_F(CalibrateTarget, WritesPlacesAndPictureThatRunCanUse) {
+  render("seed: 3\ntrajectory: {rest_s: 0.5}\n", 90);
+  const SensorConfig before = load_sensor(sensor_);
+  const Outcome outcome = calibrate();
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_NE(outcome.err.find("excited: x "), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("written: "), std::string::npos) << outcome.err;
+  EXPECT_EQ(read_file(sensor_).rfind("# mine\n", 0), 0u);
+
+  const SensorConfig after = load_sensor(sensor_);
+  EXPECT_EQ(after.camera.fx_px, before.camera.fx_px);
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Tag& tag : after.target.tags) {
+    ASSERT_TRUE(tag.platform_T_tag);
+    centre += tag.platform_T_tag->translation();
+    EXPECT_GT(tag.sigma.minCoeff(), 0);
+    EXPECT_LT(tag.sigma.head<3>().maxCoeff(), 10e-6);  // m
+    EXPECT_LT(tag.sigma.tail<3>().maxCoeff(), 2e-3);   // rad
+  }
+  EXPECT_LT(centre.norm(), 5e-9);  // m: the origin is their midpoint
+  ASSERT_TRUE(after.rest.camera_T_platform);
+  EXPECT_TRUE(after.rest.camera_T_platform->linear().isIdentity());
+  ASSERT_TRUE(after.rest.appearance);
+  EXPECT_EQ(after.rest.appearance->frames, after.rest.frames);
+
+  // Again, into a file of another name in another folder, over what is there already.
+  std::filesystem::create_directory(temporary_ / "other");
+  const std::filesystem::path copy = temporary_ / "other" / "it's mine.yaml";
+  ASSERT_EQ(calibrate({"--out", copy}).status, 0);
+  EXPECT_TRUE(load_sensor(copy).rest.appearance);
+  EXPECT_EQ(read_file(copy), [&] {
+    std::string same = read_file(sensor_);
+    const std::string name = "'sensor.yaml.rest'";
+    return same.replace(same.find(name), name.size(), "'it''s mine.yaml.rest'");
+  }());
+
+  const Outcome run =
+      run_bridge({"run", "--fast", "--source", "images:" + (temporary_ / "frames").string(),
+                  "--sensor", copy, "--output", "jsonl:" + (temporary_ / "o.jsonl").string()});
+  EXPECT_EQ(run.status, 0) << run.err;
+  const std::string samples = read_file(temporary_ / "o.jsonl");
+  EXPECT_NE(samples.find("\"status\":\"ok\""), std::string::npos);
+}
+
+TEST_F(CalibrateTarget, RefusesAndWritesNothing) {
+  render("seed: 3\ntrajectory: {rest_s: 0.5, motion: push, axis: fz}\n", 60);
+  before_ = read_file(sensor_);
+  expect_refused(calibrate(), "hardly moved");
+  expect_refused(calibrate({"--frames", "5"}), "rest of");
+  expect_refused(calibrate({"--out", temporary_ / "frames"}), "not a regular file");
+  expect_refused(run_bridge({"calibrate", "target", "--sensor", sensor_, "--source", "kinect"}),
+                 "kinect");
+  expect_refused(run_bridge({"calibrate", "target", "--sensor", sensor_}), "--source");
+}
+
+}  // namespace
+}  // namespace tagwrench::test
