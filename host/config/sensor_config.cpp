@@ -81,6 +81,15 @@ CameraRecord read_camera_record(YamlReader node) {
   return record;
 }
 
+double read_readout_ms(YamlReader& node) {
+  constexpr double kLongest = 200;
+  const double readout_ms = node.number_or("readout_ms", 0.0);
+  if (readout_ms < 0 || readout_ms > kLongest)
+    node.fail("readout_ms",
+              fmt::format("must be from 0 (all rows at once) to {}, is {}", kLongest, readout_ms));
+  return readout_ms;
+}
+
 CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record) {
   CameraModel camera;
   camera.width_px = node.integer("width", 16, 16384);
@@ -92,7 +101,7 @@ CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record) {
   const std::vector<double> distortion = node.numbers_or("distortion", std::vector<double>(5, 0.0));
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
   camera.mirrored = node.boolean_or("mirrored", false);
-  camera.readout = node.number_or("readout_ms", 0.0) * 1e-3;
+  camera.readout = read_readout_ms(node) * 1e-3;
   if (node.has("calibrated")) record = read_camera_record(node.child("calibrated"));
   node.finish();
   return camera;

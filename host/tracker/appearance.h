@@ -8,8 +8,8 @@ namespace tagwrench {
 
 /// Fits the platform's pose together with one ink spread for each tag (the distance by which black
 /// has grown on all sides) and moves the tags' edge points by it. Interior cells shrink where the
-/// outer square grows, which is what separates spread from distance. Fills the covariance of the pose
-/// (its motion, camera axes, m and rad) from what the residuals say. False when the fit fails.
+/// outer square grows, which is what separates spread from distance. Fills the covariance of the
+/// pose (its motion, camera axes, m and rad) from what the residuals say. False when the fit fails.
 bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, EdgeTarget& target,
                          Eigen::Isometry3d& camera_T_platform, Matrix6& covariance);
 

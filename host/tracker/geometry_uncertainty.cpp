@@ -9,9 +9,9 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kTry = 0.2e-3;       // m, displacement for the numeric derivative
-constexpr double kTryAngle = 0.01;    // rad
-constexpr double kTagTry = 20e-6;     // m, of a tag
+constexpr double kTry = 0.2e-3;        // m, displacement for the numeric derivative
+constexpr double kTryAngle = 0.01;     // rad
+constexpr double kTagTry = 20e-6;      // m, of a tag
 constexpr double kTagTryAngle = 2e-3;  // rad
 
 /// Where the line of sight through `p` (camera frame) meets the plane through `origin` with
@@ -49,8 +49,8 @@ void GeometryUncertainty::set(PhotometricAligner& aligner,
       centre /= count;
       Vector6 unit;
       unit << Eigen::Vector3d::Constant(kTagTry), Eigen::Vector3d::Constant(kTagTryAngle);
-      const Matrix6 scaled = unit.cwiseInverse().asDiagonal() * tag_covariance[t] *
-                             unit.cwiseInverse().asDiagonal();
+      const Matrix6 scaled =
+          unit.cwiseInverse().asDiagonal() * tag_covariance[t] * unit.cwiseInverse().asDiagonal();
       const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(scaled);
       for (int k = 0; k < 6; ++k) {
         const Vector6 error = unit.cwiseProduct(eigen.eigenvectors().col(k));
@@ -66,15 +66,14 @@ void GeometryUncertainty::set(PhotometricAligner& aligner,
           for (std::size_t n = 0; n < patches.size(); ++n) {
             const Eigen::Vector3d believed = camera_T_platform * patches[n].middle;
             const Eigen::Vector3d real =
-                patches[n].tag == t
-                    ? on_plane(believed, centre + error.head<3>(), turn * normal)
-                    : believed;
+                patches[n].tag == t ? on_plane(believed, centre + error.head<3>(), turn * normal)
+                                    : believed;
             const Eigen::Matrix3d rotation = rotation_from_vector(displacement.tail<3>());
             const Eigen::Vector3d real_origin = origin + origin_error;
             const Eigen::Vector3d now =
                 real_origin + displacement.head<3>() + rotation * (real - real_origin);
-            shifts[n] = project(camera, now).pixel -
-                        project(camera, displaced * patches[n].middle).pixel;
+            shifts[n] =
+                project(camera, now).pixel - project(camera, displaced * patches[n].middle).pixel;
           }
           part.slope[static_cast<std::size_t>(axis)].col(k) =
               size / displacement[axis] * aligner.motion_of(displaced, shifts);

@@ -50,8 +50,9 @@ constexpr double kBlurSlopePrior = 0.5;
 constexpr double squared(double v) { return v * v; }
 
 Eigen::Matrix<double, kLightParameters, 1> light_prior() {
-  return {1 / squared(kGainPrior), 1 / squared(kGainSlopePrior), 1 / squared(kGainSlopePrior),
-          1 / squared(kOffsetPrior)};
+  Eigen::Matrix<double, kLightParameters, 1> sigma;
+  sigma << kGainPrior, kGainSlopePrior, kGainSlopePrior, kGainSlopePrior, kOffsetPrior;
+  return sigma.cwiseAbs2().cwiseInverse();
 }
 
 }  // namespace
@@ -84,11 +85,10 @@ void PhotometricAligner::view_patches(const Eigen::Isometry3d& pose, const Vecto
       for (int c = 0; c < 3; ++c)
         view.camera_R_platform[static_cast<std::size_t>(3 * r + c)] =
             static_cast<float>(at.linear()(r, c));
-      view.camera_t_platform[static_cast<std::size_t>(r)] =
-          static_cast<float>(at.translation()[r]);
+      view.camera_t_platform[static_cast<std::size_t>(r)] = static_cast<float>(at.translation()[r]);
     }
     const PhotometricState::Light& light = state.light[patch.tag];
-    for (std::size_t k = 0; k < 3; ++k) view.gain[k] = static_cast<float>(light.gain[k]);
+    for (std::size_t k = 0; k < 4; ++k) view.gain[k] = static_cast<float>(light.gain[k]);
     view.offset = static_cast<float>(light.offset);
     for (std::size_t k = 0; k < 2; ++k) view.blur[k] = static_cast<float>(state.blur[k]);
 
@@ -117,8 +117,8 @@ double PhotometricAligner::typical_residual() noexcept {
       scratch_[count++] = sums_[n].squares / std::max(1.0F, sums_[n].weights);
   }
   if (count == 0) return 0;
-  const auto at = scratch_.begin() +
-                  static_cast<std::ptrdiff_t>(kTypicalRank * static_cast<double>(count - 1));
+  const auto at =
+      scratch_.begin() + static_cast<std::ptrdiff_t>(kTypicalRank * static_cast<double>(count - 1));
   std::nth_element(scratch_.begin(), at, scratch_.begin() + static_cast<std::ptrdiff_t>(count));
   return std::sqrt(static_cast<double>(*at));
 }
@@ -132,8 +132,7 @@ void PhotometricAligner::judge_patches(double typical, bool near) noexcept {
     const PatchSums& s = sums_[n];
     const PixelPatch& patch = template_.patches[n];
     bool good = s.inside >= kLeastInside * static_cast<float>(patch.pixels);
-    if (near && good)
-      good = s.squares < worst * s.weights && s.weights > kLeastWeights * s.inside;
+    if (near && good) good = s.squares < worst * s.weights && s.weights > kLeastWeights * s.inside;
     good_[n] = good ? 1 : 0;
     all[patch.tag] += static_cast<double>(patch.pixels);
     if (good) believed[patch.tag] += static_cast<double>(patch.pixels);
@@ -202,7 +201,8 @@ PhotometricAligner::Step PhotometricAligner::step(PhotometricFit& fit,
   shared[7] = -state.blur[1] / squared(kBlurSlopePrior);
   for (std::size_t t = 0; t < template_.tags; ++t) {
     const PhotometricState::Light& light = state.light[t];
-    const LightVector stray(light.gain[0] - 1, light.gain[1], light.gain[2], light.offset);
+    LightVector stray;
+    stray << light.gain[0] - 1, light.gain[1], light.gain[2], light.gain[3], light.offset;
     right[t].tail<kLightParameters>() += light_prior().cwiseProduct(stray);
     shared += right[t].head<kSharedParameters>() -
               tag_systems_[t].eliminate * right[t].tail<kLightParameters>();
@@ -214,8 +214,8 @@ PhotometricAligner::Step PhotometricAligner::step(PhotometricFit& fit,
     const LightVector light =
         tag_systems_[t].light_inverse *
         (right[t].tail<kLightParameters>() - tag_systems_[t].coupling.transpose() * delta);
-    for (int k = 0; k < 3; ++k) state.light[t].gain[static_cast<std::size_t>(k)] -= light[k];
-    state.light[t].offset -= light[3];
+    for (int k = 0; k < 4; ++k) state.light[t].gain[static_cast<std::size_t>(k)] -= light[k];
+    state.light[t].offset -= light[4];
   }
   state.blur[0] += delta[6];
   state.blur[1] += delta[7];
@@ -286,8 +286,7 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
 
   const double variance = std::max(1.0, squared(fit.residual)) * (1.0 + 1.0 / template_.frames);
   // inverse_ is of the weighted equations.
-  const Matrix6 white =
-      variance * kVarianceFactor * kMeanWeight * inverse_.topLeftCorner<6, 6>();
+  const Matrix6 white = variance * kVarianceFactor * kMeanWeight * inverse_.topLeftCorner<6, 6>();
   const Matrix6 information = white.inverse();
   double ratio = 0;
   double patches = 0;
@@ -297,8 +296,8 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
         Eigen::Map<const Eigen::Matrix<float, kPatchParameters, 1>>(sums_[n].right.data())
             .cast<double>();
     const TagSystem& tag = tag_systems_[template_.patches[n].tag];
-    const SharedVector pull = right.head<kSharedParameters>() -
-                              tag.eliminate * right.tail<kLightParameters>();
+    const SharedVector pull =
+        right.head<kSharedParameters>() - tag.eliminate * right.tail<kLightParameters>();
     const Vector6 moves = inverse_.topRows<6>() * pull;
     ratio += moves.dot(information * moves) / 6.0;
     ++patches;

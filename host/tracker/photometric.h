@@ -20,7 +20,7 @@ namespace tagwrench {
 /// Light and blur are carried from frame to frame: they change slowly.
 struct PhotometricState {
   struct Light {
-    std::array<double, 3> gain{1, 0, 0};
+    std::array<double, 4> gain{1, 0, 0, 0};
     double offset = 0;
   };
   std::array<Light, kMaxTags> light{};

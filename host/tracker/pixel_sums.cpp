@@ -115,10 +115,8 @@ struct Accumulator {
 };
 
 HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchView& view,
-                          float inverse_cut,
-                          std::size_t first, std::size_t count, const PixelPairs& pairs,
-                          const Block& block,
-                          Accumulator& sums) {
+                          float inverse_cut, std::size_t first, std::size_t count,
+                          const PixelPairs& pairs, const Block& block, Accumulator& sums) {
   const Float d;
   const auto set = [&](float value) { return hn::Set(d, value); };
   const V zero = hn::Zero(d);
@@ -143,9 +141,8 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
     const V linear = hn::MulAdd(dy, hn::MulAdd(dy, polynomial(8), polynomial(4)), polynomial(1));
     const V square = hn::MulAdd(dy, polynomial(7), polynomial(3));
     const V rest = hn::MulAdd(dy, hn::MulAdd(dy, polynomial(9), polynomial(5)), polynomial(2));
-    V expected = hn::MulAdd(
-        dx, hn::MulAdd(dx, hn::MulAdd(dx, polynomial(6), square), linear),
-        hn::MulAdd(dy, rest, middle));
+    V expected = hn::MulAdd(dx, hn::MulAdd(dx, hn::MulAdd(dx, polynomial(6), square), linear),
+                            hn::MulAdd(dy, rest, middle));
     const V laplacian = hn::Mul(
         set(2.0F),
         hn::Add(hn::Add(polynomial(3), polynomial(5)),
@@ -154,9 +151,12 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
     const V blur = hn::MulAdd(set(view.blur[1]), depth, set(view.blur[0]));
     const V more = hn::MulAdd(hn::Mul(set(0.5F), blur), load(t.bilaplacian), laplacian);
     expected = hn::MulAdd(blur, more, expected);
-    const V gain = hn::MulAdd(across, set(view.gain[1]),
-                              hn::MulAdd(down, set(view.gain[2]), set(view.gain[0])));
-    const V residual = hn::Mul(weight, hn::Sub(hn::MulAdd(gain, level, set(view.offset)), expected));
+    const V gain =
+        hn::MulAdd(across, set(view.gain[1]),
+                   hn::MulAdd(down, hn::MulAdd(down, set(view.gain[3]), set(view.gain[2])),
+                              set(view.gain[0])));
+    const V residual =
+        hn::Mul(weight, hn::Sub(hn::MulAdd(gain, level, set(view.offset)), expected));
 
     const auto usable = hn::And(hn::Lt(level, saturated), hn::Gt(weight, zero));
     const V valid = hn::IfThenElseZero(usable, load(pairs.valid));
@@ -167,10 +167,10 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
 
     // d residual / d motion: gradient in the template, carried to the image, carried to the point.
     const V two = set(2.0F);
-    const V gradient_x = hn::MulAdd(
-        hn::Mul(two, dx), polynomial(3), hn::MulAdd(dy, polynomial(4), polynomial(1)));
-    const V gradient_y = hn::MulAdd(
-        hn::Mul(two, dy), polynomial(5), hn::MulAdd(dx, polynomial(4), polynomial(2)));
+    const V gradient_x =
+        hn::MulAdd(hn::Mul(two, dx), polynomial(3), hn::MulAdd(dy, polynomial(4), polynomial(1)));
+    const V gradient_y =
+        hn::MulAdd(hn::Mul(two, dy), polynomial(5), hn::MulAdd(dx, polynomial(4), polynomial(2)));
     const auto& a = view.template_per_image;
     const V inverse = hn::Load(d, block.inverse.data() + i);
     const V x = hn::Load(d, block.x.data() + i);
@@ -183,9 +183,8 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
     const V pull_y = hn::Mul(hn::Mul(wri, set(lens.fy)),
                              hn::MulAdd(gradient_x, set(a[1]), hn::Mul(gradient_y, set(a[3]))));
     const auto& p = view.camera_t_platform;
-    const V pull_z = hn::Neg(hn::Mul(
-        inverse, hn::MulAdd(hn::Add(x, set(p[0])), pull_x,
-                            hn::Mul(hn::Add(y, set(p[1])), pull_y))));
+    const V pull_z = hn::Neg(hn::Mul(inverse, hn::MulAdd(hn::Add(x, set(p[0])), pull_x,
+                                                         hn::Mul(hn::Add(y, set(p[1])), pull_y))));
     s.right[0] = hn::Add(s.right[0], pull_x);
     s.right[1] = hn::Add(s.right[1], pull_y);
     s.right[2] = hn::Add(s.right[2], pull_z);
@@ -197,8 +196,10 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
     const V wrl = hn::Mul(wrw, middle);
     s.right[8] = hn::Add(s.right[8], wrl);
     s.right[9] = hn::MulAdd(wrl, across, s.right[9]);
-    s.right[10] = hn::MulAdd(wrl, down, s.right[10]);
-    s.right[11] = hn::Add(s.right[11], wrw);
+    const V wrld = hn::Mul(wrl, down);
+    s.right[10] = hn::Add(s.right[10], wrld);
+    s.right[11] = hn::MulAdd(wrld, down, s.right[11]);
+    s.right[12] = hn::Add(s.right[12], wrw);
     s.squares = hn::MulAdd(wr, residual, s.squares);
     s.weights = hn::Add(s.weights, w);
     s.inside = hn::Add(s.inside, valid);
@@ -255,8 +256,8 @@ namespace tagwrench {
 HWY_EXPORT(sum_patches);
 
 void sum_patches(const PixelTemplate& pixels, const PixelWindow& image,
-                 std::span<const PatchView> views, float inverse_cut, bool keep,
-                 PixelPairs& pairs, std::span<PatchSums> sums) noexcept {
+                 std::span<const PatchView> views, float inverse_cut, bool keep, PixelPairs& pairs,
+                 std::span<PatchSums> sums) noexcept {
   if (image.pixels == nullptr || image.left >= image.right || image.top >= image.bottom) {
     std::fill(sums.begin(), sums.end(), PatchSums{});
     return;

@@ -17,8 +17,8 @@ struct PatchView {
   std::array<float, 3> camera_t_platform{};  ///< m
   /// Displacement in the template per displacement in the image, px/px, row by row.
   std::array<float, 4> template_per_image{1, 0, 0, 1};
-  /// gain * (1, across, down) times the image plus offset is compared with the template.
-  std::array<float, 3> gain{1, 0, 0};
+  /// gain * (1, across, down, down^2) times the image plus offset is compared with the template.
+  std::array<float, 4> gain{1, 0, 0, 0};
   float offset = 0;
   std::array<float, 2> blur{};  ///< b = blur[0] + blur[1] * depth, px^2
 };
@@ -56,7 +56,7 @@ struct PixelPairs {
 /// of residual * weight * inverse_cut (0: all 1). `views` and `sums` have one entry for each patch,
 /// `pairs` one for each pixel; they are kept as they are when `keep` is set.
 void sum_patches(const PixelTemplate& pixels, const PixelWindow& image,
-                 std::span<const PatchView> views, float inverse_cut, bool keep,
-                 PixelPairs& pairs, std::span<PatchSums> sums) noexcept;
+                 std::span<const PatchView> views, float inverse_cut, bool keep, PixelPairs& pairs,
+                 std::span<PatchSums> sums) noexcept;
 
 }  // namespace tagwrench

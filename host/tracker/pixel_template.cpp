@@ -13,9 +13,9 @@ namespace tagwrench {
 namespace {
 
 constexpr int kPatchesPerSide = 6;
-constexpr double kBorderUsed = 1.05;  // of the white margin: the paper's edge tells as well
-constexpr double kSaturated = 250.0;  // grey level
-constexpr int kMargin_px = 8;         // around the tags, for the spline
+constexpr double kBorderUsed = 1.05;    // of the white margin: the paper's edge tells as well
+constexpr double kSaturated = 250.0;    // grey level
+constexpr int kMargin_px = 8;           // around the tags, for the spline
 constexpr double kLeastVariance = 0.1;  // rounding alone makes 1/12
 
 struct Candidate {
@@ -104,6 +104,7 @@ class Builder {
     planes_.push_back(plane);
     platform_T_tag_.push_back(platform_T_tag);
     const Box box = box_of(out_.camera, plane);
+    boxes_.push_back(box);
     splines_.emplace_back(cut_out(image_, out_.camera.width_px, box), box.left, box.top,
                           std::max(1, box.width()), std::max(1, box.height()));
     for (int y = box.top + 2; y < box.bottom - 2; ++y) {
@@ -211,8 +212,8 @@ class Builder {
       add_pixel(c, patch);
       patch.mean_noise +=
           std::sqrt(noise_.variance(at(c.x, c.y))) / static_cast<double>(pixels.size());
-      patch.reach_px = std::max({patch.reach_px, std::abs(c.x - middle.x()),
-                                 std::abs(c.y - middle.y())});
+      patch.reach_px =
+          std::max({patch.reach_px, std::abs(c.x - middle.x()), std::abs(c.y - middle.y())});
     }
     while (out_.size() % kRun != 0) pad();
     patch.count = out_.size() - patch.first;
@@ -225,13 +226,14 @@ class Builder {
     const double weight = 1.0 / std::sqrt(noise_.variance(level[0]));
     const double laplacian = 2.0 * (level[3] + level[5]);
     const double depth = ((out_.camera_T_platform * p).z() - mean_depth_) / kDepthUnit;
-    const double half = planes_[c.tag].half;
-    const double across = c.on_tag.x() / half;
-    const double down = c.on_tag.y() / half;
+    const Box& box = boxes_[c.tag];
+    const double across = 2.0 * (c.x - box.left) / box.width() - 1;
+    const double down = 2.0 * (c.y - box.top) / box.height() - 1;
 
     const Eigen::Vector2d gradient = weight * Eigen::Vector2d(level[1], level[2]);
     Eigen::Matrix<double, kNuisanceParameters, 1> nuisance;
-    nuisance << laplacian, depth * laplacian, level[0], across * level[0], down * level[0], 1;
+    nuisance << laplacian, depth * laplacian, level[0], across * level[0], down * level[0],
+        down * down * level[0], 1;
     nuisance *= weight;
     patch.gradient += gradient * gradient.transpose();
     patch.gradient_nuisance += gradient * nuisance.transpose();
@@ -262,7 +264,8 @@ class Builder {
     const auto smooth = [&](int cx, int cy) {
       double sum = 0;
       for (int j = -1; j <= 1; ++j) {
-        for (int i = -1; i <= 1; ++i) sum += (2 - std::abs(i)) * (2 - std::abs(j)) * at_clamped(cx + i, cy + j);
+        for (int i = -1; i <= 1; ++i)
+          sum += (2 - std::abs(i)) * (2 - std::abs(j)) * at_clamped(cx + i, cy + j);
       }
       return sum / 16;
     };
@@ -286,6 +289,7 @@ class Builder {
   std::vector<float> image_;
   std::vector<TagPlane> planes_;
   std::vector<Eigen::Isometry3d> platform_T_tag_;
+  std::vector<Box> boxes_;
   std::vector<SplineImage> splines_;
   std::vector<Candidate> candidates_;
 };

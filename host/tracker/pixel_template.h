@@ -16,17 +16,18 @@
 namespace tagwrench {
 
 /// Parameters of the linear model of one patch, in this order: motion of the platform (camera axes,
-/// m and rad; see rotation.h), blur (2), light of the patch's tag (4). The residual image
+/// m and rad; see rotation.h), blur (2), light of the patch's tag (5). The residual image
 /// is explained by
 ///   motion   gradient times image motion,
 ///   blur     the Laplacian, times 1 and times depth: a Gaussian point spread whose variance grows
 ///            by 2 b adds b times the Laplacian (heat equation) and, to second order, b^2 / 2 times
 ///            the Laplacian of that; defocus changes the variance in proportion to depth,
-///   light    gain times (1, x, y) over the tag, and an offset. An offset with slopes would cost a
-///            fifth of the precision.
+///   light    gain times (1, x, y, y^2) over the tag's picture, and an offset: y^2 for the bands
+///            that a flickering lamp leaves with a rolling shutter. An offset with slopes would
+///            cost a fifth of the precision.
 constexpr int kMotionParameters = 6;
 constexpr int kBlurParameters = 2;
-constexpr int kLightParameters = 4;
+constexpr int kLightParameters = 5;
 constexpr int kSharedParameters = kMotionParameters + kBlurParameters;
 constexpr int kPatchParameters = kSharedParameters + kLightParameters;
 
@@ -52,9 +53,9 @@ constexpr std::size_t kRun = 16;
 using PixelArray = std::vector<float>;
 
 struct PixelPatch {
-  std::size_t first = 0;  ///< pixel
-  std::size_t count = 0;  ///< multiple of kRun
-  std::size_t pixels = 0; ///< of these, not padding
+  std::size_t first = 0;   ///< pixel
+  std::size_t count = 0;   ///< multiple of kRun
+  std::size_t pixels = 0;  ///< of these, not padding
   std::size_t tag = 0;
   double reach_px = 0;    ///< of the pixels from the middle one, along either axis
   double mean_noise = 0;  ///< standard deviation, grey levels
@@ -79,12 +80,12 @@ struct PixelTemplate {
   std::size_t tags = 0;
   std::vector<PixelPatch> patches;
 
-  PixelArray x, y, z;                   ///< platform frame, m
-  std::array<PixelArray, 10> level;     ///< PixelPolynomial, grey levels
-  PixelArray weight;                    ///< 1 / standard deviation of the noise
-  PixelArray depth;                     ///< at rest, from the platform's origin, kDepthUnit
-  PixelArray bilaplacian;               ///< Laplacian of the Laplacian, of the smoothed image
-  PixelArray across, down;              ///< place on the tag, -1..1
+  PixelArray x, y, z;                ///< platform frame, m
+  std::array<PixelArray, 10> level;  ///< PixelPolynomial, grey levels
+  PixelArray weight;                 ///< 1 / standard deviation of the noise
+  PixelArray depth;                  ///< at rest, from the platform's origin, kDepthUnit
+  PixelArray bilaplacian;            ///< Laplacian of the Laplacian, of the smoothed image
+  PixelArray across, down;           ///< place on the tag's picture at rest, about -1..1
 
   std::size_t size() const { return x.size(); }
 };

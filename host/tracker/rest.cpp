@@ -161,9 +161,9 @@ double RestLearner::motion_px(const Eigen::Isometry3d& camera_T_platform) const 
 /// straight line through them.
 PixelNoise RestLearner::measure_noise() const {
   constexpr std::size_t kBins = 16;
-  constexpr std::size_t kLeast = 100;         // pixels in a bin
-  constexpr double kMedianToMean = 1.03;      // of a chi-squared with some 20 degrees of freedom
-  constexpr std::size_t kEvery = 7;           // pixels looked at
+  constexpr std::size_t kLeast = 100;     // pixels in a bin
+  constexpr double kMedianToMean = 1.03;  // of a chi-squared with some 20 degrees of freedom
+  constexpr std::size_t kEvery = 7;       // pixels looked at
   if (frames_ < 4) return {};
   std::array<std::vector<double>, kBins> bins;
   for (std::size_t i = 0; i < sum_.size(); i += kEvery) {

@@ -65,7 +65,7 @@ class RestLearner {
   Eigen::Isometry3d first_pose_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d last_pose_ = Eigen::Isometry3d::Identity();
   std::vector<float> sum_;
-  std::vector<float> squares_;           // of differences between successive frames
+  std::vector<float> squares_;  // of differences between successive frames
   std::vector<std::uint8_t> previous_;
   LearnedRest learned_;
 };

@@ -93,10 +93,10 @@ struct Tracker::State {
     const RestImage& image = learned.image;
     if (image.level.empty() || image.width != camera.width_px || image.height != camera.height_px)
       return;
-    aligner.set_template(make_pixel_template(
-        camera, {image.level.data(), image.width, image.height, image.width},
-        std::max(1, image.frames), learned.noise, acquirer.patterns(), learned.target,
-        learned.seen_from, {}));
+    aligner.set_template(
+        make_pixel_template(camera, {image.level.data(), image.width, image.height, image.width},
+                            std::max(1, image.frames), learned.noise, acquirer.patterns(),
+                            learned.target, learned.seen_from, {}));
     geometry.set(aligner, learned.seen_from, learned.tag_covariance, !rest_given);
     light = {};
   }
@@ -200,10 +200,10 @@ Refinement Tracker::State::find(const Frame& frame, Track& track) noexcept {
 
 PhotometricFit Tracker::State::align(const Frame& frame, const Eigen::Isometry3d& start) noexcept {
   const Region part = frame.readable();
-  const PixelWindow window{frame.image.pixels,    frame.image.stride,     part.x, part.y,
+  const PixelWindow window{frame.image.pixels,  frame.image.stride,  part.x, part.y,
                            part.x + part.width, part.y + part.height};
-  PhotometricFit fit = aligner.align(window, start, motion.velocity(frame.capture_time, start),
-                                     light);
+  PhotometricFit fit =
+      aligner.align(window, start, motion.velocity(frame.capture_time, start), light);
   if (fit.converged && camera.readout > 0) {
     fit = aligner.align(window, fit.camera_T_platform,
                         motion.velocity(frame.capture_time, fit.camera_T_platform), light);
