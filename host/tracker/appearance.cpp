@@ -13,6 +13,7 @@ constexpr double kHalf_px = 6.0;  // as the fine stage of the refinement
 /// Of the pose: longer profiles reach the paper's edge and take the tag for tilted.
 constexpr double kPoseHalf_px = 3.5;
 constexpr int kSpreadIterations = 15;
+constexpr int kClusterPoints = 12;  // in a row, of three cells' sides
 constexpr int kOffsetPasses = 3;
 constexpr double kLargestOffset_px = 2.0;
 constexpr float kLeastContrastPart = 0.3F;  // of the tag's median
@@ -92,8 +93,13 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(6 + tags, 6 + tags);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(6 + tags);
     Eigen::VectorXd row(6 + tags);
-    double squares = 0;
-    double weights = 0;
+    // What neighbouring points have in common (ragged ink, a neighbour's blur) moves the fit more
+    // than noise of the same size: the sandwich estimator for clustered errors, three cells'
+    // sides each.
+    Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(6 + tags, 6 + tags);
+    Eigen::VectorXd pull = Eigen::VectorXd::Zero(6 + tags);
+    int in_cluster = 0;
+    double clusters = 0;
     for (Eigen::Index t = 0; t < tags; ++t) {
       const auto& tag = all[static_cast<std::size_t>(t)];
       const double gain = common_gain(tag);
@@ -107,8 +113,13 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
         row.array() *= units.array();
         normal += weight * row * row.transpose();
         right += weight * (m.offset_px / gain) * row;
-        squares += weight * (m.offset_px / gain) * (m.offset_px / gain);
-        weights += weight;
+        pull += weight * (m.offset_px / gain) * row;
+        if (++in_cluster == kClusterPoints) {
+          meat += pull * pull.transpose();
+          pull.setZero();
+          in_cluster = 0;
+          ++clusters;
+        }
       }
     }
     for (Eigen::Index t = 0; t < tags; ++t) {
@@ -122,11 +133,11 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
     const Eigen::VectorXd step = ldlt.solve(right).cwiseProduct(units);
     if (!step.allFinite()) return false;
     camera_T_platform = moved(camera_T_platform, step.head<6>());
-    const auto spread = static_cast<double>(6 + tags);
-    covariance = squares / std::max(1.0, weights - spread) *
-                 (units.head<6>().asDiagonal() *
-                  ldlt.solve(Eigen::MatrixXd::Identity(6 + tags, 6 + tags)).topLeftCorner<6, 6>() *
-                  units.head<6>().asDiagonal());
+    const auto parameters = static_cast<double>(6 + tags);
+    const Eigen::MatrixXd inverse = ldlt.solve(Eigen::MatrixXd::Identity(6 + tags, 6 + tags));
+    const double few = clusters > parameters ? clusters / (clusters - parameters) : 10.0;
+    covariance = few * (units.asDiagonal() * (inverse * meat * inverse) * units.asDiagonal())
+                           .topLeftCorner<6, 6>();
     for (Eigen::Index t = 0; t < tags; ++t) {
       for (EdgePoint& point : target.tags[static_cast<std::size_t>(t)].points)
         shift(point, step[6 + t]);

@@ -31,6 +31,7 @@ constexpr double kLeastTagPart = 0.35;
 constexpr double kTypicalRank = 0.3;
 
 constexpr int kMostSteps = 10;
+constexpr int kFirstSteps = 3;  ///< by then residuals have fallen, or never will
 /// Squared sizes of steps, in standard deviations, all parameters together. A step shrinks to a few
 /// percent of the one before, squared: after one as small as kSmallStep there is nothing left to
 /// gain. Below kNearStep residuals tell which patches to believe; below kKeepStep pairs of pixels
@@ -234,23 +235,28 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
   PhotometricState now = state;
   float inverse_cut = 0;
   double step_size = 1e30;
+  double first_typical = 0;
+  bool near = false;  // once patches are judged they stay so: taking them back would begin anew
   for (int i = 0; i < kMostSteps; ++i) {
     view_patches(fit.camera_T_platform, velocity, now);
     sum_patches(template_, image, views_, inverse_cut, step_size < kKeepStep, pairs_, sums_);
     const double typical = typical_residual();
     if (!(typical > 0)) return fit;
-    judge_patches(typical, step_size < kNearStep);
+    if (i == 0) first_typical = typical;
+    if (i >= kFirstSteps && typical > first_typical) return fit;  // running away
+    judge_patches(typical, near);
     if (!factorise()) return fit;
     const Step taken = step(fit, now);
     if (!taken.solved) return fit;
-    // Two small looks in a row: the patches were judged, and the judgement was used.
-    const bool judged = step_size < kNearStep;
-    step_size = taken.squared_size;
-    inverse_cut = static_cast<float>(1.0 / (kTukey * std::max(1.0, typical)));
-    if (judged && step_size < kSmallStep) {
+    const double scale = std::max(1.0, typical);
+    // In standard deviations as the residuals have them.
+    step_size = taken.squared_size / squared(scale);
+    inverse_cut = static_cast<float>(1.0 / (kTukey * scale));
+    if (near && step_size < kSmallStep) {
       fit.converged = true;
       break;
     }
+    near = near || step_size < kNearStep;
   }
   if (!fit.converged) return fit;
   state = now;
