@@ -37,6 +37,29 @@ struct Record {
   bool known = false;  ///< there was a --sensor; else the sensor is the paper's
 };
 
+std::string today() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm local{};
+  ::localtime_r(&now, &local);
+  return fmt::format("{:04}-{:02}-{:02}", local.tm_year + 1900, local.tm_mon + 1, local.tm_mday);
+}
+
+SectionEdit camera_section(const CameraModel& camera, const CameraFit& fit) {
+  const auto& [k1, k2, p1, p2, k3] = camera.distortion;
+  return {
+      "camera",
+      {{"width", fmt::format("{}", camera.width_px)},
+       {"height", fmt::format("{}", camera.height_px)},
+       {"fx", fmt::format("{:.3f}", camera.fx_px)},
+       {"fy", fmt::format("{:.3f}", camera.fy_px)},
+       {"cx", fmt::format("{:.3f}", camera.cx_px)},
+       {"cy", fmt::format("{:.3f}", camera.cy_px)},
+       {"distortion", fmt::format("[{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]", k1, k2, p1, p2, k3)},
+       {"mirrored", fmt::format("{}", camera.mirrored)},
+       {"calibrated",
+        fmt::format("{{date: {}, views: {}, rms_px: {:.4f}}}", today(), fit.used, fit.rms_px)}}};
+}
+
 Record open_record(const CalibrateCameraOptions& options) {
   Record record;
   record.known = !options.sensor.empty();
@@ -57,6 +80,8 @@ Record open_record(const CalibrateCameraOptions& options) {
     record.sensor = parse_sensor(record.text, "the built-in sensor");
   }
   check_replaceable(record.target);
+  check_editable(record.text, {camera_section(record.sensor.camera, {})},
+                 record.known ? options.sensor : record.target);
   return record;
 }
 
@@ -199,29 +224,6 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
     guide.say(collector->look(frame.image, name), *collector, wanted);
   }
   return collector;
-}
-
-std::string today() {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  std::tm local{};
-  ::localtime_r(&now, &local);
-  return fmt::format("{:04}-{:02}-{:02}", local.tm_year + 1900, local.tm_mon + 1, local.tm_mday);
-}
-
-SectionEdit camera_section(const CameraModel& camera, const CameraFit& fit) {
-  const auto& [k1, k2, p1, p2, k3] = camera.distortion;
-  return {
-      "camera",
-      {{"width", fmt::format("{}", camera.width_px)},
-       {"height", fmt::format("{}", camera.height_px)},
-       {"fx", fmt::format("{:.3f}", camera.fx_px)},
-       {"fy", fmt::format("{:.3f}", camera.fy_px)},
-       {"cx", fmt::format("{:.3f}", camera.cx_px)},
-       {"cy", fmt::format("{:.3f}", camera.cy_px)},
-       {"distortion", fmt::format("[{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]", k1, k2, p1, p2, k3)},
-       {"mirrored", fmt::format("{}", camera.mirrored)},
-       {"calibrated",
-        fmt::format("{{date: {}, views: {}, rms_px: {:.4f}}}", today(), fit.used, fit.rms_px)}}};
 }
 
 /// What else in sensor.yaml was measured through the old camera.

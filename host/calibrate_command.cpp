@@ -1,6 +1,23 @@
 #include "host/calibrate_command.h"
 
 namespace tagwrench {
+namespace {
+
+constexpr int kMostFrames = 2'000'000'000;
+
+/// CLI11's own range lets NaN through.
+CLI::Validator duration() {
+  return {[](std::string& text) {
+            double seconds = 0;
+            const bool usable =
+                CLI::detail::lexical_cast(text, seconds) && seconds >= 1 && seconds <= 1e6;
+            return usable ? std::string()
+                          : "'" + text + "' is not a number of seconds from 1 to 1e6";
+          },
+          "SECONDS"};
+}
+
+}  // namespace
 
 CalibrateCommand::CalibrateCommand(CLI::App& app)
     : verb_(app.add_subcommand("calibrate", "measure this sensor and write it to its sensor.yaml")),
@@ -32,7 +49,7 @@ CalibrateCommand::CalibrateCommand(CLI::App& app)
   camera_
       ->add_option("--seconds", camera_options_.seconds,
                    "look at a camera no longer than this, then use what there is")
-      ->check(CLI::Range(1.0, 1e6));
+      ->check(duration());
   target_->add_option("--sensor", target_options_.sensor, "sensor.yaml of this sensor")->required();
   target_
       ->add_option("--source", target_options_.source,
@@ -41,12 +58,12 @@ CalibrateCommand::CalibrateCommand(CLI::App& app)
   target_->add_option("--out", target_options_.out,
                       "sensor.yaml to write; without it --sensor is edited in place");
   target_->add_option("--frames", target_options_.frames, "use no more than N frames")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, kMostFrames));
   target_
       ->add_option("--seconds", target_options_.seconds,
                    "use no more than S seconds; without it a folder is used up and anything else "
                    "for 30 s")
-      ->check(CLI::Range(1.0, 1e6));
+      ->check(duration());
 }
 
 int CalibrateCommand::run() const {

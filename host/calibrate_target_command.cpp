@@ -136,6 +136,13 @@ SectionEdit rest_section(const TargetEstimate& estimate, const RestImage& image,
            {"appearance", appearance}}};
 }
 
+/// The keys that will be written, before there are values.
+std::vector<SectionEdit> placeholders() {
+  return {{"target", {{"tags", "[]"}}},
+          {"rest",
+           {{"frames", "1"}, {"position_mm", "[]"}, {"rotation_rad", "[]"}, {"appearance", "''"}}}};
+}
+
 /// Both files or neither: the picture belongs to the poses.
 void write(const fs::path& sensor, const std::string& text, const fs::path& appearance,
            const TargetEstimate& estimate, const TargetDescription& target,
@@ -173,6 +180,7 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   check_replaceable(sensor_file);
   check_replaceable(appearance);
   const Input input = open_input({options.sensor, options.source, true});
+  check_editable(text, placeholders(), options.sensor);
   check_size(input);
   const SensorConfig& sensor = input.sensor;
   const UniqueFd stop = signals_as_fd();

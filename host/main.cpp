@@ -22,6 +22,7 @@ namespace {
 
 constexpr int kFailed = 1;
 constexpr int kUnusable = 2;
+constexpr int kMostFrames = 2'000'000'000;
 
 constexpr const char* kSources =
     "where frames come from:\n"
@@ -59,7 +60,8 @@ int dispatch(int argc, char** argv) {
   run->add_option("--sensor", run_options.sensor, "sensor.yaml of this sensor");
   run->add_option("--source", run_options.source, kSources);
   run->add_option("--output", run_options.outputs, kOutputs);
-  run->add_option("--frames", run_options.frames, "end after N frames")->check(CLI::PositiveNumber);
+  run->add_option("--frames", run_options.frames, "end after N frames")
+      ->check(CLI::Range(1, kMostFrames));
   run->add_option("--seconds", run_options.seconds, "end after S seconds")->check(duration);
   run->add_flag("--fast", run_options.fast,
                 "sources that are not live run as fast as they can, no frame dropped");

@@ -198,6 +198,11 @@ std::string summary(const RunReport& report) {
       seconds, seconds > 0 ? report.frames / seconds : 0.0, report.with_numbers, report.dropped);
   if (report.skipped > 0)
     line += fmt::format(", {} samples not taken by slow readers", report.skipped);
+  if (report.frames > 0 && report.with_numbers == 0) {
+    line +=
+        "; the target was never held: are the tags in view, in focus and lit, and are family, ids "
+        "and number of tags those of sensor.yaml?";
+  }
   return line;
 }
 

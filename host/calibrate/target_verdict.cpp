@@ -228,7 +228,7 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
       camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px,
       estimate.residual_px));
   lines.push_back(fmt::format("read-out: about {:.0f} ms from the first row to the last",
-                              estimate.readout * 1e3));
+                              std::round(estimate.readout * 1e3) + 0.0));  // never "-0"
   return lines;
 }
 

@@ -61,8 +61,10 @@ void check_header(const std::filesystem::path& path, const std::vector<unsigned 
 }  // namespace
 
 RestImage load_rest_image(const std::filesystem::path& path, const CameraModel& camera) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) refuse(path, "cannot be read");
+  std::error_code error;  // a pipe or a device may never end
+  std::ifstream in;
+  if (std::filesystem::is_regular_file(path, error)) in.open(path, std::ios::binary);
+  if (!in.is_open()) refuse(path, "cannot be read as a file");
   std::vector<unsigned char> bytes(std::istreambuf_iterator<char>(in), {});
   check_header(path, bytes, camera);
   cv::Mat picture;

@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "host/config/sensor_config.h"
+#include "host/config/yaml_reader.h"
 #include "host/config/yaml_spans.h"
 #include "host/config_error.h"
 #include "host/os/unique_fd.h"
@@ -226,6 +227,12 @@ void check_replaceable(const fs::path& path) {
     throw ConfigError(fmt::format(
         "{}: is not a regular file; name the sensor.yaml to write with --out", path.string()));
   }
+  if (fs::exists(status) && ::access(real.c_str(), W_OK) != 0) {
+    throw ConfigError(
+        fmt::format("{}: is write-protected ({}); chmod u+w it, or name another "
+                    "file with --out",
+                    path.string(), std::strerror(errno)));
+  }
   const fs::path folder = real.has_parent_path() ? real.parent_path() : fs::path(".");
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
     throw ConfigError(
@@ -239,6 +246,19 @@ void write_atomically(const fs::path& path, std::string_view text) {
   file.keep_mode_of_target();
   file.write(text);
   file.take_the_name();
+}
+
+void check_editable(std::string yaml, const std::vector<SectionEdit>& edits,
+                    const std::string& name) {
+  for (const SectionEdit& edit : edits) yaml = with_keys(yaml, edit, name);
+  try {
+    YamlReader::from_text(yaml, name);
+  } catch (const ConfigError& e) {
+    throw ConfigError(fmt::format(
+        "{}: cannot be edited: with new values in place it would no longer be YAML, perhaps for an "
+        "anchor among the old ones; write them out in full (in the new text, {})",
+        name, e.what()));
+  }
 }
 
 void write_sensor(std::string yaml, const std::vector<SectionEdit>& edits, const fs::path& to) {

@@ -28,9 +28,14 @@ struct SectionEdit {
 /// naming `name`, if the text is not a YAML mapping or the section is no mapping.
 std::string with_keys(std::string_view yaml, const SectionEdit& edit, const std::string& name);
 
-/// Throws ConfigError unless `path` (or what it links to) is a regular file that can be replaced,
+/// Throws ConfigError unless `path` (or what it links to) is a regular file that may be replaced,
 /// or a new name in a folder that can be written.
 void check_replaceable(const std::filesystem::path& path);
+
+/// Throws ConfigError where write_sensor could not edit this text, whatever the values: to be asked
+/// before the measurement that the values come from.
+void check_editable(std::string yaml, const std::vector<SectionEdit>& edits,
+                    const std::string& name);
 
 /// Replaces the file as a whole: a reader sees the old text or the new one, never a part. Follows a
 /// symbolic link and keeps the permissions. Throws std::runtime_error, and leaves the old file.

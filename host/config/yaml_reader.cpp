@@ -12,6 +12,9 @@
 namespace tagwrench {
 namespace {
 
+/// In the units that files are written in; squares and products of such numbers stay finite.
+constexpr double kLargest = 1e12;
+
 std::string joined(const std::vector<std::string_view>& names) {
   std::string out;
   for (std::string_view name : names) out += (out.empty() ? "" : ", ") + std::string(name);
@@ -100,6 +103,8 @@ double YamlReader::finite(const std::string& key, const YAML::Node& node) const 
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, value))
     fail(key, "must be a number");
   if (!std::isfinite(value)) fail(key, "must be a finite number, not NaN or infinity");
+  if (std::abs(value) > kLargest)
+    fail(key, fmt::format("{} is beyond all measure; use at most {}", value, kLargest));
   return value;
 }
 
@@ -114,6 +119,13 @@ double YamlReader::positive(const std::string& key) {
 double YamlReader::non_negative(const std::string& key) {
   const double value = number(key);
   if (value < 0) fail(key, fmt::format("must not be negative, is {}", value));
+  return value;
+}
+
+double YamlReader::within(const std::string& key, double lowest, double highest) {
+  const double value = number(key);
+  if (value < lowest || value > highest)
+    fail(key, fmt::format("must be {} to {}, is {}", lowest, highest, value));
   return value;
 }
 

@@ -32,6 +32,8 @@ class YamlReader {
   double number(const std::string& key);
   double positive(const std::string& key);
   double non_negative(const std::string& key);
+  /// Both ends included.
+  double within(const std::string& key, double lowest, double highest);
   int integer(const std::string& key, int lowest, int highest);
   bool boolean(const std::string& key);
   std::string text(const std::string& key);

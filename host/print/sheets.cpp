@@ -14,6 +14,7 @@ namespace tagwrench {
 namespace {
 
 const char* const kTrueSize = "Print at 100 %, never fitted to the page, never mirrored.";
+constexpr double kSmallest_mm = 0.1;
 constexpr double kLargest_mm = 1000;
 
 CellGrid tag_cells(TagFamily family, int id) {
@@ -117,9 +118,10 @@ Drawing tag_sheet(const Paper& paper, const TagSheet& sheet) {
           fmt::format("--ids: id {} is not in {}; use 0 to {}", id, name(sheet.family), ids - 1));
     }
   }
-  if (!(sheet.size_mm > 0 && sheet.size_mm <= kLargest_mm)) {
-    throw ConfigError(fmt::format(
-        "--size-mm: {} is no size; use the edge of the black square in mm", sheet.size_mm));
+  if (!(sheet.size_mm >= kSmallest_mm && sheet.size_mm <= kLargest_mm)) {
+    throw ConfigError(
+        fmt::format("--size-mm: {} is no size; use the edge of the black square in mm, {} to {}",
+                    sheet.size_mm, kSmallest_mm, kLargest_mm));
   }
   if (!(sheet.border_mm >= 0 && sheet.border_mm <= kLargest_mm)) {
     throw ConfigError(

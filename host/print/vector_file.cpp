@@ -115,7 +115,11 @@ void write_bytes(int file, std::string_view bytes, const fs::path& path) {
 
 void replace_file(const fs::path& path, std::string_view bytes) {
   std::error_code error;
-  if (fs::is_directory(path, error)) cannot_make(path, "is a folder");
+  const fs::file_status status = fs::status(path, error);
+  if (fs::is_directory(status)) cannot_make(path, "is a folder");
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    cannot_make(path, "is a pipe or a device");
+  }
   std::string partial = path.string() + ".XXXXXX";
   const UniqueFd file(::mkostemp(partial.data(), O_CLOEXEC));
   if (!file) cannot_make(path, std::strerror(errno));

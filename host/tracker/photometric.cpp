@@ -30,6 +30,10 @@ constexpr double kLeastTagPart = 0.35;
 /// The typical patch is the one at this rank from below: more than half of them may be covered.
 constexpr double kTypicalRank = 0.3;
 
+/// Of the shared parameters, those that a row or column of patches can take up by itself: the
+/// translations. Fewer groups than patches would otherwise be blamed for what is common to all.
+constexpr double kGroupsFitted = 3;
+
 constexpr int kMostSteps = 10;
 constexpr int kFirstSteps = 3;  ///< by then residuals have fallen, or never will
 /// Squared sizes of steps, in standard deviations, all parameters together. A step shrinks to a few
@@ -294,22 +298,46 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
   // inverse_ is of the weighted equations.
   const Matrix6 white = variance * kVarianceFactor * kMeanWeight * inverse_.topLeftCorner<6, 6>();
   const Matrix6 information = white.inverse();
+  // An edge runs through a row or a column of patches, and with it what is wrong with it.
+  struct Groups {
+    std::array<std::array<Vector6, kPatchesPerSide>, kMaxTags> pull;
+    double ratio = 0;
+    double count = 0;
+  };
+  Groups rows, columns;
+  for (Groups* groups : {&rows, &columns})
+    for (auto& tag : groups->pull) tag.fill(Vector6::Zero());
   double ratio = 0;
   double patches = 0;
   for (std::size_t n = 0; n < sums_.size(); ++n) {
     if (good_[n] == 0) continue;
+    const PixelPatch& patch = template_.patches[n];
     const PatchVector right =
         Eigen::Map<const Eigen::Matrix<float, kPatchParameters, 1>>(sums_[n].right.data())
             .cast<double>();
-    const TagSystem& tag = tag_systems_[template_.patches[n].tag];
-    const SharedVector pull =
-        right.head<kSharedParameters>() - tag.eliminate * right.tail<kLightParameters>();
-    const Vector6 moves = inverse_.topRows<6>() * pull;
-    ratio += moves.dot(information * moves) / 6.0;
+    const TagSystem& tag = tag_systems_[patch.tag];
+    const Vector6 pull = inverse_.topRows<6>() * (right.head<kSharedParameters>() -
+                                                  tag.eliminate * right.tail<kLightParameters>());
+    ratio += pull.dot(information * pull) / 6.0;
     ++patches;
+    rows.pull[patch.tag][patch.row] += pull;
+    columns.pull[patch.tag][patch.column] += pull;
   }
   // The fit has taken its own part out of the residuals.
-  if (patches > kSharedParameters) ratio *= patches / (patches - kSharedParameters);
+  constexpr double kFitted = kSharedParameters;
+  if (patches > kFitted) ratio *= patches / (patches - kFitted);
+  for (Groups* groups : {&rows, &columns}) {
+    for (const auto& tag : groups->pull) {
+      for (const Vector6& pull : tag) {
+        if (pull.isZero(0)) continue;
+        groups->ratio += pull.dot(information * pull) / 6.0;
+        ++groups->count;
+      }
+    }
+    // Few groups leave little to compare: then the patches must do.
+    if (groups->count > 1.2 * kFitted)
+      ratio = std::max(ratio, groups->ratio * groups->count / (groups->count - kGroupsFitted));
+  }
   fit.covariance = std::max(1.0, ratio) * white;
   if (!fit.covariance.allFinite()) fit.converged = false;
 }

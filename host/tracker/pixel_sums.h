@@ -47,7 +47,7 @@ struct PixelPairs {
       : column(count), row(count), level(count), valid(count) {}
   PixelArray column, row;  ///< px
   PixelArray level;        ///< grey level
-  PixelArray valid;        ///< 1 inside the image and not saturated, else 0
+  PixelArray valid;        ///< 1 inside the image, else 0
 };
 
 /// residual = gain * image + offset - (template, blurred) at the image pixel that is nearest to

@@ -12,7 +12,6 @@
 namespace tagwrench {
 namespace {
 
-constexpr int kPatchesPerSide = 6;
 constexpr double kBorderUsed = 1.05;    // of the white margin: the paper's edge tells as well
 constexpr double kSaturated = 250.0;    // grey level
 constexpr int kMargin_px = 8;           // around the tags, for the spline
@@ -197,6 +196,8 @@ class Builder {
     PixelPatch patch;
     patch.first = out_.size();
     patch.tag = pixels.front().tag;
+    patch.row = static_cast<std::size_t>(pixels.front().patch / kPatchesPerSide);
+    patch.column = static_cast<std::size_t>(pixels.front().patch % kPatchesPerSide);
     patch.pixels = pixels.size();
     Eigen::Vector2d middle(0, 0);
     for (const Candidate& c : pixels) middle += Eigen::Vector2d(c.x, c.y);

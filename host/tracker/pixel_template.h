@@ -46,6 +46,9 @@ struct PixelNoise {
 /// Of the depth on which blur depends, m.
 constexpr double kDepthUnit = 1e-3;
 
+/// Patches along a tag's side.
+constexpr int kPatchesPerSide = 6;
+
 /// Runs of pixels start and end at multiples of this; padding has weight 0.
 constexpr std::size_t kRun = 16;
 
@@ -57,8 +60,9 @@ struct PixelPatch {
   std::size_t count = 0;   ///< multiple of kRun
   std::size_t pixels = 0;  ///< of these, not padding
   std::size_t tag = 0;
-  double reach_px = 0;    ///< of the pixels from the middle one, along either axis
-  double mean_noise = 0;  ///< standard deviation, grey levels
+  std::size_t row = 0, column = 0;  ///< on the tag, 0..kPatchesPerSide - 1
+  double reach_px = 0;              ///< of the pixels from the middle one, along either axis
+  double mean_noise = 0;            ///< standard deviation, grey levels
   /// On the tag's plane, platform frame: what the patch's middle pixel shows, and the pixels one to
   /// its right and one below.
   Eigen::Vector3d middle, right, below;

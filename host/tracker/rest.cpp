@@ -15,6 +15,10 @@ namespace {
 /// harmless.
 constexpr double kMoved_px = 0.5;
 
+/// Light, blur and profiles of finite length displace edges by about this much, px; scatter does
+/// not show it.
+constexpr double kEdgeBias_px = 0.015;
+
 PixelView<std::uint8_t> view(const ImageView& image) {
   return {image.pixels, image.width, image.height, image.stride};
 }
@@ -192,6 +196,17 @@ PixelNoise RestLearner::measure_noise() const {
   return noise;
 }
 
+/// Larger and nearer look alike but for the bits inside: what shifts all edges outward by a little
+/// is taken for distance.
+Matrix6 RestLearner::distance_covariance(const Eigen::Isometry3d& camera_T_body) const {
+  const Eigen::Vector3d sight = camera_T_body.translation();
+  const double per_px = sight.norm() / (0.5 * camera_.fx_px * description_.tag_size);
+  Matrix6 covariance = Matrix6::Zero();
+  covariance.topLeftCorner<3, 3>() =
+      std::pow(kEdgeBias_px * per_px, 2) * (sight * sight.transpose());
+  return covariance;
+}
+
 bool RestLearner::finish() {
   const float scale = 1.0F / static_cast<float>(frames_);
   for (float& level : sum_) level *= scale;
@@ -207,6 +222,7 @@ bool RestLearner::finish() {
     EdgeTarget alone{{make_edge_tag(patterns_[t], Eigen::Isometry3d::Identity())}, 0};
     Matrix6 covariance;
     if (!fit_pose_and_spread(meter_, mean, alone, pose, covariance)) return false;
+    covariance += distance_covariance(pose);
     if (description_.tags[t].platform_T_tag)
       covariance = description_.tags[t].sigma.cwiseAbs2().asDiagonal();
     tag_covariance.push_back(covariance);
@@ -228,8 +244,9 @@ bool RestLearner::finish() {
       if (description_.tags[t].platform_T_tag) given.tags.push_back(learned_.target.tags[t]);
     }
     fitted = last_pose_;
-    Matrix6 unused;
-    if (!fit_pose_and_spread(meter_, mean, given, fitted, unused)) return false;
+    Matrix6 covariance;
+    if (!fit_pose_and_spread(meter_, mean, given, fitted, covariance)) return false;
+    learned_.pose_covariance = covariance + distance_covariance(fitted);
     if (!options_.camera_T_platform) learned_.camera_T_platform = fitted;
     for (std::size_t t = 0; t < patterns_.size(); ++t) {
       if (!description_.tags[t].platform_T_tag) {

@@ -15,8 +15,9 @@ struct LearnedRest {
   Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
   EdgeTarget target;
   Eigen::Isometry3d seen_from = Eigen::Isometry3d::Identity();  ///< camera_T_platform in `image`
-  RestImage image;   ///< the average of the rest frames, as delivered
-  PixelNoise noise;  ///< of one frame
+  Matrix6 pose_covariance = Matrix6::Zero();  ///< of seen_from; matters when rest was given
+  RestImage image;                            ///< the average of the rest frames, as delivered
+  PixelNoise noise;                           ///< of one frame
   /// How well each tag's pose is known: of its motion, camera axes, m and rad.
   std::vector<Matrix6> tag_covariance;
 };
@@ -52,6 +53,7 @@ class RestLearner {
   double motion_px(const Eigen::Isometry3d& camera_T_platform) const;
   bool finish();
   PixelNoise measure_noise() const;
+  Matrix6 distance_covariance(const Eigen::Isometry3d& camera_T_body) const;
 
   CameraModel camera_;
   TargetDescription description_;

@@ -97,6 +97,7 @@ struct Tracker::State {
         make_pixel_template(camera, {image.level.data(), image.width, image.height, image.width},
                             std::max(1, image.frames), learned.noise, acquirer.patterns(),
                             learned.target, learned.seen_from, {}));
+    pose_covariance = rest_given ? learned.pose_covariance : Matrix6::Zero();
     geometry.set(aligner, learned.seen_from, learned.tag_covariance, !rest_given);
     light = {};
   }
@@ -113,7 +114,10 @@ struct Tracker::State {
   Track learn(const Frame& frame);
   Track follow(const Frame& frame) noexcept;
   void learn_picture(const Frame& frame);
-  Refinement find(const Frame& frame, Track& track) noexcept;
+  Refinement find_near(const Frame& frame) noexcept;
+  Refinement find_anywhere(const Frame& frame, Track& track) noexcept;
+  PhotometricFit finish(const Frame& frame, const Refinement& edges) noexcept;
+  bool believed(const PhotometricFit& fit) const noexcept;
   Refinement reacquire(const Frame& frame, Track& track);
   Refinement refine_within_reach(const Frame& frame, const Eigen::Isometry3d& start) noexcept;
   PhotometricFit align(const Frame& frame, const Eigen::Isometry3d& start) noexcept;
@@ -137,6 +141,7 @@ struct Tracker::State {
   PhotometricAligner aligner;
   PhotometricState light;
   GeometryUncertainty geometry;
+  Matrix6 pose_covariance = Matrix6::Zero();  ///< of the picture's place against a given rest
 };
 
 Track Tracker::State::learn(const Frame& frame) {
@@ -183,19 +188,34 @@ Refinement Tracker::State::reacquire(const Frame& frame, Track& track) {
 }
 
 /// The edges find a target that is further away than alignment reaches.
-Refinement Tracker::State::find(const Frame& frame, Track& track) noexcept {
-  Refinement fit;
-  if (holding) {
-    fit = refine_within_reach(frame, motion.predict(frame.capture_time));
-    // A motion that stops dead is nearer to where it was than to where it was going.
-    if (fit.verdict == Verdict::lost) fit = refine_within_reach(frame, motion.last());
-  }
-  if (fit.verdict != Verdict::lost) return fit;
+Refinement Tracker::State::find_near(const Frame& frame) noexcept {
+  if (!holding) return {};
+  const Refinement fit = refine_within_reach(frame, motion.predict(frame.capture_time));
+  // A motion that stops dead is nearer to where it was than to where it was going.
+  return fit.verdict != Verdict::lost ? fit : refine_within_reach(frame, motion.last());
+}
+
+Refinement Tracker::State::find_anywhere(const Frame& frame, Track& track) noexcept {
   try {
     return reacquire(frame, track);
   } catch (const std::exception&) {
     return {};  // out of memory: try again with the next frame
   }
+}
+
+/// From what the edges found to the pose that counts.
+PhotometricFit Tracker::State::finish(const Frame& frame, const Refinement& edges) noexcept {
+  if (aligner.ready()) return align(frame, edges.camera_T_platform);
+  PhotometricFit fit;
+  fit.camera_T_platform = edges.camera_T_platform;
+  fit.covariance = edges.covariance;
+  fit.tags_held = edges.tags_held;
+  fit.converged = edges.verdict == Verdict::held;
+  return fit;
+}
+
+bool Tracker::State::believed(const PhotometricFit& fit) const noexcept {
+  return fit.converged && (!aligner.ready() || trusted(fit, light));
 }
 
 PhotometricFit Tracker::State::align(const Frame& frame, const Eigen::Isometry3d& start) noexcept {
@@ -231,36 +251,32 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
   const bool partial = !frame.readable().contains(whole);
 
   PhotometricFit fit;
-  bool followed = false;
-  if (holding && aligner.ready()) {
-    fit = align(frame, motion.predict(frame.capture_time));
-    followed = fit.converged && trusted(fit, light);
-  }
+  if (holding && aligner.ready()) fit = align(frame, motion.predict(frame.capture_time));
+  bool followed = holding;
   Refinement edges;
-  if (!followed) {
+  if (!believed(fit)) {
     if (partial) {
       track.needs_whole_frame = true;
       return track;
     }
-    const bool held = holding;
-    edges = find(frame, track);
+    edges = find_near(frame);
+    if (edges.verdict != Verdict::lost) fit = finish(frame, edges);
+    if (edges.verdict == Verdict::lost || !believed(fit)) {
+      const Refinement anew = find_anywhere(frame, track);
+      if (anew.verdict != Verdict::lost) {
+        edges = anew;
+        fit = finish(frame, edges);
+        followed = false;
+      }
+    }
     holding = edges.verdict != Verdict::lost;
     if (!holding) {
       light = {};
       return track;
     }
-    followed = held;
-    if (aligner.ready()) {
-      fit = align(frame, edges.camera_T_platform);
-    } else {
-      fit.camera_T_platform = edges.camera_T_platform;
-      fit.covariance = edges.covariance;
-      fit.tags_held = edges.tags_held;
-      fit.converged = edges.verdict == Verdict::held;
-    }
   }
   holding = had_target = true;
-  const bool believed = fit.converged && (!aligner.ready() || trusted(fit, light));
+  const bool good = believed(fit);
   const Eigen::Isometry3d& pose = fit.converged ? fit.camera_T_platform : edges.camera_T_platform;
   if (followed) {
     motion.add(frame.capture_time, pose);
@@ -270,12 +286,12 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
   track.tags_held = fit.converged ? fit.tags_held : edges.tags_held;
   track.residual_px = edges.residual_px;
   track.status = Status::doubtful;
-  say_misfit(believed, track);
-  if (!believed) return track;
+  say_misfit(good, track);
+  if (!good) return track;
   track.status = Status::ok;
   track.displacement = motion_between(rest, pose);
   track.covariance = displacement_covariance(fit.covariance, track.displacement) +
-                     geometry.covariance(track.displacement);
+                     geometry.covariance(track.displacement) + pose_covariance;
   if (aligner.ready()) track.wanted = region(frame.capture_time);
   if (!aligner.ready() && motion.step().head<3>().norm() < kStill &&
       motion.step().tail<3>().norm() < kStillAngle) {

@@ -104,7 +104,7 @@ TEST_F(BadInput, SensorFileNamesKeyAndLine) {
                  {"edited.yaml:", "target.family", "missing", "familly"});
   std::filesystem::remove_all(temporary_ / "frames");
   expect_refused(run_sensor("tag_size_mm: 3.8", "tag_size_mm: -3.8"), 2,
-                 {"edited.yaml:", "tag_size_mm", "greater than 0"});
+                 {"edited.yaml:", "tag_size_mm", "must be 0.01 to 10000"});
   std::filesystem::remove_all(temporary_ / "frames");
   expect_refused(run_sensor("tag_size_mm: 3.8", "tag_size_mm: .nan"), 2,
                  {"edited.yaml:", "tag_size_mm", "finite"});

@@ -105,12 +105,22 @@ TEST_F(CalibrateCameraCommand, LeavesTheFileAloneWhenItRefuses) {
   expect_refused(calibrate({"--source", "sim", "--sensor", file}), {"sim", "no board"});
   expect_refused(calibrate({"--sensor", file}), {"--source", "--images"});
   expect_refused(calibrate({"--images", pictures()}), {"--sensor", "--out"});
+  expect_refused(calibrate({"--images", pictures(), "--sensor", file, "--seconds", "nan"}),
+                 {"--seconds", "'nan'", "1 to 1e6"});
   expect_refused(calibrate({"--images", pictures(), "--sensor", file, "--out",
                             temporary_ / "none" / "s.yaml"}),
                  {"none", "cannot be written"});
   expect_refused(calibrate({"--images", pictures(), "--sensor", file, "--out", "/dev/null"}),
                  {"/dev/null", "regular file"});
   EXPECT_EQ(read_file(file), kSensor);
+}
+
+TEST_F(CalibrateCameraCommand, RefusesAFileThatCannotBeEditedBeforeItLooks) {
+  const std::string text = kSensor + "---\nb: 1\n";
+  const Outcome o = calibrate({"--images", pictures(), "--sensor", sensor_file(text)});
+  expect_refused(o, {"second document"});
+  EXPECT_EQ(lines_in(o.err), 1u) << o.err;
+  EXPECT_EQ(read_file(temporary_ / "sensor.yaml"), text);
 }
 
 TEST_F(CalibrateCameraCommand, RefusesPicturesOfAnotherSize) {

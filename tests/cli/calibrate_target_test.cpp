@@ -90,10 +90,17 @@ TEST_F(CalibrateTarget, RefusesAndWritesNothing) {
   before_ = read_file(sensor_);
   expect_refused(calibrate(), "hardly moved");
   expect_refused(calibrate({"--frames", "5"}), "rest of");
+  expect_refused(calibrate({"--frames", "0"}), "not in range 1 to 2000000000");
+  expect_refused(calibrate({"--seconds", "nan"}), "'nan' is not a number of seconds");
   expect_refused(calibrate({"--out", temporary_ / "frames"}), "not a regular file");
   expect_refused(run_bridge({"calibrate", "target", "--sensor", sensor_, "--source", "kinect"}),
                  "kinect");
   expect_refused(run_bridge({"calibrate", "target", "--sensor", sensor_}), "--source");
+  before_ += "---\nb: 1\n";
+  write_file(sensor_, before_);
+  const Outcome twofold = calibrate();
+  expect_refused(twofold, "second document");
+  EXPECT_EQ(lines_in(twofold.err), 1u) << twofold.err;
 }
 
 }  // namespace

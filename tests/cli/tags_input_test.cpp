@@ -1,6 +1,7 @@
 // `tagwrench tags`: what it refuses, in one line and with nothing written, and what it takes from a
 // sensor.yaml.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <iterator>
 
@@ -53,6 +54,7 @@ TEST_F(TagsInput, NumbersThatCannotBePrintedAreRefused) {
   expect_refused(tags({"--ids", "5,two"}), {"--ids"});
   expect_refused(tags({"--size-mm", "0"}), {"--size-mm"});
   expect_refused(tags({"--size-mm", "nan"}), {"--size-mm"});
+  expect_refused(tags({"--size-mm", "1e-300"}), {"--size-mm", "0.1 to 1000"});
   expect_refused(tags({"--size-mm", "250"}), {"250 mm", "does not fit on a4"});
   expect_refused(tags({"--border-mm=-1"}), {"--border-mm"});
   expect_refused(tags({"--copies", "0"}), {"--copies"});
@@ -74,6 +76,11 @@ TEST_F(TagsInput, PlacesThatTakeNoFileAreRefused) {
   EXPECT_EQ(outcome.status, 2) << outcome.err;
   EXPECT_EQ(lines_in(outcome.err), 1u) << outcome.err;
   expect_refused(run_bridge({"tags"}), {"--out"});
+  ASSERT_EQ(::mkfifo((temporary_ / "pipe.pdf").c_str(), 0600), 0);
+  const Outcome pipe = tags({}, "pipe.pdf");
+  EXPECT_EQ(pipe.status, 2) << pipe.err;
+  EXPECT_NE(pipe.err.find("is a pipe"), std::string::npos) << pipe.err;
+  EXPECT_TRUE(std::filesystem::is_fifo(temporary_ / "pipe.pdf"));
 }
 
 TEST_F(TagsInput, CellsFinerThanAPrintersDotsAreWarnedOf) {

@@ -1,6 +1,7 @@
 #include "host/config/appearance_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -88,6 +89,14 @@ TEST_F(RestPicture, MissingForeignAndDamagedFilesAreRefused) {
   broken[whole.size() / 2] = static_cast<char>(~broken[whole.size() / 2]);
   write(broken);
   expect_refused("is damaged");
+}
+
+TEST_F(RestPicture, FoldersAndPipesAreRefused) {
+  fs::create_directory(folder_ / "rest.png");
+  expect_refused("cannot be read");
+  fs::remove(folder_ / "rest.png");
+  ASSERT_EQ(::mkfifo((folder_ / "rest.png").c_str(), 0600), 0);
+  expect_refused("cannot be read");
 }
 
 TEST_F(RestPicture, AnotherSizeOrDepthIsRefused) {

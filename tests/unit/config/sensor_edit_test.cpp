@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <csignal>
 
@@ -112,6 +113,25 @@ TEST(WithKeys, RefusesWhatIsNoSensorFile) {
   EXPECT_THROW(with_keys(std::string(100'000, '['), {"camera", {}}, "s"), ConfigError);
 }
 
+TEST(CheckEditable, SaysBeforeTheWorkWhatCouldNotBeWrittenAfterIt) {
+  const std::vector<SectionEdit> edits = {{"camera", {{"fx", "1"}}}, {"rest", {{"frames", "9"}}}};
+  EXPECT_NO_THROW(check_editable(kSensor, edits, "sensor.yaml"));
+  const std::string anchored = replaced(replaced(kSensor, "fx: 805.0", "fx: &f 805.0"),
+                                        "axial_n_per_mm: 0.7", "axial_n_per_mm: *f");
+  for (const std::string& text :
+       {anchored, "\xEF\xBB\xBF" + std::string(kSensor), std::string(kSensor) + "---\na: 1\n"}) {
+    ASSERT_NO_THROW(parse_sensor(text, "sensor.yaml"));
+    try {
+      check_editable(text, edits, "sensor.yaml");
+      ADD_FAILURE() << "accepted: " << text;
+    } catch (const ConfigError& e) {
+      const std::string line = e.what();
+      EXPECT_EQ(line.rfind("sensor.yaml:", 0), 0u) << line;
+      EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+    }
+  }
+}
+
 TEST_F(SensorFile, IsReplacedAsAWholeKeepingItsMode) {
   const fs::path file = folder_ / "sensor.yaml";
   write_atomically(file, kSensor);
@@ -155,6 +175,15 @@ TEST_F(SensorFile, StaysWhenTheDiskIsFull) {
   ::setrlimit(RLIMIT_FSIZE, &old);
   EXPECT_EQ(read_text(file), kSensor);
   EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(SensorFile, StaysWhenItIsWriteProtected) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may write everything";
+  const fs::path file = folder_ / "sensor.yaml";
+  write_atomically(file, kSensor);
+  EXPECT_NO_THROW(check_replaceable(file));
+  fs::permissions(file, fs::perms::owner_read);
+  EXPECT_THROW(check_replaceable(file), ConfigError);
 }
 
 TEST_F(SensorFile, IsCheckedBeforeTheWork) {

@@ -14,7 +14,7 @@ namespace {
 TEST(TrackerHeap, HeldTargetAllocatesNothing) {
   const render::Scene scene = render::roof();
   CameraModel camera;
-  Tracker tracker(camera, TargetDescription{}, RestOptions{3, {}});
+  Tracker tracker(camera, TargetDescription{}, RestOptions{3, {}, {}});
   std::mt19937 random(5);
   const std::vector<float> light = render::expose(scene, Vector6::Zero());
   std::vector<render::Picture> pictures;
@@ -36,6 +36,7 @@ TEST(TrackerHeap, HeldTargetAllocatesNothing) {
     if (i >= 4) spent += std::chrono::steady_clock::now() - before;
     if (i >= 3) {
       EXPECT_EQ(track.status, Status::ok) << i;
+      EXPECT_FALSE(track.wanted.empty()) << "by its picture, not by its edges";
     }
   }
   EXPECT_EQ(test::stop_counting_allocations(), 0);

@@ -167,8 +167,9 @@ std::vector<float> expose(const Scene& scene, const Vector6& displacement) {
         continue;
       }
       for (int i = 0; i < n * n; ++i) {
-        const double du = (i % n + 0.5) / n - 0.5;
-        const double dv = (i / n + 0.5) / n - 0.5;
+        // No two samples in one row or column: edges along either get n * n levels.
+        const double du = (i % n + (i / n + 0.5) / n) / n - 0.5;
+        const double dv = (i / n + (i % n + 0.5) / n) / n - 0.5;
         const Eigen::Vector3d ray = ray_of(scene, u + du, v + dv);
         float level = kBackground;
         for (const Plane& plane : planes) {

@@ -23,7 +23,7 @@ TEST(TagFamilies, LastIdOfEachFamilyExistsAndTheNextDoesNot) {
   for (int i = 0; i < kTagFamilies; ++i) {
     TargetDescription target;
     target.family = static_cast<TagFamily>(i);
-    target.tags = {{id_count(target.family) - 1, {}}};
+    target.tags = {{id_count(target.family) - 1, {}, Vector6::Zero()}};
     const Acquirer acquirer(CameraModel{}, target);
     EXPECT_EQ(acquirer.patterns().at(0).cells, bits_per_side(target.family) + 2)
         << name(target.family);
@@ -34,7 +34,7 @@ TEST(TagFamilies, LastIdOfEachFamilyExistsAndTheNextDoesNot) {
 
 TEST(Target, IdListedTwiceIsRefusedByName) {
   TargetDescription target;
-  target.tags = {{5, {}}, {5, {}}};
+  target.tags = {{5, {}, Vector6::Zero()}, {5, {}, Vector6::Zero()}};
   try {
     const Acquirer acquirer(CameraModel{}, target);
     FAIL() << "accepted";

@@ -30,7 +30,7 @@ TargetDescription ids(TagFamily family, std::vector<int> list) {
   TargetDescription target;
   target.family = family;
   target.tags.clear();
-  for (const int id : list) target.tags.push_back({id, {}});
+  for (const int id : list) target.tags.push_back({id, {}, Vector6::Zero()});
   return target;
 }
 
@@ -49,7 +49,7 @@ struct Bench {
   std::mt19937 random{7};
   std::uint64_t sequence = 0;
 
-  Bench(Scene the_scene, const TargetDescription& target, RestOptions rest = {kRestFrames, {}})
+  Bench(Scene the_scene, const TargetDescription& target, RestOptions rest = {kRestFrames, {}, {}})
       : scene(std::move(the_scene)), tracker(camera_of(scene), target, rest) {}
 
   Track show(const Picture& picture) {
@@ -166,7 +166,7 @@ TEST(Tracker, GivenPlacementAndRestPoseNeedNoLearning) {
   for (std::size_t t = 0; t < 2; ++t) {
     target.tags[t].platform_T_tag = camera_T_platform.inverse() * scene.tags[t].camera_T_tag;
   }
-  Bench bench(scene, target, {kRestFrames, camera_T_platform});
+  Bench bench(scene, target, {kRestFrames, camera_T_platform, {}});
   expect_accurate(follow(bench, 25), 25, 2.0, 6.0, 0.5);
 }
 
@@ -267,6 +267,23 @@ TEST(Tracker, BothTagsCoveredIsLostAndComesBack) {
   const Track back = bench.show(truth);
   ASSERT_EQ(back.status, Status::ok);
   EXPECT_LT((back.displacement - truth).head<3>().norm(), 5e-6);
+}
+
+TEST(Tracker, HeldAgainWithinTwoFramesAfterItMovedUnseen) {
+  Bench bench(render::roof(), roof_target());
+  bench.rest();
+  bench.show(sway(3));
+  for (int i = 0; i < 4; ++i) {
+    const Track hidden =
+        bench.show(cover(render::take(bench.scene, sway(3 + i), bench.random), 0, 480, 90));
+    EXPECT_NE(hidden.status, Status::ok);
+  }
+  const Vector6 elsewhere = pose6(-0.8, 0.6, 0.4, 0.04, -0.03, 0.06);
+  bench.show(elsewhere);
+  const Track second = bench.show(elsewhere);
+  ASSERT_EQ(second.status, Status::ok);
+  EXPECT_EQ(second.tags_held, 2);
+  EXPECT_LT((second.displacement - elsewhere).head<3>().norm(), 5e-6);
 }
 
 TEST(Tracker, FastAndAbruptMotionIsFollowedInTheSameFrame) {
