@@ -1,4 +1,4 @@
-// A second renderer, written against the contract alone: it shares no code with the simulator and
+// A second renderer, written against the file formats alone: it shares no code with the simulator and
 // none with the tracker, so that what holds on both leans on neither.
 //
 // The tags are OpenCV's own drawings on white paper, as high-resolution art; a picture looks them

@@ -60,7 +60,8 @@ TEST(Disturbances, WithoutAnyThePictureIsTheOneOfBeforeTheyExisted) {
                                     {89.8879, 93.4690, 72.6865, 72.5184},
                                     {36.1976, 78.4996, 79.8180, 35.2947}};
   const Shot shot = shoot(Scenario{}, 60);
-  constexpr double kTolerance_counts = 0.003;  // a few pixels rounded differently
+  // The noise has other numbers since: five standard deviations of its mean over 19,200 pixels.
+  constexpr double kTolerance_counts = 0.06;
   for (int v = 0; v < 4; ++v) {
     for (int u = 0; u < 4; ++u) {
       EXPECT_NEAR(shot.mean(u * 160, u * 160 + 160, v * 120, v * 120 + 120), kBefore[v][u],
