@@ -1,7 +1,6 @@
 #include "host/calibrate_camera_command.h"
 
 #include <fmt/format.h>
-#include <poll.h>
 
 #include <algorithm>
 #include <chrono>
@@ -100,11 +99,6 @@ CameraModel camera_for(const Record& record, const SourceFormat& format) {
   camera.height_px = format.height;
   camera.fx_px = camera.fy_px = kGuessedFocal * format.width;
   return camera;
-}
-
-bool signalled(const UniqueFd& stop) {
-  pollfd entry{stop.get(), POLLIN, 0};
-  return ::poll(&entry, 1, 0) > 0;
 }
 
 /// Every picture of the folders; nothing if stopped by a signal.
@@ -211,15 +205,11 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
                             : TimePoint::max();
   while (!guide.complete() && static_cast<int>(collector->views().size()) < kMostCameraViews &&
          Clock::now() < end) {
-    pollfd fds[2] = {{source.poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};
-    ::poll(fds, 2, source.poll_fd() < 0 ? 0 : 200);
-    if (fds[1].revents != 0) return nullptr;
     Frame frame;
-    const ReadStatus status = source.read(frame);
-    if (status == ReadStatus::end) break;
-    if (status == ReadStatus::disconnected || status == ReadStatus::reconnected)
-      tell(source.detail());
-    if (status != ReadStatus::frame) continue;
+    const Next next = next_frame(source, stop, frame);
+    if (next == Next::stopped) return nullptr;
+    if (next == Next::end) break;
+    if (next != Next::frame) continue;
     const std::string name = fmt::format("view {}", collector->views().size() + 1);
     guide.say(collector->look(frame.image, name), *collector, wanted);
   }

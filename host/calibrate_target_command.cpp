@@ -1,7 +1,6 @@
 #include "host/calibrate_target_command.h"
 
 #include <fmt/format.h>
-#include <poll.h>
 
 #include <chrono>
 #include <filesystem>
@@ -27,11 +26,6 @@ constexpr int kStopped = 1;
 constexpr std::size_t kMostKeyframes = 150;
 constexpr double kSecondsFromCamera = 30;
 constexpr Duration kSayEvery = std::chrono::seconds(2);
-
-bool signalled(const UniqueFd& stop) {
-  pollfd entry{stop.get(), POLLIN, 0};
-  return ::poll(&entry, 1, 0) > 0;
-}
 
 /// Says what to do, and every two seconds how far it is.
 class Guide {
@@ -73,15 +67,11 @@ bool watch(FrameSource& source, const CalibrateTargetOptions& options, const Uni
   std::optional<TimePoint> first;
   Guide guide;
   while (!options.frames || record.counts().frames < *options.frames) {
-    pollfd fds[2] = {{source.poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};
-    ::poll(fds, 2, source.poll_fd() < 0 ? 0 : 200);
-    if (fds[1].revents != 0) return false;
     Frame frame;
-    const ReadStatus status = source.read(frame);
-    if (status == ReadStatus::end) break;
-    if (status == ReadStatus::disconnected || status == ReadStatus::reconnected)
-      tell(source.detail());
-    if (status != ReadStatus::frame) continue;
+    const Next next = next_frame(source, stop, frame);
+    if (next == Next::stopped) return false;
+    if (next == Next::end) break;
+    if (next != Next::frame) continue;
     if (!first) first = frame.capture_time;
     if (std::chrono::duration<double>(frame.capture_time - *first).count() >= seconds) break;
     guide.say(record, record.add(frame));
@@ -136,9 +126,14 @@ SectionEdit rest_section(const TargetEstimate& estimate, const RestImage& image,
            {"appearance", appearance}}};
 }
 
-/// The keys that will be written, before there are values.
+SectionEdit camera_section(const TargetEstimate& estimate) {
+  return {"camera", {{"readout_ms", fmt::format("{:.1f}", estimate.readout * 1e3)}}};
+}
+
+/// The keys that may be written, before there are values.
 std::vector<SectionEdit> placeholders() {
-  return {{"target", {{"tags", "[]"}}},
+  return {{"camera", {{"readout_ms", "0"}}},
+          {"target", {{"tags", "[]"}}},
           {"rest",
            {{"frames", "1"}, {"position_mm", "[]"}, {"rotation_rad", "[]"}, {"appearance", "''"}}}};
 }
@@ -151,11 +146,12 @@ void write(const fs::path& sensor, const std::string& text, const fs::path& appe
   std::optional<std::string> before;
   if (fs::exists(appearance, error)) before = read_text(appearance);
   save_rest_image(appearance, image);
+  std::vector<SectionEdit> edits = {
+      target_section(estimate, target),
+      rest_section(estimate, image, appearance_name(sensor, appearance))};
+  if (readout_is_clear(estimate)) edits.push_back(camera_section(estimate));
   try {
-    write_sensor(text,
-                 {target_section(estimate, target),
-                  rest_section(estimate, image, appearance_name(sensor, appearance))},
-                 sensor);
+    write_sensor(text, edits, sensor);
   } catch (...) {
     if (before) {
       write_atomically(appearance, *before);
@@ -205,6 +201,7 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   write(sensor_file, text, appearance, estimate, sensor.target, record.at_rest().image);
   for (const std::string& line : describe(record, estimate, sensor.target, sensor.camera))
     tell(line);
+  if (readout_is_clear(estimate)) tell("the shutter rolls: camera.readout_ms is written too");
   tell(fmt::format("written: {} and {}", sensor_file.string(), appearance.string()));
   return 0;
 }

@@ -1,6 +1,7 @@
 #include "host/input.h"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/signalfd.h>
 
 #include <csignal>
@@ -13,6 +14,8 @@
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/source/v4l2_source.h"
+#include "host/tell.h"
+#include "host/tracker/appearance_check.h"
 
 namespace tagwrench {
 namespace {
@@ -97,9 +100,36 @@ void check_size(const Input& input) {
       format.description, format.width, format.height, camera.width_px, camera.height_px));
 }
 
+void check_appearance(const Input& input) {
+  const SensorConfig& sensor = input.sensor;
+  const auto mismatch = check_appearance(sensor.camera, sensor.target, sensor.rest);
+  if (!mismatch) return;
+  throw ConfigError(fmt::format(
+      "sensor.yaml: rest.appearance: the picture does not show tag {} of {} where the rest pose "
+      "puts it (likeness {:.2f}); run `tagwrench calibrate target`, or remove rest.appearance",
+      mismatch->id, name(sensor.target.family), mismatch->likeness));
+}
+
 UniqueFd signals_as_fd() {
   const sigset_t signals = block_signals();
   return UniqueFd(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+bool signalled(const UniqueFd& stop) {
+  pollfd entry{stop.get(), POLLIN, 0};
+  return ::poll(&entry, 1, 0) > 0;
+}
+
+Next next_frame(FrameSource& source, const UniqueFd& stop, Frame& frame) {
+  constexpr int kPatience_ms = 200;
+  pollfd fds[2] = {{source.poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};
+  ::poll(fds, 2, source.poll_fd() < 0 ? 0 : kPatience_ms);
+  if (fds[1].revents != 0) return Next::stopped;
+  const ReadStatus status = source.read(frame);
+  if (status == ReadStatus::end) return Next::end;
+  if (status == ReadStatus::disconnected || status == ReadStatus::reconnected)
+    tell(source.detail());
+  return status == ReadStatus::frame ? Next::frame : Next::nothing;
 }
 
 }  // namespace tagwrench

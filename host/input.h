@@ -2,6 +2,7 @@
 // end a command.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -40,8 +41,19 @@ std::string paper_sensor_yaml();
 /// Throws ConfigError unless the source's frames have the size that the sensor's camera has.
 void check_size(const Input& input);
 
+/// Throws ConfigError unless the picture of the sensor at rest, where one is given, shows its tags.
+void check_appearance(const Input& input);
+
 /// Ctrl-C, kill and a closed terminal no longer end the program at once; the descriptor is readable
 /// once one of them has come.
 UniqueFd signals_as_fd();
+
+/// Whether one of them has come to signals_as_fd().
+bool signalled(const UniqueFd& stop);
+
+enum class Next : std::uint8_t { frame, nothing, end, stopped };
+
+/// Waits a while for a frame, the end of the source or a signal; says when a camera goes or comes.
+Next next_frame(FrameSource& source, const UniqueFd& stop, Frame& frame);
 
 }  // namespace tagwrench

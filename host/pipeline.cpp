@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <exception>
 
+#include "host/hint_text.h"
 #include "host/tell.h"
 
 namespace tagwrench {
@@ -19,28 +21,6 @@ constexpr Duration kGuardianGrace = milliseconds(60);
 // A camera that slows down in dim light is late, not lost; slower than this it is lost.
 constexpr Duration kSlowestInterval = milliseconds(250);
 constexpr std::size_t kMostOutputs = 14;
-
-const char* text(Hint hint) {
-  switch (hint) {
-    case Hint::image_looks_mirrored:
-      return "the image looks mirrored (tags decode only when it is flipped left to right); set "
-             "camera.mirrored: true in "
-             "sensor.yaml";
-    case Hint::image_looks_unmirrored:
-      return "the image does not look mirrored, but sensor.yaml says so; set camera.mirrored: "
-             "false in sensor.yaml";
-    case Hint::rest_learned:
-      return "rest pose learned; the wrench counts from here";
-    case Hint::moved_while_learning:
-      return "the platform moved while its rest pose was learned; let it rest for a moment";
-    case Hint::appearance_does_not_fit:
-      return "the target does not look like the picture in rest.appearance (light, focus, dirt or "
-             "another lens?); run `tagwrench calibrate target`, or remove that line";
-    case Hint::none:
-      break;
-  }
-  return "";
-}
 
 }  // namespace
 
@@ -72,7 +52,7 @@ void Pipeline::step(Frame& frame) noexcept {
   ++report_.frames;
   report_.dropped += sample.dropped;
   if (carries_numbers(sample.status)) ++report_.with_numbers;
-  say_hint(track.hint);
+  say_hint(track);
 }
 
 RunReport Pipeline::run(const RunLimits& limits) {
@@ -191,10 +171,24 @@ void Pipeline::send_neutral() noexcept {
         .status = Status::lost});
 }
 
-void Pipeline::say_hint(Hint hint) noexcept {
-  if (hint == Hint::none || hint == last_hint_) return;
-  last_hint_ = hint;
-  say(text(hint));
+/// What was wrong is not, once the target is held.
+void Pipeline::say_hint(const Track& track) noexcept {
+  if (track.status == Status::ok && trouble_shown_) {
+    trouble_shown_ = false;
+    for (const std::unique_ptr<Output>& output : outputs_) output->notice({});
+  }
+  // The tracker itself sees to it that troubles are not said too often.
+  const bool trouble = is_trouble(track.hint);
+  if (track.hint == Hint::none || (track.hint == last_hint_ && !trouble)) return;
+  last_hint_ = track.hint;
+  try {
+    const std::string line = hint_text(track.hint, track.details);
+    if (track.status != Status::ok && track.hint != Hint::rest_learned) report_.trouble = line;
+    trouble_shown_ = trouble_shown_ || (trouble && track.status != Status::ok);
+    say(line);
+  } catch (const std::exception&) {
+    return;  // out of memory: unsaid
+  }
 }
 
 void Pipeline::say(std::string_view line) noexcept {

@@ -28,6 +28,7 @@ struct RunReport {
   enum class End : std::uint8_t { limit, source_ended, interrupted, output_failed };
   End end = End::limit;
   std::string failure;             ///< one line, when an output failed
+  std::string trouble;             ///< the last line that said why the target is not held
   std::uint64_t frames = 0;        ///< processed
   std::uint64_t with_numbers = 0;  ///< of these, ok or saturated
   std::uint64_t dropped = 0;       ///< lost by the source
@@ -56,7 +57,7 @@ class Pipeline {
   void note_arrival(TimePoint now) noexcept;
   void wait(TimePoint until) noexcept;
   void say(std::string_view line) noexcept;
-  void say_hint(Hint hint) noexcept;
+  void say_hint(const Track& track) noexcept;
   TimePoint wake_time(const RunLimits& limits) const noexcept;
   TimePoint missing_at() const noexcept;
 
@@ -75,6 +76,7 @@ class Pipeline {
   bool neutral_ = true;
   bool source_ready_ = false;
   Hint last_hint_ = Hint::none;
+  bool trouble_shown_ = false;  ///< since the target was last held
   Sample last_sample_;
   RunReport report_;
   std::optional<RunReport::End> end_;

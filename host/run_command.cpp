@@ -199,9 +199,11 @@ std::string summary(const RunReport& report) {
   if (report.skipped > 0)
     line += fmt::format(", {} samples not taken by slow readers", report.skipped);
   if (report.frames > 0 && report.with_numbers == 0) {
-    line +=
-        "; the target was never held: are the tags in view, in focus and lit, and are family, ids "
-        "and number of tags those of sensor.yaml?";
+    line += "; the target was never held: ";
+    line += report.trouble.empty()
+                ? "are the tags in view, in focus and lit, and are family, ids and number of tags "
+                  "those of sensor.yaml?"
+                : report.trouble;
   }
   return line;
 }
@@ -214,6 +216,7 @@ int run(const RunOptions& options) {
                                        : open_input({options.sensor, options.source, options.fast});
   const UniqueFd stop = signals_as_fd();
   check_size(input);
+  check_appearance(input);
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
   const WrenchEstimator wrench(input.sensor.wrench);
   const Shaping shaping(input.sensor.shaping);

@@ -15,8 +15,10 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
+#include <string_view>
 #include <utility>
 
 namespace tagwrench {
@@ -114,12 +116,54 @@ constexpr const char* name(Status status) {
 /// What the tracker noticed that a person should be told; said once by whoever runs the loop.
 enum class Hint : std::uint8_t {
   none,
-  image_looks_mirrored,    ///< tags decode only after a horizontal flip, and the sensor says
-                           ///< mirrored: false
-  image_looks_unmirrored,  ///< the reverse: the sensor says mirrored: true
-  rest_learned,            ///< this frame completed the rest pose
-  moved_while_learning,    ///< the platform moved during the rest frames; learning starts again
+  image_looks_mirrored,     ///< tags decode only after a horizontal flip, and the sensor says
+                            ///< mirrored: false
+  image_looks_unmirrored,   ///< the reverse: the sensor says mirrored: true
+  rest_learned,             ///< this frame completed the rest pose
+  moved_while_learning,     ///< the platform moved during the rest frames; learning starts again
   appearance_does_not_fit,  ///< the target no longer looks like the picture that was loaded
+  far_from_rest,  ///< held, and standing still since the start, but not where rest was given
+  shutter_rolls,  ///< pictures of a moving target are sheared; the sensor says readout 0
+  // Why the target is not held (tracker/diagnosis.h):
+  image_black,           ///< lens cap on, no light
+  image_saturated,       ///< much of it is white
+  image_empty,           ///< even grey
+  image_unsharp,         ///< contrast, but no sharp edge
+  no_tag,                ///< nothing of what the sensor describes, and nothing known instead
+  wrong_family,          ///< tags of another family
+  wrong_ids,             ///< tags of the family, but other ones
+  tag_missing,           ///< some of the tags, but not all
+  tag_twice,             ///< one id in two places
+  tag_printed_mirrored,  ///< some tags read as they are, others only when flipped
+  other_scale,           ///< the tags' size does not go with the distances between them
+  other_places,          ///< the tags sit differently to each other
+  rest_elsewhere,        ///< the target is out of reach of its rest pose
+};
+
+/// Says why the target is not held, and is true no longer when it is.
+constexpr bool is_trouble(Hint hint) { return hint >= Hint::image_black; }
+
+/// The numbers that go with a hint; those that do not apply are empty or zero.
+struct HintDetails {
+  struct Ids {
+    std::array<std::int16_t, 8> id{};
+    std::uint8_t count = 0;
+
+    constexpr void add(int tag) {
+      if (count < id.size()) id[count++] = static_cast<std::int16_t>(tag);
+    }
+    constexpr bool operator==(const Ids&) const = default;
+  };
+  Ids expected;             ///< the sensor's tags
+  Ids seen;                 ///< in view, whether expected or not
+  Ids concerned;            ///< those that are missing, there twice, or printed mirrored
+  std::string_view family;  ///< of the tags seen; a name that stays
+  std::string_view expected_family;
+  double amount = 0;  ///< grey level of the brightest pixels; part of pixels that are white; px
+                      ///< that the sharpest edge is wide; size of the tags over what was described;
+                      ///< readout (s)
+  Vector6 offset = Vector6::Zero();  ///< from rest to where the target is, m and rad, camera axes
+  bool rest_given = false;           ///< by the sensor's description, not learned
 };
 
 /// The platform's displacement from rest, as the tracker sees it. Numbers are zero unless status is
@@ -127,6 +171,7 @@ enum class Hint : std::uint8_t {
 struct Track {
   Status status = Status::acquiring;
   Hint hint = Hint::none;
+  HintDetails details;                     ///< of the hint
   Vector6 displacement = Vector6::Zero();  ///< translation (m), rotation vector r with R_now =
                                            ///< exp(r) R_rest (rad), both along camera axes
   Matrix6 covariance = Matrix6::Zero();    ///< of displacement, m^2, m rad, rad^2

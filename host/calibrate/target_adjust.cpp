@@ -5,9 +5,9 @@
 #include <cmath>
 #include <utility>
 
+#include "host/calibrate/target_derivatives.h"
 #include "host/calibrate/target_normal.h"
 #include "host/calibrate/target_print.h"
-#include "host/tracker/projection.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -33,6 +33,8 @@ constexpr double kRestFloor_px = 0.01;   // the averaged rest image has errors t
 constexpr double kModel_px = 0.004;
 /// And the same for the focal length, as a part of it.
 constexpr double kFocalModel = 0.002;
+/// And the read-out time: a picture's velocity is the mean over two steps.
+constexpr double kReadoutModel = 0.3e-3;    // s
 constexpr double kReadoutPrior = 30e-3;     // s, a rolling shutter's
 constexpr double kSpreadPrior = 50e-6;      // m
 constexpr double kLeastContrastPart = 0.3;  // of the tag's median, for a point to be used
@@ -64,33 +66,6 @@ struct Observation {
 
 }  // namespace
 
-EdgeDerivatives edge_derivatives(const CameraModel& camera, const EdgeMeasurement& measurement,
-                                 const Eigen::Isometry3d& camera_T_platform,
-                                 const Eigen::Isometry3d& rest_camera_T_platform,
-                                 const Eigen::Isometry3d& camera_T_tag,
-                                 const Eigen::Vector3d& point) {
-  EdgeDerivatives by;
-  by.frame = measurement.row;
-  by.normal = measurement.px_per_m;
-  // A motion (t, r) of the tag at rest moves the point by t + r x arm at rest, and by that turned
-  // in the picture.
-  const Eigen::Matrix3d turn =
-      camera_T_platform.linear() * rest_camera_T_platform.linear().transpose();
-  const Eigen::Vector3d pull = turn.transpose() * measurement.row.head<3>();
-  const Eigen::Vector3d arm = camera_T_tag.linear() * point;
-  by.tag << pull, arm.cross(pull);
-  // measurement.row begins with J^T n, n the direction of the profile and J the projection's
-  // derivative; the image grows about the principal point.
-  const Eigen::Vector3d p =
-      camera_T_platform * (rest_camera_T_platform.inverse() * (camera_T_tag * point));
-  const ProjectedPoint seen = project(camera, p);
-  const Eigen::Matrix2d square = seen.jacobian * seen.jacobian.transpose();
-  const Eigen::Vector2d direction = square.inverse() * (seen.jacobian * measurement.row.head<3>());
-  by.focal = direction.dot(seen.pixel - Eigen::Vector2d(camera.cx_px, camera.cy_px));
-  by.row_px = seen.pixel.y();
-  return by;
-}
-
 struct TargetAdjuster::Problem {
   // What moves while iterating.
   struct State {
@@ -120,7 +95,9 @@ struct TargetAdjuster::Problem {
   EdgeTag edges(const State& state, std::size_t tag) const;
   template <class Pixel>
   void observe(const EdgeMeter& meter, const PixelView<Pixel>& image, const State& state,
-               const Eigen::Isometry3d& pose, std::vector<Observation>& out) const;
+               const Eigen::Isometry3d& pose, const Eigen::VectorXd& late,
+               std::vector<Observation>& out) const;
+  Eigen::VectorXd lateness(const std::vector<Observation>& seen, double readout) const;
   void observe_all(const std::vector<Keyframe>& frames, const State& state);
   void learn_noise();
   TargetNormal equations(const State& state, bool at_rest_only) const;
@@ -173,13 +150,28 @@ EdgeTag TargetAdjuster::Problem::edges(const State& state, std::size_t tag) cons
   return out;
 }
 
+/// How far (m, along its normal) the rolling shutter shows each point off its place.
+Eigen::VectorXd TargetAdjuster::Problem::lateness(const std::vector<Observation>& seen,
+                                                  double readout) const {
+  Eigen::VectorXd late = Eigen::VectorXd::Zero(points);
+  for (std::size_t p = 0; p < seen.size(); ++p) {
+    if (seen[p].valid)
+      late[static_cast<Eigen::Index>(p)] = seen[p].by_readout * readout / seen[p].by.normal;
+  }
+  return late;
+}
+
+/// Profiles are taken `late` off the points' places, and offsets count from there.
 template <class Pixel>
 void TargetAdjuster::Problem::observe(const EdgeMeter& meter, const PixelView<Pixel>& image,
                                       const State& state, const Eigen::Isometry3d& pose,
+                                      const Eigen::VectorXd& late,
                                       std::vector<Observation>& out) const {
   out.assign(static_cast<std::size_t>(points), {});
   for (std::size_t t = 0; t < printed.size(); ++t) {
-    const EdgeTag tag = edges(state, t);
+    EdgeTag tag = edges(state, t);
+    for (std::size_t i = 0; i < tag.points.size(); ++i)
+      tag.points[i] = shifted(tag.points[i], late[first[t] + static_cast<Eigen::Index>(i)]);
     std::vector<EdgeMeasurement> measured(tag.points.size());
     meter.measure(image, tag, pose, kHalf_px, false, measured);
     std::vector<double> gains;
@@ -200,18 +192,22 @@ void TargetAdjuster::Problem::observe(const EdgeMeter& meter, const PixelView<Pi
 
 void TargetAdjuster::Problem::observe_all(const std::vector<Keyframe>& frames, const State& state) {
   observe(EdgeMeter(with_focal(rest.camera, state.focal_ratio)), rest_view(), state, rest_pose,
-          at_rest);
+          Eigen::VectorXd::Zero(points), at_rest);
   moving.resize(frames.size());
   for (std::size_t k = 0; k < frames.size(); ++k) {
     const Keyframe& frame = frames[k];
+    // Profiles are short: an edge that is far from where it is looked for is found too near.
+    const Eigen::VectorXd late = lateness(moving[k], state.readout);
     observe(EdgeMeter(with_focal(frame.camera, state.focal_ratio)), frame.view(), state,
-            state.poses[k], moving[k]);
+            state.poses[k], late, moving[k]);
     // A row is read before or after the middle one, by its part of the read-out time.
     const double middle = 0.5 * (frame.image_rows - 1) - frame.first_row;
-    for (Observation& seen : moving[k]) {
+    for (std::size_t p = 0; p < moving[k].size(); ++p) {
+      Observation& seen = moving[k][p];
       seen.by_readout =
           seen.by.frame.dot(frame.velocity) * (seen.by.row_px - middle) / frame.image_rows;
-      seen.offset -= seen.by_readout * state.readout;
+      seen.offset +=
+          late[static_cast<Eigen::Index>(p)] * seen.by.normal - seen.by_readout * state.readout;
     }
   }
 }
@@ -358,13 +354,16 @@ TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
     return information.ldlt().solve(
         Eigen::MatrixXd::Identity(information.rows(), information.cols()));
   };
-  estimate.covariance =
-      inverse(normal.information().topLeftCorner(all, all)).topLeftCorner(tags, tags);
+  const Eigen::MatrixXd covariance = inverse(normal.information().topLeftCorner(all, all));
+  estimate.covariance = covariance.topLeftCorner(tags, tags);
   estimate.covariance_at_rest =
       inverse(alone.information().topLeftCorner(all, all)).topLeftCorner(tags, tags);
   estimate.focal_sigma =
       std::hypot(kFocalModel, std::sqrt(inverse(normal.information())(all, all)));
   estimate.readout = state.readout;
+  const Eigen::Index readout = normal.readout_index();
+  const double readout_noise = std::sqrt(covariance(readout, readout));
+  estimate.readout_sigma = std::hypot(kReadoutModel, readout_noise);
   estimate.camera_T_tag = state.camera_T_tag;
   estimate.ink_spread = state.spread;
   estimate.print_scatter = problem.scatter.robust;
@@ -380,6 +379,8 @@ TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
     }
   }
   estimate.residual_px = std::sqrt(squares / std::max(1.0, count));
+  // What one parameter takes off a sum of squared normalised residuals, in a linear fit.
+  estimate.readout_gain = std::pow(estimate.readout / readout_noise, 2) / std::max(1.0, count);
   estimate.solved = estimate.covariance.allFinite() && estimate.covariance_at_rest.allFinite() &&
                     std::isfinite(estimate.focal_sigma);
   return estimate;

@@ -25,22 +25,6 @@
 
 namespace tagwrench {
 
-/// How the offset of one edge point (px, along its normal in the image) changes.
-struct EdgeDerivatives {
-  Vector6 frame = Vector6::Zero();  ///< with a motion of the platform (rotation.h), px/m and px/rad
-  Vector6 tag = Vector6::Zero();    ///< with a motion of the tag at rest, camera axes, alike
-  double normal = 0;                ///< with a shift of the edge in the tag's plane, px/m
-  double focal = 0;                 ///< with the logarithm of the focal length, px
-  double row_px = 0;                ///< where the point is seen
-};
-
-/// `camera_T_platform` in this picture and at rest; `camera_T_tag` at rest; `point` in tag axes, m.
-EdgeDerivatives edge_derivatives(const CameraModel& camera, const EdgeMeasurement& measurement,
-                                 const Eigen::Isometry3d& camera_T_platform,
-                                 const Eigen::Isometry3d& rest_camera_T_platform,
-                                 const Eigen::Isometry3d& camera_T_tag,
-                                 const Eigen::Vector3d& point);
-
 /// What is known before the motion, and what after it, of the same parameters.
 struct TargetEstimate {
   std::vector<Eigen::Isometry3d> camera_T_tag;  ///< at rest
@@ -49,14 +33,17 @@ struct TargetEstimate {
   /// given.
   Eigen::MatrixXd covariance;
   Eigen::MatrixXd covariance_at_rest;  ///< the same from the rest image alone
-  double readout = 0;                  ///< from the first row to the last, s; good to a tenth
-  double focal_ratio = 1;              ///< that fits best, to the camera's
-  double focal_sigma = 0;              ///< of the ratio
-  double noise_px = 0;                 ///< of one edge in one keyframe
-  double residual_px = 0;              ///< RMS over all edges of all keyframes, outliers included
-  double print_scatter = 0;            ///< of the edges about the pattern, m
-  int points = 0;                      ///< edge points in use
-  bool solved = false;                 ///< false: the equations had no solution
+  double readout = 0;                  ///< from the first row to the last, s
+  double readout_sigma = 0;            ///< s
+  /// By how much of an edge's variance the fit would be worse without the read-out time.
+  double readout_gain = 0;
+  double focal_ratio = 1;    ///< that fits best, to the camera's
+  double focal_sigma = 0;    ///< of the ratio
+  double noise_px = 0;       ///< of one edge in one keyframe
+  double residual_px = 0;    ///< RMS over all edges of all keyframes, outliers included
+  double print_scatter = 0;  ///< of the edges about the pattern, m
+  int points = 0;            ///< edge points in use
+  bool solved = false;       ///< false: the equations had no solution
 };
 
 /// The rest image and where the tags are in it, nearly right.

@@ -20,24 +20,6 @@ bool same_edge(const EdgePoint& a, const EdgePoint& b) {
 
 }  // namespace
 
-EdgePoint shifted(EdgePoint point, double distance) {
-  switch (point.normal) {
-    case EdgeNormal::plus_x:
-      point.x += distance;
-      break;
-    case EdgeNormal::minus_x:
-      point.x -= distance;
-      break;
-    case EdgeNormal::plus_y:
-      point.y += distance;
-      break;
-    case EdgeNormal::minus_y:
-      point.y -= distance;
-      break;
-  }
-  return point;
-}
-
 PrintScatter print_scatter(const std::vector<EdgeTag>& printed,
                            const std::vector<Eigen::Index>& first, const Eigen::VectorXd& shift,
                            const std::vector<double>& spread) {

@@ -19,7 +19,4 @@ PrintScatter print_scatter(const std::vector<EdgeTag>& printed,
                            const std::vector<Eigen::Index>& first, const Eigen::VectorXd& shift,
                            const std::vector<double>& spread);
 
-/// The point moved along its normal, m.
-EdgePoint shifted(EdgePoint point, double distance);
-
 }  // namespace tagwrench

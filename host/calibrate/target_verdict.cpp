@@ -20,6 +20,8 @@ constexpr double kLeastFollowed = 0.5;    // of the frames in motion
 constexpr double kLargestNoise_px = 0.3;  // of one edge
 constexpr double kLargestFocalError = 0.01;
 constexpr double kFocalSigmas = 3.0;
+constexpr double kReadoutSigmas = 8;
+constexpr double kLeastReadoutGain = 0.05;       // of an edge's variance
 constexpr double kLargestPositionSigma = 10e-6;  // m
 constexpr double kLargestRotationSigma = 2e-3;   // rad
 constexpr double kBetterPart = 0.9;              // of a sigma, to be called better known
@@ -184,6 +186,11 @@ int better_known(const TargetEstimate& estimate, double part) {
   return static_cast<int>((solver.eigenvalues().array() < part * part).count());
 }
 
+bool readout_is_clear(const TargetEstimate& estimate) {
+  return estimate.readout > kReadoutSigmas * estimate.readout_sigma &&
+         estimate.readout_gain > kLeastReadoutGain;
+}
+
 std::vector<std::string> describe(const TargetRecorder& record, const TargetEstimate& estimate,
                                   const TargetDescription& target, const CameraModel& camera) {
   const TargetRecorder::Counts& counts = record.counts();
@@ -227,8 +234,11 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
       "focal length: {:.2f} +- {:.2f} px fits best, sensor.yaml says {:.2f}; residual {:.3f} px",
       camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px,
       estimate.residual_px));
-  lines.push_back(fmt::format("read-out: about {:.0f} ms from the first row to the last",
-                              std::round(estimate.readout * 1e3) + 0.0));  // never "-0"
+  lines.push_back(fmt::format(
+      "read-out: {:.1f} +- {:.1f} ms from the first row to the last, sensor.yaml says {:.1f}{}",
+      std::round(estimate.readout * 1e4) * 0.1 + 0.0,  // never "-0"
+      estimate.readout_sigma * 1e3, camera.readout * 1e3,
+      readout_is_clear(estimate) ? "" : "; not clearly other than 0"));
   return lines;
 }
 

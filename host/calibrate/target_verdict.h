@@ -41,6 +41,10 @@ std::vector<Vector6> platform_sigmas(const Eigen::MatrixXd& covariance);
 /// this part of that from the rest image alone.
 int better_known(const TargetEstimate& estimate, double part);
 
+/// Whether the recording tells that the shutter rolls, and how fast: many sigmas, and a fit that is
+/// clearly better with it. A global shutter's never does.
+bool readout_is_clear(const TargetEstimate& estimate);
+
 /// Lines for people: what was excited, where the tags are and how well that is known.
 std::vector<std::string> describe(const TargetRecorder& record, const TargetEstimate& estimate,
                                   const TargetDescription& target, const CameraModel& camera);

@@ -3,15 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
+#include <vector>
 
 #include "host/config/sensor_edit.h"
 #include "host/config_error.h"
+#include "host/source/png.h"
 
 namespace tagwrench {
 namespace {
@@ -20,41 +22,23 @@ constexpr float kCountsPerLevel = 256.0F;
 constexpr const char* kRemedy =
     "remove rest.appearance, and run `tagwrench calibrate target` for a new one";
 
-// Of a PNG file (W3C, "Portable Network Graphics Specification", 5.2 and 11.2.2).
-constexpr std::array<unsigned char, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-constexpr std::size_t kHeaderSize = 26;
-constexpr std::size_t kWidthAt = 16;
-constexpr std::size_t kHeightAt = 20;
-constexpr std::size_t kDepthAt = 24;
-constexpr std::size_t kColourTypeAt = 25;
-constexpr unsigned char kGrey = 0;
-
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& what) {
   throw ConfigError(fmt::format("{}: {}; {}", path.string(), what, kRemedy));
 }
 
-std::uint32_t big_endian(const std::vector<unsigned char>& bytes, std::size_t at) {
-  return std::uint32_t{bytes[at]} << 24 | std::uint32_t{bytes[at + 1]} << 16 |
-         std::uint32_t{bytes[at + 2]} << 8 | std::uint32_t{bytes[at + 3]};
-}
-
 /// The header is checked before anything is decoded: a small file may claim gigapixels.
-void check_header(const std::filesystem::path& path, const std::vector<unsigned char>& bytes,
+void check_header(const std::filesystem::path& path, const std::vector<std::uint8_t>& bytes,
                   const CameraModel& camera) {
-  if (bytes.size() < kHeaderSize ||
-      !std::equal(kSignature.begin(), kSignature.end(), bytes.begin())) {
-    refuse(path, "is not a PNG file");
+  const auto header = png_header(bytes);
+  if (!header) refuse(path, "is not a PNG file");
+  if (header->width != static_cast<std::uint32_t>(camera.width_px) ||
+      header->height != static_cast<std::uint32_t>(camera.height_px)) {
+    refuse(path, fmt::format("is {}x{}, but sensor.yaml's camera is {}x{}", header->width,
+                             header->height, camera.width_px, camera.height_px));
   }
-  const std::uint32_t width = big_endian(bytes, kWidthAt);
-  const std::uint32_t height = big_endian(bytes, kHeightAt);
-  if (width != static_cast<std::uint32_t>(camera.width_px) ||
-      height != static_cast<std::uint32_t>(camera.height_px)) {
-    refuse(path, fmt::format("is {}x{}, but sensor.yaml's camera is {}x{}", width, height,
-                             camera.width_px, camera.height_px));
-  }
-  if (bytes[kDepthAt] != 16 || bytes[kColourTypeAt] != kGrey) {
+  if (header->bit_depth != 16 || !header->grey) {
     refuse(path, fmt::format("is a {}-bit {} picture, but the rest image is 16-bit grey",
-                             bytes[kDepthAt], bytes[kColourTypeAt] == kGrey ? "grey" : "colour"));
+                             header->bit_depth, header->grey ? "grey" : "colour"));
   }
 }
 
@@ -65,27 +49,16 @@ RestImage load_rest_image(const std::filesystem::path& path, const CameraModel& 
   std::ifstream in;
   if (std::filesystem::is_regular_file(path, error)) in.open(path, std::ios::binary);
   if (!in.is_open()) refuse(path, "cannot be read as a file");
-  std::vector<unsigned char> bytes(std::istreambuf_iterator<char>(in), {});
+  std::vector<std::uint8_t> bytes(std::istreambuf_iterator<char>(in), {});
   check_header(path, bytes, camera);
-  cv::Mat picture;
-  try {
-    picture = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    picture.release();
-  }
-  if (picture.type() != CV_16UC1 || picture.cols != camera.width_px ||
-      picture.rows != camera.height_px) {
-    refuse(path, "is damaged");
-  }
+  std::vector<std::uint16_t> counts;
+  if (!decode_png(bytes, camera.width_px, camera.height_px, counts)) refuse(path, "is damaged");
   RestImage image;
-  image.width = picture.cols;
-  image.height = picture.rows;
-  image.level.reserve(picture.total());
-  for (int row = 0; row < picture.rows; ++row) {
-    const auto* counts = picture.ptr<std::uint16_t>(row);
-    for (int column = 0; column < picture.cols; ++column)
-      image.level.push_back(static_cast<float>(counts[column]) / kCountsPerLevel);
-  }
+  image.width = camera.width_px;
+  image.height = camera.height_px;
+  image.level.reserve(counts.size());
+  for (const std::uint16_t count : counts)
+    image.level.push_back(static_cast<float>(count) / kCountsPerLevel);
   return image;
 }
 

@@ -10,6 +10,7 @@
 #include "host/config/appearance_file.h"
 #include "host/config/calibration_file.h"
 #include "host/config/yaml_reader.h"
+#include "host/tracker/projection.h"
 #include "host/wrench/spring_model.h"
 
 namespace tagwrench {
@@ -94,6 +95,49 @@ double read_readout_ms(YamlReader& node) {
   return readout_ms;
 }
 
+/// Where the distortion folds the image, px: looking outward, its pixels begin to show again what
+/// they have shown nearer to the centre. Empty where they never do.
+std::optional<Eigen::Vector2d> fold(const CameraModel& camera) {
+  constexpr int kSides = 16;  // places along each side of the image
+  constexpr int kSteps = 32;  // from the centre to each
+  constexpr int kWithin = 4;  // places in each step
+  constexpr int kNewton = 10;
+  constexpr double kClose_px = 1e-6;
+  const Eigen::Vector2d centre(camera.cx_px, camera.cy_px);
+  const auto folded = [&](const Eigen::Vector2d& ray) {
+    return !(project(camera, ray.homogeneous()).jacobian.leftCols<2>().determinant() > 0);
+  };
+  const auto fold_toward = [&](const Eigen::Vector2d& border) -> std::optional<Eigen::Vector2d> {
+    Eigen::Vector2d ray(0, 0);
+    for (int step = 1; step <= kSteps; ++step) {
+      const Eigen::Vector2d pixel = centre + (border - centre) * step / kSteps;
+      const Eigen::Vector2d before = ray;
+      double miss = 0;
+      for (int i = 0; i < kNewton; ++i) {
+        const ProjectedPoint at = project(camera, ray.homogeneous());
+        miss = (pixel - at.pixel).norm();
+        ray += at.jacobian.leftCols<2>().inverse() * (pixel - at.pixel);
+      }
+      if (!(miss < kClose_px)) return pixel;
+      for (int i = 1; i <= kWithin; ++i) {
+        if (folded(before + (ray - before) * i / kWithin)) return pixel;
+      }
+    }
+    return std::nullopt;
+  };
+  const double right = camera.width_px - 1;
+  const double bottom = camera.height_px - 1;
+  for (int i = 0; i <= kSides; ++i) {
+    const double part = static_cast<double>(i) / kSides;
+    for (const Eigen::Vector2d& border :
+         {Eigen::Vector2d(part * right, 0), Eigen::Vector2d(part * right, bottom),
+          Eigen::Vector2d(0, part * bottom), Eigen::Vector2d(right, part * bottom)}) {
+      if (const auto found = fold_toward(border)) return found;
+    }
+  }
+  return std::nullopt;
+}
+
 CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record) {
   CameraModel camera;
   camera.width_px = node.integer("width", 16, 16384);
@@ -104,6 +148,12 @@ CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record) {
   camera.cy_px = node.within("cy", -kFarthestCentre_px, kFarthestCentre_px);
   const std::vector<double> distortion = node.numbers_or("distortion", std::vector<double>(5, 0.0));
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
+  if (const auto at = fold(camera)) {
+    node.fail("distortion",
+              fmt::format("folds the image at pixel ({:.0f}, {:.0f}), which no lens does; run "
+                          "`tagwrench calibrate camera`, or leave it out",
+                          at->x(), at->y()));
+  }
   camera.mirrored = node.boolean_or("mirrored", false);
   camera.readout = read_readout_ms(node) * 1e-3;
   if (node.has("calibrated")) record = read_camera_record(node.child("calibrated"));

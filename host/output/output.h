@@ -35,7 +35,8 @@ class Output {
   /// Answers. What a client has changed, in words for people; empty if nothing.
   virtual std::string_view service() noexcept { return {}; }
 
-  /// Offers a line meant for people; true if this output has shown it.
+  /// Offers a line meant for people; true if this output has shown it. An empty one takes the last
+  /// one away.
   virtual bool notice(std::string_view) noexcept { return false; }
 };
 

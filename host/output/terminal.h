@@ -54,7 +54,7 @@ class TerminalOutput : public Output {
   TextSink sink_;
   bool live_ = false;
   std::array<char, TextSink::kMaxBlock> screen_{};
-  std::array<char, 160> notice_{};
+  std::array<char, 320> notice_{};
   std::size_t notice_size_ = 0;
   TerminalFigures figures_;
   double period_s_ = 0;  ///< smoothed

@@ -148,6 +148,22 @@ void draw_axis(View& view, int i, const TerminalOptions& options, const Sample& 
   if (wide) view.print(" +/- {:<8.3g} of {:.4g} {}", sigma * a.scale, full * a.scale, a.unit);
 }
 
+/// Over as many lines as it takes, broken at spaces.
+void draw_note(View& view, std::string_view note, int width) {
+  constexpr std::string_view kFirst = "note    ", kNext = "        ";
+  const auto room = static_cast<std::size_t>(std::max(10, width - static_cast<int>(kFirst.size())));
+  std::string_view label = kFirst;
+  while (!note.empty() && view.next_line()) {
+    std::size_t taken = note.size() <= room ? note.size() : note.rfind(' ', room);
+    if (taken == 0 || taken == std::string_view::npos) taken = room;
+    view.text(label);
+    view.text(note.substr(0, taken));
+    note.remove_prefix(taken);
+    note.remove_prefix(std::min(note.size(), note.find_first_not_of(' ')));
+    label = kNext;
+  }
+}
+
 }  // namespace
 
 std::size_t draw_view(Screen& screen, const TerminalOptions& options, const Sample& sample,
@@ -177,7 +193,7 @@ std::size_t draw_view(Screen& screen, const TerminalOptions& options, const Samp
   for (const std::string& device : options.devices) {
     if (view.next_line()) view.print("output  {}", device);
   }
-  if (!notice.empty() && view.next_line()) view.print("note    {}", notice);
+  draw_note(view, notice, width);
   view.finish();
   lines = view.lines();
   return view.size();

@@ -1,5 +1,5 @@
 // The size of a picture from its first bytes, so that a whole folder can be checked before the
-// first frame. Pure.
+// first frame.
 #pragma once
 
 #include <cstdint>

@@ -11,13 +11,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 
 #include "host/config_error.h"
 #include "host/source/decode.h"
 #include "host/source/frame_times.h"
 #include "host/source/image_header.h"
+#include "host/source/pgm.h"
+#include "host/source/png.h"
 
 namespace tagwrench {
 namespace {
@@ -106,9 +107,8 @@ std::vector<Duration> frame_times(const std::string& dir, const std::vector<std:
 
 struct ImagesSource::Picture {
   std::vector<std::uint8_t> bytes;  ///< grows to the largest file and stays there
-  cv::Mat grey;
-  std::optional<Decoder>
-      jpeg;  ///< ours, because OpenCV fills the rest of a truncated JPEG and calls it good
+  std::vector<std::uint8_t> grey;
+  std::optional<Decoder> jpeg;
 };
 
 ImagesSource::ImagesSource(const std::string& dir, bool fast)
@@ -136,7 +136,10 @@ ImagesSource::ImagesSource(const std::string& dir, bool fast)
 ImagesSource::~ImagesSource() = default;
 
 std::string ImagesSource::unusable() const {
-  return corrupt_ == 0 ? std::string() : fmt::format("{} corrupt pictures were skipped", corrupt_);
+  if (corrupt_ == 0) return {};
+  return fmt::format("{}: is damaged or has changed, and was skipped{}; record it again",
+                     paths_[first_corrupt_],
+                     corrupt_ == 1 ? "" : fmt::format(", as were {} others", corrupt_ - 1));
 }
 
 void ImagesSource::arm() const noexcept {
@@ -166,7 +169,7 @@ ReadStatus ImagesSource::read(Frame& frame) noexcept {
   arm();
   const TimePoint handed_over = std::chrono::steady_clock::now();
   if (!load(paths_[index], frame)) {
-    ++corrupt_;
+    if (corrupt_++ == 0) first_corrupt_ = index;
     return ReadStatus::nothing;
   }
   frame.capture_time = TimePoint(times_[index]);
@@ -202,14 +205,12 @@ bool ImagesSource::load(const std::string& path, Frame& frame) noexcept {
       }
       return picture_->jpeg->decode(bytes, bytes.size(), wanted_, frame.image, frame.decoded);
     }
-    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data());
-    cv::Mat& grey = picture_->grey;
-    // Not into the old picture: OpenCV leaves that in place when it fails.
-    grey = cv::imdecode(encoded, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-    if (grey.cols != format_.width || grey.rows != format_.height || grey.type() != CV_8UC1) {
+    std::vector<std::uint8_t>& grey = picture_->grey;
+    if (!(bytes[0] == 'P' ? decode_pgm(bytes, format_.width, format_.height, grey)
+                          : decode_png(bytes, format_.width, format_.height, grey))) {
       return false;
     }
-    frame.image = {grey.data, grey.cols, grey.rows, static_cast<int>(grey.step)};
+    frame.image = {grey.data(), format_.width, format_.height, format_.width};
     frame.decoded = {};
     return true;
   } catch (const std::exception&) {

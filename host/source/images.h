@@ -52,6 +52,7 @@ class ImagesSource final : public FrameSource {
   std::size_t next_ = 0;
   std::size_t delivered_ = 0;  ///< index after the last frame that was handed on
   std::uint64_t corrupt_ = 0;
+  std::size_t first_corrupt_ = 0;
 };
 
 }  // namespace tagwrench

@@ -53,15 +53,17 @@ cv::Point2f centre(const std::vector<cv::Point2f>& square) {
 /// outside, and both may be listed: the outside is the square. An id in two places cannot be told
 /// apart from its double.
 std::optional<std::size_t> only(int id, const std::vector<int>& ids,
-                                const std::vector<std::vector<cv::Point2f>>& corners) {
+                                const std::vector<std::vector<cv::Point2f>>& corners, bool& twice) {
   constexpr double kSamePlacePart = 0.1;  // of the square's perimeter
   std::optional<std::size_t> best;
+  twice = false;
   double longest_px = 0;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     if (ids[i] != id) continue;
     const double perimeter_px = cv::arcLength(corners[i], true);
     if (best &&
         cv::norm(centre(corners[i]) - centre(corners[*best])) > kSamePlacePart * perimeter_px) {
+      twice = true;
       return std::nullopt;
     }
     if (perimeter_px <= longest_px) continue;
@@ -141,23 +143,38 @@ struct Acquirer::Detector {
     }
   }
 
-  std::vector<FoundTag> detect(const cv::Mat& image, const TargetDescription& target) const {
+  Finding detect(const cv::Mat& image, const TargetDescription& target) const {
     std::vector<std::vector<cv::Point2f>> corners;
+    std::vector<std::vector<cv::Point2f>> rejected;
     std::vector<int> ids;
-    cv::aruco::detectMarkers(image, dictionary, corners, ids, parameters);
+    cv::aruco::detectMarkers(image, dictionary, corners, ids, parameters, rejected);
     if (dictionary->markerSize >= kFineCells) add_sharpened(image, target, corners, ids);
-    std::vector<FoundTag> found;
+    Finding finding;
     for (std::size_t t = 0; t < target.tags.size(); ++t) {
-      const std::optional<std::size_t> seen = only(target.tags[t].id, ids, corners);
+      bool twice = false;
+      const std::optional<std::size_t> seen = only(target.tags[t].id, ids, corners, twice);
+      if (twice) finding.twice.push_back(target.tags[t].id);
       if (!seen) continue;
       const std::size_t at = *seen;
       FoundTag tag;
       tag.index = t;
       for (std::size_t c = 0; c < 4; ++c) tag.corners_px[c] = {corners[at][c].x, corners[at][c].y};
       tag.camera_T_tag = poses(corners[at]);
-      if (!tag.camera_T_tag.empty()) found.push_back(std::move(tag));
+      if (!tag.camera_T_tag.empty()) finding.tags.push_back(std::move(tag));
     }
-    return found;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      const auto same = [id = ids[i]](const Tag& tag) { return tag.id == id; };
+      if (std::any_of(target.tags.begin(), target.tags.end(), same)) continue;
+      rejected.push_back(corners[i]);
+      const auto& others = finding.other_ids;
+      if (std::find(others.begin(), others.end(), ids[i]) == others.end())
+        finding.other_ids.push_back(ids[i]);
+    }
+    for (const std::vector<cv::Point2f>& shape : rejected) {
+      auto& out = finding.squares.emplace_back();
+      for (std::size_t c = 0; c < 4; ++c) out[c] = {shape[c].x, shape[c].y};
+    }
+    return finding;
   }
 };
 
@@ -178,8 +195,7 @@ Finding Acquirer::search(const ImageView& image) {
                              static_cast<std::size_t>(image.stride));
   cv::Mat flipped;
   if (camera_.mirrored) cv::flip(as_delivered, flipped, 1);
-  Finding finding;
-  finding.tags = detector_->detect(camera_.mirrored ? flipped : as_delivered, target_);
+  Finding finding = detector_->detect(camera_.mirrored ? flipped : as_delivered, target_);
   if (!finding.tags.empty()) {
     misses_ = 0;
     return finding;
@@ -187,7 +203,7 @@ Finding Acquirer::search(const ImageView& image) {
   if (misses_++ % kFlipEvery != 0) return finding;
   if (!camera_.mirrored) cv::flip(as_delivered, flipped, 1);
   finding.other_way_round =
-      !detector_->detect(camera_.mirrored ? as_delivered : flipped, target_).empty();
+      !detector_->detect(camera_.mirrored ? as_delivered : flipped, target_).tags.empty();
   return finding;
 }
 

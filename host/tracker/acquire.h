@@ -27,6 +27,10 @@ struct FoundTag {
 struct Finding {
   std::vector<FoundTag> tags;
   bool other_way_round = false;  ///< nothing here, but tags in the image flipped the other way
+  // In the image as described, flipped back if mirrored; px.
+  std::vector<int> other_ids;  ///< tags of the family, but not of the target
+  std::vector<int> twice;      ///< tags of the target that are in more than one place
+  std::vector<std::array<Eigen::Vector2d, 4>> squares;  ///< four corners, but no tag of the target
 };
 
 class Acquirer {

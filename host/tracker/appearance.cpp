@@ -54,23 +54,6 @@ double robust_cut(const Measurements& all) {
   return kTukey * std::max(kLeastScale_px, kMadToSigma * median(std::move(offsets)));
 }
 
-void shift(EdgePoint& point, double distance) {
-  switch (point.normal) {
-    case EdgeNormal::plus_x:
-      point.x += distance;
-      break;
-    case EdgeNormal::minus_x:
-      point.x -= distance;
-      break;
-    case EdgeNormal::plus_y:
-      point.y += distance;
-      break;
-    case EdgeNormal::minus_y:
-      point.y -= distance;
-      break;
-  }
-}
-
 double common_gain(const std::vector<EdgeMeasurement>& tag) {
   std::vector<double> gains;
   for (const EdgeMeasurement& m : tag) {
@@ -140,7 +123,7 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
                            .topLeftCorner<6, 6>();
     for (Eigen::Index t = 0; t < tags; ++t) {
       for (EdgePoint& point : target.tags[static_cast<std::size_t>(t)].points)
-        shift(point, step[6 + t]);
+        point = shifted(point, step[6 + t]);
     }
   }
   renormalise(camera_T_platform);
@@ -162,7 +145,7 @@ bool learn_appearance(const EdgeMeter& meter, const PixelView<float>& image, Edg
         if (!measured[i].valid) continue;
         const double step_px = std::clamp(measured[i].offset_px / gain, -0.5, 0.5);
         moved_px[i] += step_px;
-        shift(tag.points[i], step_px / measured[i].px_per_m);
+        tag.points[i] = shifted(tag.points[i], step_px / measured[i].px_per_m);
       }
     }
     meter.measure(image, tag, camera_T_platform, kHalf_px, false, measured);
@@ -172,15 +155,20 @@ bool learn_appearance(const EdgeMeter& meter, const PixelView<float>& image, Edg
     }
     const double least = kLeastContrastPart * median(std::move(contrasts));
     std::vector<EdgePoint> kept;
+    std::size_t measurable = 0;  // a narrow white margin leaves nothing of the outer edge
     for (std::size_t i = 0; i < before; ++i) {
       const EdgeMeasurement& m = measured[i];
+      measurable += m.too_near ? 0 : 1;
       if (!m.valid || m.contrast < least || std::abs(moved_px[i]) > kLargestOffset_px) continue;
       kept.push_back(tag.points[i]);
       kept.back().contrast = static_cast<float>(m.contrast);
       squares += moved_px[i] * moved_px[i];
       count += 1;
     }
-    if (static_cast<double>(kept.size()) < kLeastPart * static_cast<double>(before)) return false;
+    if (kept.empty() ||
+        static_cast<double>(kept.size()) < kLeastPart * static_cast<double>(measurable)) {
+      return false;
+    }
     tag.points = std::move(kept);
     for (CellPoint& cell : tag.cells) {
       const double grey = meter.cell_grey(image, tag, cell, camera_T_platform);

@@ -125,6 +125,7 @@ void EdgeMeter::measure(const PixelView<Pixel>& image, const EdgeTag& tag,
     const EdgePoint& point = tag.points[i];
     EdgeMeasurement& m = out[i];
     m.valid = false;
+    m.too_near = false;
     m.weight = 0;
     const Eigen::Vector3d p = origin + point.x * axis_x + point.y * axis_y;
     const ProjectedPoint projected = project(camera_, p);
@@ -148,7 +149,8 @@ void EdgeMeter::measure(const PixelView<Pixel>& image, const EdgeTag& tag,
     }
     const double half =
         std::min({half_width_px, kReachUsed * point.reach * m.px_per_m, kWidestHalf_px});
-    if (!(half >= kSmallestHalf_px)) continue;
+    m.too_near = !(half >= kSmallestHalf_px);
+    if (m.too_near) continue;
     const auto window =
         static_cast<std::size_t>(std::lround((half - kSmallestHalf_px) / kHalfStep_px));
     take(image, projected.pixel, direction, windows_[std::min<std::size_t>(window, kWindows - 1)],

@@ -30,9 +30,10 @@ struct EdgeMeasurement {
       1;  ///< d offset_px / d true offset: below 1, for the profile is cut off and blurred
   double contrast =
       0;  ///< weighted grey levels across the edge, positive when black and white are as printed
-  double px_per_m = 0;  ///< image distance per distance along the normal in the tag's plane
-  double weight = 0;    ///< for the solver
-  bool valid = false;   ///< projected, inside the image, and with contrast
+  double px_per_m = 0;    ///< image distance per distance along the normal in the tag's plane
+  double weight = 0;      ///< for the solver
+  bool too_near = false;  ///< another edge is so near that no profile fits between
+  bool valid = false;     ///< projected, inside the image, and with contrast
 };
 
 /// Takes profiles across edges and finds the edge in each by the centroid of its gradient under a

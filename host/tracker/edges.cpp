@@ -99,6 +99,24 @@ void add_points(const TagPattern& pattern, const Walk& walk, std::vector<EdgePoi
 
 }  // namespace
 
+EdgePoint shifted(EdgePoint point, double distance) {
+  switch (point.normal) {
+    case EdgeNormal::plus_x:
+      point.x += distance;
+      break;
+    case EdgeNormal::minus_x:
+      point.x -= distance;
+      break;
+    case EdgeNormal::plus_y:
+      point.y += distance;
+      break;
+    case EdgeNormal::minus_y:
+      point.y -= distance;
+      break;
+  }
+  return point;
+}
+
 EdgeTag make_edge_tag(const TagPattern& pattern, const Eigen::Isometry3d& platform_T_tag) {
   EdgeTag tag;
   tag.id = pattern.id;

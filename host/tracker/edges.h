@@ -35,6 +35,9 @@ struct EdgePoint {
   float contrast = 0;  ///< grey levels from black to white at rest; 0 when not learned
 };
 
+/// The point moved along its normal, toward white, m.
+EdgePoint shifted(EdgePoint point, double distance);
+
 /// The middle of one cell.
 struct CellPoint {
   double x = 0;  ///< m, tag axes

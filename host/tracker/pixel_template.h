@@ -98,8 +98,8 @@ struct PixelTemplate {
 CameraModel raw_camera(const CameraModel& camera);
 
 struct PixelTemplateOptions {
-  std::size_t most_pixels = 8192;
-  double least_information = 0.98;  ///< stop choosing pixels when they carry this part
+  std::size_t most_pixels = 10240;
+  double least_information = 0.99;  ///< stop choosing pixels when they carry this part
 };
 
 /// Chooses the pixels. `mean` is the averaged rest image as delivered (not flipped).

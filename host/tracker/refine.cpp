@@ -205,8 +205,12 @@ int Refiner::judge_tags(const PixelView<Pixel>& image, const Refinement& fit) no
   for (std::size_t t = 0; t < target_.tags.size(); ++t) {
     if (excluded_[t]) continue;
     int inliers = 0;
-    for (const EdgeMeasurement& m : of_tag(t)) inliers += m.weight > 0.2 ? 1 : 0;
-    const bool enough = inliers >= kLeastInlierPart * static_cast<double>(of_tag(t).size());
+    int measurable = 0;
+    for (const EdgeMeasurement& m : of_tag(t)) {
+      inliers += m.weight > 0.2 ? 1 : 0;
+      measurable += m.too_near ? 0 : 1;
+    }
+    const bool enough = measurable > 0 && inliers >= kLeastInlierPart * measurable;
     if (enough && looks_like_tag(image, target_.tags[t], fit.camera_T_platform)) {
       ++held;
     } else {

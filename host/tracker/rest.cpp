@@ -67,7 +67,7 @@ bool RestLearner::start(const ImageView& image, const Finding& finding) {
   }
   if (!place(camera_T_tag)) return false;
   joint_.set_target(learned_.target);
-  const Refinement fit = joint_.refine(view(image), learned_.camera_T_platform);
+  const Refinement fit = joint_.refine(view(image), seen_from(camera_T_tag));
   if (fit.verdict != Verdict::held || fit.tags_held != description_.tags.size()) return false;
   first_pose_ = last_pose_ = fit.camera_T_platform;
   return true;
@@ -120,6 +120,15 @@ bool RestLearner::place(const std::vector<Eigen::Isometry3d>& camera_T_tag) {
     learned_.target.tags.push_back(make_edge_tag(patterns_[t], platform_T_tag));
   }
   return camera_T_platform.matrix().allFinite();
+}
+
+/// Where the platform is, which need not be where rest was given.
+Eigen::Isometry3d RestLearner::seen_from(const std::vector<Eigen::Isometry3d>& camera_T_tag) const {
+  for (std::size_t t = 0; t < camera_T_tag.size(); ++t) {
+    const auto& given = description_.tags[t].platform_T_tag;
+    if (given) return camera_T_tag[t] * given->inverse();
+  }
+  return learned_.camera_T_platform;
 }
 
 void RestLearner::accumulate(const ImageView& image) {

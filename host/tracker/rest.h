@@ -49,6 +49,7 @@ class RestLearner {
   bool start(const ImageView& image, const Finding& finding);
   std::optional<Eigen::Isometry3d> tag_pose(const ImageView& image, const FoundTag& found);
   bool place(const std::vector<Eigen::Isometry3d>& camera_T_tag);
+  Eigen::Isometry3d seen_from(const std::vector<Eigen::Isometry3d>& camera_T_tag) const;
   void accumulate(const ImageView& image);
   double motion_px(const Eigen::Isometry3d& camera_T_platform) const;
   bool finish();

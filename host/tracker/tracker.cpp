@@ -7,24 +7,17 @@
 #include "host/config_error.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/corner_pose.h"
+#include "host/tracker/diagnosis.h"
 #include "host/tracker/geometry_uncertainty.h"
 #include "host/tracker/motion.h"
 #include "host/tracker/photometric.h"
 #include "host/tracker/refine.h"
 #include "host/tracker/rest.h"
+#include "host/tracker/shutter_check.h"
+#include "host/tracker/trust.h"
 
 namespace tagwrench {
 namespace {
-
-/// A fit that believes less of the template than this is doubted.
-constexpr double kLeastGood = 0.3;
-/// As is one that leaves residuals of this part of the contrast, or that needs a blur beyond what
-/// its expansion describes, px^2.
-constexpr double kMostResidualPart = 0.10;
-constexpr double kMostBlur = 1.2;
-/// Standard deviations beyond these are of no use for a force: m, rad.
-constexpr double kDoubtTranslation = 0.3e-3;
-constexpr double kDoubtRotation = 0.03;
 
 /// Around the place where the target is expected: a motion this large between frames is followed
 /// without the whole frame, px.
@@ -32,6 +25,13 @@ constexpr int kMargin_px = 40;
 
 /// Frames in a row that a loaded picture of the target may fail to fit before it is called wrong.
 constexpr int kMisfits = 15;
+
+/// Farther from a given rest pose than anybody seats a platform twice: m and rad; how long it
+/// stands there; and how long the pose may still settle after the picture was learned.
+constexpr double kFar = 0.3e-3;
+constexpr double kFarAngle = 0.026;
+constexpr Duration kStillTime = std::chrono::milliseconds(1500);
+constexpr Duration kSettling = std::chrono::milliseconds(200);
 
 /// While the platform moves less than this per frame, its picture may be learned, m and rad.
 constexpr double kStill = 3e-6;
@@ -51,26 +51,20 @@ PixelView<std::uint8_t> view(const ImageView& image) {
   return {image.pixels, image.width, image.height, image.stride};
 }
 
-bool trusted(const PhotometricFit& fit, const PhotometricState& state) {
-  const Vector6 sigma = fit.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  return fit.good >= kLeastGood && fit.residual_part < kMostResidualPart &&
-         std::abs(state.blur[0]) < kMostBlur && sigma.head<3>().maxCoeff() < kDoubtTranslation &&
-         sigma.tail<3>().maxCoeff() < kDoubtRotation;
-}
-
 }  // namespace
 
 struct Tracker::State {
   State(const CameraModel& model, const TargetDescription& description, const RestOptions& options)
       : camera(model),
-        tag_size(description.tag_size),
-        rest_given(options.camera_T_platform.has_value()),
+        target(description),
         acquirer(model, description),
         refiner(model),
-        learner(model, description, options, acquirer.patterns()) {
+        learner(model, description, options, acquirer.patterns()),
+        diagnostician(model, description) {
+    rest.given = options.camera_T_platform.has_value();
     const bool placed = std::all_of(description.tags.begin(), description.tags.end(),
                                     [](const Tag& tag) { return tag.platform_T_tag.has_value(); });
-    if (!placed || !rest_given) return;
+    if (!placed || !rest.given) return;
     LearnedRest given;
     given.camera_T_platform = given.seen_from = *options.camera_T_platform;
     for (std::size_t t = 0; t < description.tags.size(); ++t) {
@@ -84,12 +78,13 @@ struct Tracker::State {
   }
 
   void adopt(const LearnedRest& learned) {
-    rest = learned.camera_T_platform;
+    rest.camera_T_platform = learned.camera_T_platform;
     refiner.set_target(learned.target);
-    platform_T_tag.clear();
-    for (const EdgeTag& tag : learned.target.tags) platform_T_tag.push_back(tag.platform_T_tag);
-    motion.start({}, rest);
-    rest_known = true;
+    rest.platform_T_tag.clear();
+    for (const EdgeTag& tag : learned.target.tags)
+      rest.platform_T_tag.push_back(tag.platform_T_tag);
+    motion.start({}, rest.camera_T_platform);
+    rest.known = true;
     const RestImage& image = learned.image;
     if (image.level.empty() || image.width != camera.width_px || image.height != camera.height_px)
       return;
@@ -97,8 +92,8 @@ struct Tracker::State {
         make_pixel_template(camera, {image.level.data(), image.width, image.height, image.width},
                             std::max(1, image.frames), learned.noise, acquirer.patterns(),
                             learned.target, learned.seen_from, {}));
-    pose_covariance = rest_given ? learned.pose_covariance : Matrix6::Zero();
-    geometry.set(aligner, learned.seen_from, learned.tag_covariance, !rest_given);
+    pose_covariance = rest.given ? learned.pose_covariance : Matrix6::Zero();
+    geometry.set(aligner, learned.seen_from, learned.tag_covariance, !rest.given);
     light = {};
   }
 
@@ -111,6 +106,7 @@ struct Tracker::State {
     return camera.mirrored ? Hint::image_looks_unmirrored : Hint::image_looks_mirrored;
   }
 
+  void find(const Frame& frame, Track& track);
   Track learn(const Frame& frame);
   Track follow(const Frame& frame) noexcept;
   void learn_picture(const Frame& frame);
@@ -123,20 +119,30 @@ struct Tracker::State {
   PhotometricFit align(const Frame& frame, const Eigen::Isometry3d& start) noexcept;
   Region region(TimePoint time) const noexcept;
   void say_misfit(bool fits, Track& track) noexcept;
+  void say_far_from_rest(TimePoint time, Track& track) noexcept;
+  void say_shutter(const Frame& frame, const Eigen::Isometry3d& pose, Track& track) noexcept;
+  void check_geometry(const Frame& frame, Track& track);
+  void explain(const Frame& frame, Track& track) noexcept;
 
   CameraModel camera;
-  double tag_size;
-  bool rest_given;
+  TargetDescription target;
   Acquirer acquirer;
   Refiner refiner;
   RestLearner learner;
-  bool rest_known = false;
+  Diagnostician diagnostician;
+  ShutterCheck shutter;
+  Finding finding;        ///< the last one
+  bool searched = false;  ///< it is of this frame
+  bool learning = false;  ///< this frame counted for rest
   bool appearance_loaded = false;
-  Eigen::Isometry3d rest = Eigen::Isometry3d::Identity();
-  std::vector<Eigen::Isometry3d> platform_T_tag;
+  KnownRest rest;
   bool had_target = false;
   bool holding = false;
   int misfits = 0;
+  bool geometry_checked = false;
+  bool far_from_rest_told = false;       ///< or known to be untrue
+  std::optional<TimePoint> still_since;  ///< only while that is open
+  bool still_by_picture = false;         ///< not by edges, which lie a little elsewhere
   Motion motion;
   PhotometricAligner aligner;
   PhotometricState light;
@@ -144,17 +150,23 @@ struct Tracker::State {
   Matrix6 pose_covariance = Matrix6::Zero();  ///< of the picture's place against a given rest
 };
 
+void Tracker::State::find(const Frame& frame, Track& track) {
+  finding = acquirer.find(frame.image);
+  searched = true;
+  if (finding.other_way_round) track.hint = flip_hint();
+}
+
 Track Tracker::State::learn(const Frame& frame) {
   Track track;
-  const Finding finding = learner.wants_finding() ? acquirer.find(frame.image) : Finding{};
-  if (finding.other_way_round) track.hint = flip_hint();
+  if (learner.wants_finding()) find(frame, track);
   const RestLearner::Progress progress = learner.add(frame.image, finding);
+  learning = progress == RestLearner::Progress::learning;
   track.tags_held = static_cast<std::uint8_t>(learner.tags_seen());
   if (progress == RestLearner::Progress::moved) track.hint = Hint::moved_while_learning;
   if (progress == RestLearner::Progress::done) {
     adopt(learner.learned());
     had_target = holding = true;
-    motion.start(frame.capture_time, rest);
+    motion.start(frame.capture_time, rest.camera_T_platform);
     track.hint = Hint::rest_learned;
   }
   return track;
@@ -163,7 +175,7 @@ Track Tracker::State::learn(const Frame& frame) {
 /// Where rest and placement are given but no picture is, one is taken as soon as the platform
 /// stands still, wherever that is.
 void Tracker::State::learn_picture(const Frame& frame) {
-  const Finding finding = learner.wants_finding() ? acquirer.find(frame.image) : Finding{};
+  finding = learner.wants_finding() ? acquirer.find(frame.image) : Finding{};
   if (learner.add(frame.image, finding) != RestLearner::Progress::done) return;
   const Eigen::Isometry3d now = motion.last();
   adopt(learner.learned());
@@ -173,16 +185,16 @@ void Tracker::State::learn_picture(const Frame& frame) {
 Refinement Tracker::State::refine_within_reach(const Frame& frame,
                                                const Eigen::Isometry3d& start) noexcept {
   Refinement fit = refiner.refine(view(frame.image), start);
-  if (fit.verdict != Verdict::lost && !within_reach(rest, fit.camera_T_platform)) fit = {};
+  if (fit.verdict != Verdict::lost && !within_reach(rest.camera_T_platform, fit.camera_T_platform))
+    fit = {};
   return fit;
 }
 
 Refinement Tracker::State::reacquire(const Frame& frame, Track& track) {
-  const Finding finding = acquirer.find(frame.image);
-  if (finding.other_way_round) track.hint = flip_hint();
+  find(frame, track);
   if (finding.tags.empty()) return {};
-  const std::optional<Eigen::Isometry3d> start =
-      pose_from_corners(camera, tag_size, finding.tags, platform_T_tag, rest);
+  const std::optional<Eigen::Isometry3d> start = pose_from_corners(
+      camera, target.tag_size, finding.tags, rest.platform_T_tag, rest.camera_T_platform);
   if (!start) return {};
   return refine_within_reach(frame, *start);
 }
@@ -228,7 +240,8 @@ PhotometricFit Tracker::State::align(const Frame& frame, const Eigen::Isometry3d
     fit = aligner.align(window, fit.camera_T_platform,
                         motion.velocity(frame.capture_time, fit.camera_T_platform), light);
   }
-  if (fit.converged && !within_reach(rest, fit.camera_T_platform)) fit.converged = false;
+  if (fit.converged && !within_reach(rest.camera_T_platform, fit.camera_T_platform))
+    fit.converged = false;
   return fit;
 }
 
@@ -242,6 +255,62 @@ void Tracker::State::say_misfit(bool fits, Track& track) noexcept {
   if (!appearance_loaded) return;
   misfits = fits ? 0 : misfits + 1;
   if (misfits >= kMisfits && track.hint == Hint::none) track.hint = Hint::appearance_does_not_fit;
+}
+
+/// Once, when the target has stood still since the start, but not where rest was given.
+void Tracker::State::say_far_from_rest(TimePoint time, Track& track) noexcept {
+  if (far_from_rest_told || !rest.given) return;
+  const Vector6& offset = track.displacement;
+  const bool far = offset.head<3>().norm() > kFar || offset.tail<3>().norm() > kFarAngle;
+  const bool still =
+      motion.step().head<3>().norm() < kStill && motion.step().tail<3>().norm() < kStillAngle;
+  if (!still_since || still_by_picture != aligner.ready()) still_since = time;
+  still_by_picture = aligner.ready();
+  if (time - *still_since < kSettling) return;
+  far_from_rest_told = !far || !still;
+  if (far_from_rest_told || time - *still_since < kStillTime) return;
+  far_from_rest_told = true;
+  track.hint = Hint::far_from_rest;
+  track.details.offset = offset;
+  track.details.rest_given = true;
+}
+
+/// Once, when doubted pictures of a moving target turn out to be sheared.
+void Tracker::State::say_shutter(const Frame& frame, const Eigen::Isometry3d& pose,
+                                 Track& track) noexcept {
+  if (camera.readout > 0 || !aligner.ready()) return;
+  const PixelWindow window{frame.image.pixels, frame.image.stride, 0, 0,
+                           frame.image.width,  frame.image.height};
+  if (shutter.rolls(aligner, window, frame.capture_time, pose, light) && track.hint == Hint::none) {
+    track.hint = Hint::shutter_rolls;
+  }
+}
+
+/// Once, as soon as the target is held: tags of the wrong size, or in other places than described,
+/// may be held, but what is measured is wrong.
+void Tracker::State::check_geometry(const Frame& frame, Track& track) {
+  if (geometry_checked) return;
+  geometry_checked = true;
+  if (finding.tags.size() != target.tags.size()) return;
+  const Diagnosis diagnosis = diagnose(camera, target, rest, frame.image, finding);
+  if (diagnosis.cause != Hint::other_scale && diagnosis.cause != Hint::other_places) return;
+  far_from_rest_told = true;  // a wrong scale looks like a wrong distance
+  track.hint = diagnosis.cause;
+  track.details = diagnosis.details;
+}
+
+/// Why there are no numbers, now and then.
+void Tracker::State::explain(const Frame& frame, Track& track) noexcept {
+  if (track.status == Status::ok || learning) {
+    diagnostician.held();
+    if (!learning && track.hint == Hint::none) check_geometry(frame, track);
+    return;
+  }
+  if (!searched || track.needs_whole_frame || track.hint != Hint::none) return;
+  const Diagnosis diagnosis =
+      diagnostician.not_held(frame.capture_time, rest, frame.image, finding);
+  track.hint = diagnosis.cause;
+  track.details = diagnosis.details;
 }
 
 Track Tracker::State::follow(const Frame& frame) noexcept {
@@ -272,12 +341,15 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
     holding = edges.verdict != Verdict::lost;
     if (!holding) {
       light = {};
+      shutter.lost();
       return track;
     }
   }
   holding = had_target = true;
   const bool good = believed(fit);
   const Eigen::Isometry3d& pose = fit.converged ? fit.camera_T_platform : edges.camera_T_platform;
+  if (!good) say_shutter(frame, pose, track);
+  shutter.seen(frame.capture_time, pose);
   if (followed) {
     motion.add(frame.capture_time, pose);
   } else {
@@ -289,9 +361,10 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
   say_misfit(good, track);
   if (!good) return track;
   track.status = Status::ok;
-  track.displacement = motion_between(rest, pose);
+  track.displacement = motion_between(rest.camera_T_platform, pose);
   track.covariance = displacement_covariance(fit.covariance, track.displacement) +
                      geometry.covariance(track.displacement) + pose_covariance;
+  say_far_from_rest(frame.capture_time, track);
   if (aligner.ready()) track.wanted = region(frame.capture_time);
   if (!aligner.ready() && motion.step().head<3>().norm() < kStill &&
       motion.step().tail<3>().norm() < kStillAngle) {
@@ -317,12 +390,15 @@ Track Tracker::track(const Frame& frame) noexcept {
     absent.status = state_->had_target ? Status::lost : Status::acquiring;
     return absent;
   }
-  if (state_->rest_known) return state_->follow(frame);
+  state_->searched = state_->learning = false;
+  Track track;
   try {
-    return state_->learn(frame);
+    track = state_->rest.known ? state_->follow(frame) : state_->learn(frame);
   } catch (const std::exception&) {
     return {};  // out of memory: try again with the next frame
   }
+  state_->explain(frame, track);
+  return track;
 }
 
 }  // namespace tagwrench

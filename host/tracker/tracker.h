@@ -3,6 +3,7 @@
 // acquire   image -> tag corners. OpenCV lives there; runs only while the target is not held.
 // refine    predicted pose + pixels -> pose with covariance, all tags as one rigid target.
 // rest      learns the rest pose and the tags' placement from the first frames.
+// diagnosis says why, while the target is not held.
 #pragma once
 
 #include <memory>

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 
 #include "tests/cli/bridge.h"
 
@@ -90,6 +91,20 @@ TEST_F(BadInput, MixedSizeImageFolder) {
   cv::imwrite((folder / "000001.png").string(), cv::Mat::zeros(100, 120, CV_8UC1));
   expect_refused(run_source("images:" + folder.string()), 2, {"000001.png", "120x100", "640x480"});
   EXPECT_FALSE(wrote_output());
+}
+
+TEST_F(BadInput, ATruncatedPictureIsNamedInOneLine) {
+  const std::filesystem::path folder = render(3);
+  std::filesystem::resize_file(folder / "000001.png",
+                               std::filesystem::file_size(folder / "000001.png") / 2);
+  const Outcome ran =
+      run_bridge({"run", "--fast", "--source", "images:" + folder.string(), "--output", "jsonl:-"});
+  EXPECT_EQ(ran.status, 0) << ran.err;
+  EXPECT_EQ(lines_in(ran.out), 2u);
+  EXPECT_NE(ran.err.find("000001.png: is damaged"), std::string::npos) << ran.err;
+  std::istringstream lines(ran.err);
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_EQ(line.rfind("tagwrench: ", 0), 0u) << line;
 }
 
 TEST_F(BadInput, FramesOfAnotherSizeThanTheSensor) {

@@ -1,6 +1,8 @@
 // `tagwrench calibrate target` as its users run it.
 #include <gtest/gtest.h>
 
+#include <opencv2/imgcodecs.hpp>
+
 #include "host/config/sensor_config.h"
 #include "tests/cli/bridge.h"
 
@@ -83,6 +85,55 @@ TEST_F(CalibrateTarget, WritesPlacesAndPictureThatRunCanUse) {
   EXPECT_EQ(run.status, 0) << run.err;
   const std::string samples = read_file(temporary_ / "o.jsonl");
   EXPECT_NE(samples.find("\"status\":\"ok\""), std::string::npos);
+}
+
+TEST_F(CalibrateTarget, APictureThatIsNotOfTheTargetIsRefusedByRunAndCuredByCalibrating) {
+  render("seed: 3\ntrajectory: {rest_s: 0.5}\n", 90);
+  ASSERT_EQ(calibrate().status, 0);
+  EXPECT_EQ(load_sensor(sensor_).camera.readout, 0) << "of a global shutter";
+  const std::string good = read_file(sensor_);
+  const auto run = [&] {
+    return run_bridge({"run", "--fast", "--source", "images:" + (temporary_ / "frames").string(),
+                       "--sensor", sensor_, "--output", "jsonl:-", "--frames", "3"});
+  };
+  EXPECT_EQ(run().status, 0);
+
+  std::string swapped = good;
+  const std::size_t five = swapped.find("id: 5");
+  const std::size_t two = swapped.find("id: 2");
+  swapped[five + 4] = '2';
+  swapped[two + 4] = '5';
+  write_file(sensor_, swapped);
+  const Outcome other = run();
+  EXPECT_EQ(other.status, 2);
+  EXPECT_EQ(other.out, "");
+  EXPECT_EQ(lines_in(other.err), 1u) << other.err;
+  EXPECT_NE(other.err.find("does not show tag 2"), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find("calibrate target"), std::string::npos) << other.err;
+
+  write_file(sensor_, good);
+  for (const double level : {0.0, 65535.0}) {
+    std::vector<unsigned char> flat;
+    cv::imencode(".png", cv::Mat(480, 640, CV_16UC1, cv::Scalar(level)), flat);
+    write_file(temporary_ / "sensor.yaml.rest", std::string(flat.begin(), flat.end()));
+    const Outcome blank = run();
+    EXPECT_EQ(blank.status, 2);
+    EXPECT_EQ(lines_in(blank.err), 1u) << blank.err;
+    EXPECT_NE(blank.err.find("rest.appearance"), std::string::npos) << blank.err;
+  }
+  EXPECT_EQ(calibrate().status, 0);
+  EXPECT_EQ(run().status, 0);
+}
+
+TEST_F(CalibrateTarget, ARollingShuttersReadOutIsWritten) {
+  render(
+      "seed: 3\nexposure: {rolling_readout_ms: 20}\n"
+      "trajectory: {rest_s: 0.5, amplitude: [0.22, 0.2, 2.4, 0.004, 0.004, 0.003]}\n",
+      150);
+  const Outcome outcome = calibrate();
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("camera.readout_ms is written"), std::string::npos) << outcome.err;
+  EXPECT_NEAR(load_sensor(sensor_).camera.readout, 20e-3, 1e-3);  // s
 }
 
 TEST_F(CalibrateTarget, RefusesAndWritesNothing) {

@@ -75,6 +75,43 @@ TEST_F(PipelineLoop, EndsAfterTheFramesAskedFor) {
   EXPECT_EQ(run(source, std::make_unique<Recorder>(), limits).frames, 4u);
 }
 
+/// Shows the clip, then black for two seconds, and that once more.
+class BlackedOut final : public FrameSource {
+ public:
+  BlackedOut() { format_ = {640, 480, std::chrono::milliseconds(40), "blacked out"}; }
+  const SourceFormat& format() const noexcept override { return format_; }
+  int poll_fd() const noexcept override { return -1; }
+  ReadStatus read(Frame& frame) noexcept override {
+    constexpr int kBlack = 50;
+    if (next_ == 2 * (kFrames + kBlack)) return ReadStatus::end;
+    const int at = next_ % (kFrames + kBlack);
+    frame = {};
+    frame.image = {
+        at < kFrames ? Clip::get().pictures[static_cast<std::size_t>(at)].data() : black_.data(),
+        640, 480, 640};
+    frame.latency_origin = std::chrono::steady_clock::now();
+    frame.capture_time = TimePoint{} + next_ * format_.period;
+    frame.sequence = static_cast<std::uint64_t>(next_++);
+    return ReadStatus::frame;
+  }
+
+ private:
+  SourceFormat format_;
+  std::vector<std::uint8_t> black_ = std::vector<std::uint8_t>(640 * 480, 3);
+  int next_ = 0;
+};
+
+TEST_F(PipelineLoop, ATroubleIsSaidEachTimeItComesAndTakenAwayWhenItHasGone) {
+  BlackedOut source;
+  run(source, std::make_unique<Recorder>());
+  const std::vector<std::string>& said = recorder().notices;
+  ASSERT_EQ(said.size(), 4U);
+  EXPECT_NE(said[0].find("rest pose learned"), std::string::npos);
+  EXPECT_NE(said[1].find("black"), std::string::npos);
+  EXPECT_EQ(said[2], "");
+  EXPECT_EQ(said[3], said[1]);
+}
+
 TEST_F(PipelineLoop, AHintIsSaidOnce) {
   PlayedSource source(kFrames, PlayedSource::After::end);
   run(source, std::make_unique<Recorder>());

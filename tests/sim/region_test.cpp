@@ -1,7 +1,9 @@
 // Frames of which only the part around the target is decoded: the run is the same to the last bit,
 // and a target that has left this part is found in the same frame.
-#include <cstdlib>
+#include <algorithm>
+#include <cmath>
 
+#include "host/source/simulator/renderer.h"
 #include "tests/sim/played.h"
 #include "tests/support/poisoned_source.h"
 
@@ -12,28 +14,32 @@ constexpr int kWidth = 640, kHeight = 480;
 
 using Picture = std::vector<std::uint8_t>;
 
-/// The platform at rest, then pushed about in all six axes.
-std::vector<Picture> pushed_about(int frames) {
-  sim::Scenario scenario;
-  scenario.trajectory.motion = sim::Motion::compound;
-  scenario.trajectory.rest_time = kRestFrames / scenario.camera.frame_rate;
-  SimulatorSource source(scenario, /*live=*/false);
-  std::vector<Picture> pictures;
-  for (int i = 0; i < frames; ++i) {
-    Frame frame;
-    source.read(frame);
-    pictures.emplace_back(frame.image.pixels, frame.image.pixels + kWidth * kHeight);
-  }
-  return pictures;
+constexpr double kJump = 1.3e-3;  // m, 48 px: beyond the margin of the region
+
+/// From rest, pushed about in all six axes, a little further with every frame.
+Vector6 pushed(int frame) {
+  const double t = 0.1 * std::max(0, frame - kRestFrames);
+  Vector6 displacement;
+  displacement << 0.3e-3 * std::sin(t), 0.2e-3 * std::sin(1.3 * t), 0.3e-3 * std::sin(0.7 * t),
+      0.03 * std::sin(0.9 * t), 0.02 * std::sin(1.1 * t), 0.03 * std::sin(1.7 * t);
+  return displacement;
 }
 
-/// The picture moved to the right by whole columns; grey comes in from the left.
-Picture moved(const Picture& picture, int columns) {
-  Picture out(picture.size(), 128);
-  for (int y = 0; y < kHeight; ++y) {
-    std::copy_n(picture.begin() + y * kWidth, kWidth - columns, out.begin() + y * kWidth + columns);
+/// The platform at rest, then pushed about; in frames jump_begin to jump_end - 1 it is elsewhere.
+std::vector<Picture> pushed_about(int frames, int jump_begin = 0, int jump_end = 0) {
+  const sim::Scenario scenario;
+  const sim::TrajectoryPlayer player(scenario.trajectory, scenario.seed);
+  sim::Renderer renderer(scenario);
+  sim::PlatformMotion motion(scenario.mechanics, player, 0, 2 * renderer.half_window() + 0.01);
+  std::vector<Picture> pictures;
+  for (int i = 0; i < frames; ++i) {
+    Vector6 displacement = pushed(i);
+    if (i >= jump_begin && i < jump_end) displacement[0] += kJump;
+    motion.set_state({displacement, Vector6::Zero()});
+    pictures.emplace_back(kWidth * kHeight);
+    renderer.render(motion, 0, static_cast<std::uint64_t>(i), pictures.back().data());
   }
-  return out;
+  return pictures;
 }
 
 class Pictures final : public FrameSource {
@@ -102,16 +108,14 @@ TEST_F(RegionLoop, OnceTheTargetIsHeldLessThanHalfOfTheFrameIsDecoded) {
 }
 
 TEST_F(RegionLoop, ATargetThatJumpsOutOfTheRegionIsFoundInTheSameFrame) {
-  constexpr int kJump_px = 48;  // 1.3 mm, beyond the margin of the region
-  std::vector<Picture> pictures = pushed_about(20);
-  for (std::size_t i = 12; i < 16; ++i) pictures[i] = moved(pictures[i], kJump_px);
+  const std::vector<Picture> pictures = pushed_about(20, 12, 16);
   Pictures whole(pictures);
   const std::vector<Sample> reference = samples_of(whole);
   Pictures inner(pictures);
   PoisonedSource poisoned(inner);
   const std::vector<Sample> samples = samples_of(poisoned);
   expect_same(samples, reference);
-  EXPECT_GT(samples[12].displacement[0], 1.0e-3) << "m";
+  EXPECT_NEAR(samples[12].displacement[0], pushed(12)[0] + kJump, 2e-6) << "m";
   for (const std::size_t jump : {12U, 16U}) {
     EXPECT_TRUE(carries_numbers(samples[jump].status)) << "frame " << jump;
     EXPECT_TRUE(poisoned.deliveries()[jump].completed) << "frame " << jump;
@@ -119,9 +123,7 @@ TEST_F(RegionLoop, ATargetThatJumpsOutOfTheRegionIsFoundInTheSameFrame) {
 }
 
 TEST_F(RegionLoop, AFrameThatCannotBeCompletedCarriesNoNumbersAndTheNextIsWhole) {
-  constexpr int kJump_px = 48;
-  std::vector<Picture> pictures = pushed_about(20);
-  for (std::size_t i = 12; i < pictures.size(); ++i) pictures[i] = moved(pictures[i], kJump_px);
+  const std::vector<Picture> pictures = pushed_about(20, 12, 20);
   Pictures inner(pictures);
   PoisonedSource poisoned(inner);
   poisoned.rest_is_damaged = true;

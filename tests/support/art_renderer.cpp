@@ -20,6 +20,7 @@ constexpr int kCells = 7;            // of an ArUco original tag, black frame in
 constexpr int kRestFrames = 25;
 // Art has no detail that the samples could miss: smoothed by one sample's width.
 constexpr double kArtSmoothing_samples = 1.0;
+constexpr double kBlurReach = 4;         // sigmas
 constexpr double kPlateBehind = 3.0e-3;  // m
 constexpr double kPlateHalf = 14e-3;     // m
 constexpr double kPlateTexels_per_m = 30e3;
@@ -81,6 +82,22 @@ cv::Mat sample_rays(const cv::Mat& rays) {
   return fine;
 }
 
+/// Where a plane's points are seen along `rays`: CV_32FC2.
+cv::Mat through(const cv::Matx33d& plane_from_ray, const cv::Mat& rays) {
+  const cv::Matx33d& h = plane_from_ray;
+  cv::Mat points(rays.size(), CV_32FC2);
+  for (int y = 0; y < rays.rows; ++y) {
+    const auto* ray = rays.ptr<cv::Vec2f>(y);
+    auto* point = points.ptr<cv::Vec2f>(y);
+    for (int x = 0; x < rays.cols; ++x) {
+      const double w = 1 / (h(2, 0) * ray[x][0] + h(2, 1) * ray[x][1] + h(2, 2));
+      point[x] = {float((h(0, 0) * ray[x][0] + h(0, 1) * ray[x][1] + h(0, 2)) * w),
+                  float((h(1, 0) * ray[x][0] + h(1, 1) * ray[x][1] + h(1, 2)) * w)};
+    }
+  }
+  return points;
+}
+
 cv::Mat tag_drawing(int id) {
   cv::Mat drawing;
   cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_ARUCO_ORIGINAL), id,
@@ -90,8 +107,10 @@ cv::Mat tag_drawing(int id) {
 
 }  // namespace
 
-ArtRenderer::ArtRenderer(const ArtScene& scene) : scene_(scene), rays_(pixel_rays(scene)) {
-  fine_rays_ = sample_rays(rays_);
+ArtRenderer::ArtRenderer(const ArtScene& scene) : scene_(scene) {
+  const cv::Mat rays = pixel_rays(scene);
+  rays.convertTo(rays_, CV_32F);
+  fine_rays_ = sample_rays(rays);
   for (const ArtTag& tag : scene.tags) {
     Art art;
     art.texels_per_m = kCells * kTexelsPerCell / scene.tag_size;
@@ -133,69 +152,69 @@ cv::Point2d ArtRenderer::project(const ArtTag& tag, const cv::Point2d& point,
   return pixel.front();
 }
 
-void ArtRenderer::draw_plate(const Vector6& displacement, cv::Mat& scene) const {
+cv::Mat ArtRenderer::plate(const cv::Mat& rays, const Vector6& displacement) const {
   const cv::Matx33d texel_from_plane(kPlateTexels_per_m, 0, 0.5 * (plate_.cols - 1), 0,
                                      kPlateTexels_per_m, 0.5 * (plate_.rows - 1), 0, 0, 1);
   const cv::Matx33d h =
       texel_from_plane *
       plane_in_camera({0, 0, kPlateBehind}, {0, 0, 0}, scene_.rest_position, displacement).inv();
-  cv::Mat texels(rays_.size(), CV_32FC2);
-  for (int y = 0; y < rays_.rows; ++y) {
-    for (int x = 0; x < rays_.cols; ++x) {
-      const cv::Vec2d& ray = rays_.at<cv::Vec2d>(y, x);
-      const cv::Vec3d p = h * cv::Vec3d(ray[0], ray[1], 1);
-      texels.at<cv::Vec2f>(y, x) = {float(p[0] / p[2]), float(p[1] / p[2])};
-    }
-  }
-  cv::remap(plate_, scene, texels, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REFLECT);
+  cv::Mat scene;
+  cv::remap(plate_, scene, through(h, rays), cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REFLECT);
+  return scene;
 }
 
-void ArtRenderer::draw_tag(std::size_t tag, const Vector6& displacement, cv::Mat& scene) const {
+void ArtRenderer::draw_tag(std::size_t tag, const Vector6& displacement, const cv::Mat& rays,
+                           cv::Mat& scene) const {
   const Art& art = art_[tag];
-  const double half = 0.5 * art.ink_and_paper.cols / art.texels_per_m;
-  std::vector<cv::Point2f> outline;
-  for (const cv::Point2d& corner : {cv::Point2d(-half, -half), cv::Point2d(half, -half),
-                                    cv::Point2d(half, half), cv::Point2d(-half, half)})
-    outline.push_back(project(scene_.tags[tag], corner, displacement));
-  const cv::Rect seen = cv::boundingRect(outline);
-  const cv::Rect box = cv::Rect(seen.x - 2, seen.y - 2, seen.width + 4, seen.height + 4) &
-                       cv::Rect(0, 0, scene_.width, scene_.height);
-  if (box.empty()) return;
-
   const cv::Matx33d texel_from_plane(art.texels_per_m, 0, 0.5 * (art.ink_and_paper.cols - 1), 0,
                                      art.texels_per_m, 0.5 * (art.ink_and_paper.rows - 1), 0, 0, 1);
   const cv::Matx33d h = texel_from_plane * ray_from_plane(scene_.tags[tag], displacement).inv();
-  const cv::Mat rays = fine_rays_(
-      cv::Rect(box.x * kSamples, box.y * kSamples, box.width * kSamples, box.height * kSamples));
-  cv::Mat texels(rays.size(), CV_32FC2);
-  for (int y = 0; y < rays.rows; ++y) {
-    const auto* ray = rays.ptr<cv::Vec2f>(y);
-    auto* texel = texels.ptr<cv::Vec2f>(y);
-    for (int x = 0; x < rays.cols; ++x) {
-      const double w = 1 / (h(2, 0) * ray[x][0] + h(2, 1) * ray[x][1] + h(2, 2));
-      texel[x] = {float((h(0, 0) * ray[x][0] + h(0, 1) * ray[x][1] + h(0, 2)) * w),
-                  float((h(1, 0) * ray[x][0] + h(1, 1) * ray[x][1] + h(1, 2)) * w)};
-    }
-  }
-  cv::Mat samples, pixels;
-  cv::remap(art.ink_and_paper, samples, texels, cv::noArray(), cv::INTER_LINEAR,
+  cv::Mat samples;
+  cv::remap(art.ink_and_paper, samples, through(h, rays), cv::noArray(), cv::INTER_LINEAR,
             cv::BORDER_CONSTANT);
-  cv::resize(samples, pixels, box.size(), 0, 0, cv::INTER_AREA);
-  cv::Mat under = scene(box);
-  for (int y = 0; y < box.height; ++y) {
-    for (int x = 0; x < box.width; ++x) {
-      const cv::Vec2f& over = pixels.at<cv::Vec2f>(y, x);
-      float& pixel = under.at<float>(y, x);
-      pixel = pixel * (1 - over[1]) + over[0];
-    }
+  for (int y = 0; y < scene.rows; ++y) {
+    const auto* over = samples.ptr<cv::Vec2f>(y);
+    auto* sample = scene.ptr<float>(y);
+    for (int x = 0; x < scene.cols; ++x) sample[x] = sample[x] * (1 - over[x][1]) + over[x][0];
   }
 }
 
+cv::Rect ArtRenderer::seen(const Vector6& displacement) const {
+  std::vector<cv::Point2f> outline;
+  for (std::size_t t = 0; t < scene_.tags.size(); ++t) {
+    const double half = 0.5 * art_[t].ink_and_paper.cols / art_[t].texels_per_m;
+    for (const cv::Point2d& corner : {cv::Point2d(-half, -half), cv::Point2d(half, -half),
+                                      cv::Point2d(half, half), cv::Point2d(-half, half)})
+      outline.push_back(project(scene_.tags[t], corner, displacement));
+  }
+  return cv::boundingRect(outline);
+}
+
 cv::Mat ArtRenderer::light(const Vector6& displacement) const {
-  cv::Mat scene;
-  draw_plate(displacement, scene);
-  for (std::size_t t = 0; t < scene_.tags.size(); ++t) draw_tag(t, displacement, scene);
-  if (scene_.blur_sigma_px > 0) cv::GaussianBlur(scene, scene, {}, scene_.blur_sigma_px);
+  const double blur = scene_.blur_sigma_px;
+  cv::Mat scene = plate(rays_, displacement);
+  if (blur > 0)
+    cv::GaussianBlur(scene, scene, {}, blur);  // the plate has nothing finer than pixels
+
+  // Where the tags are, what the lens blurs is what the pixels then average, not the other way
+  // about: else the blur would depend on where in a pixel an edge lies.
+  const int reach = static_cast<int>(std::ceil(kBlurReach * blur)) + 2;
+  const auto grown = [&](const cv::Rect& r, int by) {
+    return cv::Rect(r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by) &
+           cv::Rect(0, 0, scene.cols, scene.rows);
+  };
+  const cv::Rect shown = grown(seen(displacement), reach);
+  if (!shown.empty()) {
+    const cv::Rect drawn = grown(shown, reach);
+    const cv::Mat rays = fine_rays_(cv::Rect(drawn.x * kSamples, drawn.y * kSamples,
+                                             drawn.width * kSamples, drawn.height * kSamples));
+    cv::Mat fine = plate(rays, displacement);
+    for (std::size_t t = 0; t < scene_.tags.size(); ++t) draw_tag(t, displacement, rays, fine);
+    if (blur > 0) cv::GaussianBlur(fine, fine, {}, blur * kSamples);
+    cv::Mat pixels;
+    cv::resize(fine, pixels, drawn.size(), 0, 0, cv::INTER_AREA);
+    pixels(shown - drawn.tl()).copyTo(scene(shown));
+  }
   for (int x = 0; x < scene.cols; ++x)
     scene.col(x) *= 1 - scene_.light_fall * x / (scene.cols - 1.0);
   return scene;

@@ -1,10 +1,10 @@
-// A second renderer, written against the file formats alone: it shares no code with the simulator and
-// none with the tracker, so that what holds on both leans on neither.
+// A second renderer, written against the file formats alone: it shares no code with the simulator
+// and none with the tracker, so that what holds on both leans on neither.
 //
-// The tags are OpenCV's own drawings on white paper, as high-resolution art; a picture looks them
-// up through plain homographies, 4 x 4 samples a pixel averaged over its area. A textured plate
-// lies behind. Then Gaussian blur, uneven light, noise, rounding. No dynamics: a frame shows the
-// platform standing at its displacement.
+// The tags are OpenCV's own drawings on white paper, as high-resolution art, before a textured
+// plate; a picture looks them up through plain homographies, 4 x 4 samples a pixel, blurs the
+// samples (Gaussian) and averages them over the pixel's area. Then uneven light, noise, rounding.
+// No dynamics: a frame shows the platform standing at its displacement.
 #pragma once
 
 #include <array>
@@ -66,13 +66,15 @@ class ArtRenderer {
   };
 
   cv::Matx33d ray_from_plane(const ArtTag& tag, const Vector6& displacement) const;
-  void draw_plate(const Vector6& displacement, cv::Mat& scene) const;
-  void draw_tag(std::size_t tag, const Vector6& displacement, cv::Mat& scene) const;
+  cv::Mat plate(const cv::Mat& rays, const Vector6& displacement) const;
+  void draw_tag(std::size_t tag, const Vector6& displacement, const cv::Mat& rays,
+                cv::Mat& scene) const;
+  cv::Rect seen(const Vector6& displacement) const;  ///< of the tags, px
 
   ArtScene scene_;
   std::vector<Art> art_;
   cv::Mat plate_;
-  cv::Mat rays_;       ///< CV_64FC2, of every pixel
+  cv::Mat rays_;       ///< CV_32FC2, of every pixel
   cv::Mat fine_rays_;  ///< CV_32FC2, of every sample
 };
 

@@ -2,7 +2,8 @@
 //
 // Order of one frame: plate (one sample a pixel), pads (one), tags (2 x 2 samples a pixel, spread
 // over the exposure), what passes before the lens, Gaussian point spread whose width follows the
-// depth of the scene row by row, light and glare, noise, rounding.
+// depth of the scene row by row (a part of it is in the tags' textures), light and glare, noise,
+// rounding.
 #pragma once
 
 #include <array>
@@ -100,6 +101,7 @@ class Renderer {
   double contrast_at(const Eigen::Vector2d& pixel, double middle_time) const noexcept;
   Eigen::Vector2d from_centre(double column, double row) const noexcept;
 
+  double before_sampling_px() const noexcept;
   void choose_point_spread(double focus_distance) noexcept;
   double depth_at_row(int row) const noexcept;
   void blur_rows() noexcept;

@@ -1,8 +1,41 @@
 #include "host/source/simulator/texture.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tagwrench::sim {
+namespace {
+
+std::vector<float> gaussian(double sigma) {
+  std::vector<float> weights(static_cast<std::size_t>(std::ceil(3 * sigma)) + 1);
+  float sum = 0;
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    weights[k] = static_cast<float>(std::exp(-0.5 * static_cast<double>(k * k) / (sigma * sigma)));
+    sum += k == 0 ? weights[k] : 2 * weights[k];
+  }
+  for (float& weight : weights) weight /= sum;
+  return weights;
+}
+
+/// The columns of `from` (rows of `width`) convolved, turned into the rows of what is returned.
+std::vector<float> blurred_columns(const std::vector<float>& from, int width,
+                                   const std::vector<float>& weights) {
+  const int height = static_cast<int>(from.size()) / width;
+  const int reach = static_cast<int>(weights.size()) - 1;
+  std::vector<float> out(from.size(), 0.0F);
+  for (int v = 0; v < height; ++v) {
+    for (int k = std::max(-reach, -v); k <= std::min(reach, height - 1 - v); ++k) {
+      const float weight = weights[static_cast<std::size_t>(std::abs(k))];
+      const float* row = from.data() + static_cast<std::ptrdiff_t>(v + k) * width;
+      for (int u = 0; u < width; ++u)
+        out[static_cast<std::size_t>(u) * static_cast<std::size_t>(height) +
+            static_cast<std::size_t>(v)] += weight * row[u];
+    }
+  }
+  return out;
+}
+
+}  // namespace
 
 Texture Texture::of_size(double half_x, double half_y, double texels_per_m, bool opaque) {
   Texture t;
@@ -15,6 +48,30 @@ Texture Texture::of_size(double half_x, double half_y, double texels_per_m, bool
   t.reflectance.assign(size, 0.0F);
   if (!opaque) t.coverage.assign(size, 0.0F);
   return t;
+}
+
+Texture softened(const Texture& t, double sigma_texels) {
+  if (sigma_texels <= 0) return t;
+  const std::vector<float> weights = gaussian(sigma_texels);
+  const int more = static_cast<int>(weights.size()) - 1;
+  Texture out = t;
+  out.width += 2 * more;
+  out.height += 2 * more;
+  out.centre_u += more;
+  out.centre_v += more;
+  const auto soften = [&](const std::vector<float>& from) {
+    if (from.empty()) return from;
+    std::vector<float> wide(static_cast<std::size_t>(out.width) *
+                            static_cast<std::size_t>(out.height));
+    for (int v = 0; v < t.height; ++v) {
+      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(t.index(0, v)), t.width,
+                  wide.begin() + static_cast<std::ptrdiff_t>(out.index(more, v + more)));
+    }
+    return blurred_columns(blurred_columns(wide, out.width, weights), out.height, weights);
+  };
+  out.reflectance = soften(t.reflectance);
+  out.coverage = soften(t.coverage);
+  return out;
 }
 
 SmoothNoise::SmoothNoise(Random& random, double spacing)

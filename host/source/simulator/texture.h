@@ -31,6 +31,9 @@ struct Texture {
   double y(int v) const { return (v - centre_v) / texels_per_m; }
 };
 
+/// The texture after a Gaussian of this width (in texels), enlarged so that nothing is cut off.
+Texture softened(const Texture& t, double sigma_texels);
+
 /// Smooth random field with zero mean, unit variance and a correlation length of about `spacing`
 /// metres.
 class SmoothNoise {

@@ -57,13 +57,22 @@ TEST(TargetFromMotion, ARollingShutterIsMeasuredAndSpoilsNothing) {
   const Recording recording(scenario, kFrames);
   const TargetEstimate estimate = adjusted(recording);
   check_estimate(estimate, recording.sensor.camera);
-  EXPECT_NEAR(estimate.readout, 20e-3, 3e-3);  // s
+  EXPECT_NEAR(estimate.readout, 20e-3, 4 * estimate.readout_sigma);  // s
+  EXPECT_LT(estimate.readout_sigma, 0.5e-3);
+  EXPECT_TRUE(readout_is_clear(estimate));
   EXPECT_NEAR(estimate.focal_ratio, 1, 4 * estimate.focal_sigma);
   for (std::size_t t = 0; t < 2; ++t) {
     const Vector6 error = motion_between(recording.true_tag(t), estimate.camera_T_tag[t]);
     EXPECT_LT(error.head<3>().norm(), 10 * kUm) << "tag " << t;
     EXPECT_LT(error.tail<3>().norm(), 2 * kMrad) << "tag " << t;
   }
+}
+
+TEST(TargetFromMotion, AGlobalShutterIsNotTakenForARollingOne) {
+  const Recording recording(realistic(3), kFrames);
+  const TargetEstimate estimate = adjusted(recording);
+  EXPECT_NEAR(estimate.readout, 0, 4 * estimate.readout_sigma);
+  EXPECT_FALSE(readout_is_clear(estimate));
 }
 
 // Errors of the tracker, on all axes, when it is given the tags' places.

@@ -1,4 +1,6 @@
 // Derivatives against differences, and eliminations against the full equations.
+#include "host/calibrate/target_derivatives.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>

@@ -31,6 +31,12 @@ class RestPicture : public testing::Test {
   ~RestPicture() override { fs::remove_all(folder_); }
 
   std::string complaint() const {
+    testing::internal::CaptureStderr();
+    const std::string line = loading();
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    return line;
+  }
+  std::string loading() const {
     try {
       load_rest_image(folder_ / "rest.png", camera_);
     } catch (const ConfigError& e) {

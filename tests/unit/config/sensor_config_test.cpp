@@ -74,6 +74,17 @@ TEST(SensorConfig, RemembersTheCalibrationOfTheCamera) {
   }
 }
 
+// Of lenses as they are sold: a webcam's, a wide one's, one that bends the other way; and the
+// strongest barrel that shows no direction twice in this image.
+TEST(SensorConfig, AcceptsTheDistortionOfRealLenses) {
+  for (const char* distortion : {"[-0.42, 0.21, 0.001, -0.002, -0.06]", "[0.3, 0.4, 0, 0, 0]",
+                                 "[0, 0, 0, 0, 0]", "[-0.55, 0, 0, 0, 0]"}) {
+    const std::string text =
+        replaced(kGood, "fy: 806.0,", std::string("fy: 806.0, distortion: ") + distortion + ",");
+    EXPECT_NO_THROW(parse_sensor(text, "sensor.yaml")) << distortion;
+  }
+}
+
 TEST(SensorConfig, ReadsEveryOptionalKey) {
   const SensorConfig s = parse_sensor(
       replaced(
@@ -81,7 +92,7 @@ TEST(SensorConfig, ReadsEveryOptionalKey) {
                    "{id: 5, position_mm: [1, 2, 3], rotation_rad: [0, 0, 1.5707963267948966], "
                    "position_sigma_mm: [0.004, 0.005, 0.006], rotation_sigma_rad: [0.001, 0.002, "
                    "0.003]}"),
-          "fy: 806.0,", "fy: 806.0, distortion: [1, 2, 3, 4, 5], mirrored: true,") +
+          "fy: 806.0,", "fy: 806.0, distortion: [-0.1, 0.02, 3e-3, -4e-3, 0.05], mirrored: true,") +
           "  range_n: [1, 2, 3]\n"
           "  range_nm: [0.01, 0.02, 0.03]\n"
           "  origin_mm: [0, 0, 20]\n"
@@ -91,7 +102,7 @@ TEST(SensorConfig, ReadsEveryOptionalKey) {
           "spacemouse: {id: '1209:00aB'}\n",
       "sensor.yaml");
   EXPECT_TRUE(s.camera.mirrored);
-  EXPECT_EQ(s.camera.distortion[4], 5.0);
+  EXPECT_EQ(s.camera.distortion[4], 0.05);
   ASSERT_TRUE(s.target.tags[0].platform_T_tag);
   // The tag's x axis lies along platform y.
   EXPECT_TRUE((*s.target.tags[0].platform_T_tag * Eigen::Vector3d(1e-3, 0, 0))
@@ -179,6 +190,14 @@ INSTANTIATE_TEST_SUITE_P(
                 "sensor.yaml:12: wrench.springs.axial_n_per_mm:", "finite"},
         BadCase{"WrongShape", "[11, 8, -10], [-11, 8, -10]", "[11, 8], [-11, 8, -10]",
                 "sensor.yaml:11: wrench.springs.centres_mm:", "entry 1 must have 3"},
+        BadCase{"FoldedImage", "cx: 319.5", "cx: 319.5, distortion: [-5, 0, 0, 0, 0]",
+                "sensor.yaml:1: camera.distortion:", "folds the image"},
+        BadCase{"FoldedImageThatUnfoldsFurtherOut", "cx: 319.5",
+                "cx: 319.5, distortion: [-6, 15, 0, 0, 0]",
+                "sensor.yaml:1: camera.distortion:", "folds the image"},
+        BadCase{"ImageFoldedByTheTangentialPart", "cx: 319.5",
+                "cx: 319.5, distortion: [0, 0, 2, 0, 0]",
+                "sensor.yaml:1: camera.distortion:", "folds the image"},
         BadCase{"WrongDistortion", "cx: 319.5", "cx: 319.5, distortion: [0, 0]",
                 "sensor.yaml:1: camera.distortion:", "5 numbers, has 2"},
         BadCase{"NegativeReadout", "cx: 319.5", "cx: 319.5, readout_ms: -1",

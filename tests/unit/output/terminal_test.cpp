@@ -50,11 +50,11 @@ class View : public ::testing::Test {
     options_.color = false;
   }
   std::vector<std::string> draw(const Sample& sample, int width, int height = 24) {
-    size_ =
-        draw_view(screen_, options_, sample, {60, 0.8, 3}, "said once", width, height, 0, count_);
+    size_ = draw_view(screen_, options_, sample, {60, 0.8, 3}, notice_, width, height, 0, count_);
     return visible_lines({screen_.data(), size_});
   }
   TerminalOptions options_;
+  std::string notice_ = "said once";
   std::array<char, TextSink::kMaxBlock> screen_{};
   std::size_t size_ = 0;
   int count_ = 0;
@@ -72,6 +72,19 @@ TEST_F(View, ShowsValuesWithTheirUnitsAndWhereTheyComeFrom) {
   EXPECT_NE(lines[6].find("of 200 mN m"), std::string::npos);
   EXPECT_NE(lines[8].find("simulated sensor"), std::string::npos);
   EXPECT_NE(lines[10].find("said once"), std::string::npos);
+}
+
+TEST_F(View, ALongNoticeIsBrokenAtSpacesAndWholeIfThereIsRoom) {
+  notice_ =
+      "no tag is seen, neither tags 5 and 2 of aruco_original nor any other; are they in view?";
+  const auto lines = draw(test::ok_sample(), 50);
+  std::string shown;
+  for (std::size_t i = 10; i < lines.size(); ++i) {
+    EXPECT_LE(lines[i].size(), 50U);
+    shown += lines[i].substr(8, lines[i].find_last_not_of(' ') - 7) + ' ';
+  }
+  EXPECT_EQ(shown, notice_ + ' ');
+  EXPECT_EQ(draw(test::ok_sample(), 50, 11).size(), 11U) << "no more lines than the screen has";
 }
 
 TEST_F(View, BarsGrowFromTheMiddleWithTheSign) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "host/source/simulator/renderer.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/source/simulator/tag_print.h"
 
@@ -124,6 +125,43 @@ TEST(RenderImage, DefocusSoftensEdges) {
     return most;
   };
   EXPECT_GT(steepest(20e-3), 1.5 * steepest(14e-3));
+}
+
+// Of a picture that was blurred before it was sampled, the pixels tell what lies half-way between
+// them.
+TEST(RenderImage, ATagHalfAPixelFurtherIsWhatInterpolationSays) {
+  Scenario s = resting();
+  s.noise = {0, 0};
+  s.exposure.even = true;
+  s.target.tags = {{5, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}};
+  const TrajectoryPlayer player(s.trajectory, s.seed);
+  PlatformMotion motion(s.mechanics, player, -0.1, 0.01);
+  Renderer renderer(s);
+  const auto shifted_px = [&](double shift) {
+    Vector6 displacement = Vector6::Zero();
+    displacement[0] = shift * s.target.rest_position.z() / s.camera.fx_px;
+    motion.set_state({displacement, Vector6::Zero()});
+    std::vector<std::uint8_t> pixels(640 * 480);
+    renderer.render(motion, 0, 0, pixels.data());
+    return pixels;
+  };
+  const auto here = shifted_px(0);
+  const auto there = shifted_px(0.5);
+  // Lagrange's polynomial through eight pixels, in their middle.
+  constexpr double kWeights[4] = {1225 / 2048.0, -245 / 2048.0, 49 / 2048.0, -5 / 2048.0};
+  double squares = 0;
+  constexpr int kRows = 90;
+  constexpr int kColumns = 140;
+  for (int column = 320 - kColumns / 2; column < 320 + kColumns / 2; ++column) {
+    double mean = 0;  // down the columns, along which edges run: rounding averages out
+    for (int row = 240 - kRows / 2; row < 240 + kRows / 2; ++row) {
+      const auto at = static_cast<std::size_t>(row * 640 + column);
+      mean += there[at];
+      for (std::size_t k = 0; k < 4; ++k) mean -= kWeights[k] * (here[at - 1 - k] + here[at + k]);
+    }
+    squares += std::pow(mean / kRows, 2);
+  }
+  EXPECT_LT(std::sqrt(squares / kColumns), 0.085);  // grey levels
 }
 
 TEST(RenderImage, JpegChangesLittleAndIsDeterministic) {

@@ -54,7 +54,7 @@ TEST(ImageHeader, RefusesWhatIsNone) {
 }
 
 TEST(ImageHeader, RefusesEveryTruncation) {
-  for (std::size_t n = 0; n < 24; ++n) EXPECT_FALSE(image_size({kPng.data(), n})) << n;
+  for (std::size_t n = 0; n < kPng.size(); ++n) EXPECT_FALSE(image_size({kPng.data(), n})) << n;
   for (std::size_t n = 0; n < 23; ++n) EXPECT_FALSE(image_size({kJpeg.data(), n})) << n;
 }
 

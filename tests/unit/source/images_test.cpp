@@ -148,12 +148,16 @@ TEST_F(Images, APictureThatTurnsOutCorruptIsSkippedAndCounted) {
   for (const char* name : {"b.png", "c.pgm"}) cut_in_half(name);
   fs::resize_file(dir_ / "d.jpg", jpeg.size() - 10);
   Frame frame;
+  testing::internal::CaptureStderr();
   ASSERT_EQ(source.read(frame), ReadStatus::frame);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(source.read(frame), ReadStatus::nothing) << i;
   ASSERT_EQ(source.read(frame), ReadStatus::frame);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "what to say is the caller's";
   EXPECT_EQ(level(frame), 30);
   EXPECT_EQ(frame.dropped, 3U);
   EXPECT_EQ(source.corrupt_frames(), 3U);
+  EXPECT_NE(source.unusable().find("b.png: is damaged"), std::string::npos) << source.unusable();
+  EXPECT_NE(source.unusable().find("2 others"), std::string::npos) << source.unusable();
 }
 
 TEST_F(Images, APictureThatVanishesOrChangesSizeIsSkipped) {

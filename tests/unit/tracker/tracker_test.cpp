@@ -170,6 +170,24 @@ TEST(Tracker, GivenPlacementAndRestPoseNeedNoLearning) {
   expect_accurate(follow(bench, 25), 25, 2.0, 6.0, 0.5);
 }
 
+TEST(Tracker, ThePictureIsLearnedWhereTheTargetStandsEvenIfRestWasElsewhere) {
+  const Scene scene = render::roof();
+  TargetDescription target = roof_target();
+  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
+  camera_T_platform.translation() = scene.pivot;
+  for (std::size_t t = 0; t < 2; ++t) {
+    target.tags[t].platform_T_tag = camera_T_platform.inverse() * scene.tags[t].camera_T_tag;
+  }
+  const Eigen::Vector3d elsewhere(0, 0.8e-3, 0);
+  camera_T_platform.translation() += elsewhere;
+  Bench bench(scene, target, {kRestFrames, camera_T_platform, {}});
+  Track track;
+  for (int i = 0; i < 2 * kRestFrames; ++i) track = bench.show(Vector6::Zero());
+  ASSERT_EQ(track.status, Status::ok);
+  EXPECT_LT((track.displacement.head<3>() + elsewhere).norm(), 10e-6);
+  EXPECT_FALSE(track.wanted.empty());  // only alignment with a picture needs but a part
+}
+
 TEST(Tracker, GivenPlacementLearnsTheRestPoseAlone) {
   const Scene scene = render::roof();
   TargetDescription target = roof_target();

@@ -1,0 +1,38 @@
+// Are pictures doubted because a rolling shutter shears them while the target moves, and the
+// sensor does not say so?
+#pragma once
+
+#include "host/tracker/motion.h"
+#include "host/tracker/photometric.h"
+
+namespace tagwrench {
+
+/// Tries doubted pictures of a moving target once more, as if their rows had been exposed one after
+/// the other. What else spoils pictures (things before the lens, glare, blur of motion) is not
+/// mended by that; nor is a sheared one by rows in the other order.
+class ShutterCheck {
+ public:
+  /// Where the target is in the frame of this time, trusted or not.
+  void seen(TimePoint time, const Eigen::Isometry3d& camera_T_platform) noexcept {
+    motion_.add(time, camera_T_platform);
+  }
+  void lost() noexcept { motion_.start({}, Eigen::Isometry3d::Identity()); }
+
+  /// Before seen(): the picture of a fit that was not trusted, its pose, and the light before it.
+  /// True once, when enough pictures have been mended and few have not. Allocates once. Never
+  /// throws.
+  bool rolls(const PhotometricAligner& aligner, const PixelWindow& image, TimePoint time,
+             const Eigen::Isometry3d& pose, const PhotometricState& light) noexcept;
+
+ private:
+  bool mended(const PixelWindow& image, const Eigen::Isometry3d& pose, const Vector6& velocity,
+              const PhotometricState& light) noexcept;
+
+  PhotometricAligner trial_;
+  Motion motion_;  ///< through doubted frames too
+  int mended_ = 0;
+  int tried_ = 0;
+  bool done_ = false;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,25 @@
+// When a photometric fit deserves to be believed.
+#pragma once
+
+#include <cmath>
+
+#include "host/tracker/photometric.h"
+
+namespace tagwrench {
+
+inline bool trusted(const PhotometricFit& fit, const PhotometricState& state) noexcept {
+  /// Believing less of the template than this.
+  constexpr double kLeastGood = 0.3;
+  /// Residuals of this part of the contrast, or a blur beyond what its expansion describes, px^2.
+  constexpr double kMostResidualPart = 0.10;
+  constexpr double kMostBlur = 1.2;
+  /// Standard deviations beyond these are of no use for a force: m, rad.
+  constexpr double kDoubtTranslation = 0.3e-3;
+  constexpr double kDoubtRotation = 0.03;
+  const Vector6 sigma = fit.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  return fit.good >= kLeastGood && fit.residual_part < kMostResidualPart &&
+         std::abs(state.blur[0]) < kMostBlur && sigma.head<3>().maxCoeff() < kDoubtTranslation &&
+         sigma.tail<3>().maxCoeff() < kDoubtRotation;
+}
+
+}  // namespace tagwrench
