@@ -51,15 +51,15 @@ Case simulated(const std::string& name, const std::string& what, const sim::Scen
   result.targets = targets_of_every_case();
   result.targets.absolute = limits(0.15, 0.6, INFINITY, INFINITY, INFINITY);
   result.targets.std_over_bound = 1.2;
+  result.calibrate = true;
   return result;
 }
 
-void clean(Table& table, const std::optional<std::string>& calibrated) {
+void clean(Table& table) {
   Case c = simulated("clean", "exact print, even light, ideal lens", scenario_named("clean"));
   c.targets.after_fit = limits(0.05, 0.4, 0.04, 0.08, 0.025);
   c.targets.z_gain_over_a = 150;
   c.targets.z_gain_over_b = 8;
-  c.calibrated = calibrated;
   bench_case(c, table);
 }
 
@@ -106,6 +106,7 @@ void grid(Table& table) {
                      scenario);
   c.clip.opencv_knows_family = false;
   c.april.reset();
+  c.calibrate = false;
   c.targets.speed_gain_over_b = 0;
   bench_case(c, table);
 }
@@ -140,18 +141,18 @@ void hard(Table& table) {
 
 struct NamedCase {
   const char* name;
-  std::function<void(Table&, const std::optional<std::string>& calibrated)> bench;
+  std::function<void(Table&)> bench;
 };
 
 const std::vector<NamedCase>& cases() {
   static const std::vector<NamedCase> all = {
       {"clean", clean},
-      {"realistic", [](Table& t, const auto&) { realistic(t, false); }},
-      {"jpeg85", [](Table& t, const auto&) { realistic(t, true); }},
-      {"full_hd", [](Table& t, const auto&) { full_hd(t); }},
-      {"semi_real", [](Table& t, const auto&) { semi_real(t); }},
-      {"grid", [](Table& t, const auto&) { grid(t); }},
-      {"hard", [](Table& t, const auto&) { hard(t); }},
+      {"realistic", [](Table& t) { realistic(t, false); }},
+      {"jpeg85", [](Table& t) { realistic(t, true); }},
+      {"full_hd", full_hd},
+      {"semi_real", semi_real},
+      {"grid", grid},
+      {"hard", hard},
   };
   return all;
 }
@@ -172,7 +173,7 @@ std::string problem(const std::vector<std::string>& names) {
   return {};
 }
 
-void bench(const std::vector<std::string>& names, const std::optional<std::string>& calibrated) {
+void bench(const std::vector<std::string>& names) {
   Table table;
   fmt::print(
       "Every method sees the same frames in the same run, one thread; times are processor time of\n"
@@ -182,7 +183,7 @@ void bench(const std::vector<std::string>& names, const std::optional<std::strin
       "across,\n"
       "150 um in depth or 10 mrad; the hard case has a finer rule (tests/support/hard_run.h).\n");
   for (const NamedCase& c : cases()) {
-    if (asked_for(names, c.name)) c.bench(table, calibrated);
+    if (asked_for(names, c.name)) c.bench(table);
   }
   table.close();
 }
@@ -192,18 +193,13 @@ void bench(const std::vector<std::string>& names, const std::optional<std::strin
 
 int main(int argc, char** argv) {
   cv::setNumThreads(1);
-  std::vector<std::string> names(argv + 1, argv + argc);
-  std::optional<std::string> calibrated;
-  if (names.size() >= 2 && names[0] == "--calibrated") {
-    calibrated = names[1];
-    names.erase(names.begin(), names.begin() + 2);
-  }
+  const std::vector<std::string> names(argv + 1, argv + argc);
   if (const std::string wrong = tagwrench::bench::problem(names); !wrong.empty()) {
     fmt::print(stderr, "bench tracker: {}\n", wrong);
     return 2;
   }
   try {
-    tagwrench::bench::bench(names, calibrated);
+    tagwrench::bench::bench(names);
   } catch (const std::exception& e) {
     fmt::print(stderr, "bench tracker: {}\n", e.what());
     return 1;

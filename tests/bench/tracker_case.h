@@ -37,9 +37,9 @@ struct Case {
   std::string name;
   std::vector<std::string> about;
   Clip clip;
-  std::optional<Clip> april;              ///< the same motion with AprilTags
-  std::optional<Clip> smaller;            ///< whose time must not be much less
-  std::optional<std::string> calibrated;  ///< a sensor file with calibrated geometry
+  std::optional<Clip> april;    ///< the same motion with AprilTags
+  std::optional<Clip> smaller;  ///< whose time must not be much less
+  bool calibrate = false;       ///< also with geometry calibrated from another recording
   Targets targets;
 };
 

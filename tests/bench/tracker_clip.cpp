@@ -45,10 +45,11 @@ class MovingShots final : public ShotSource {
 class HeldShots final : public ShotSource {
  public:
   HeldShots(const sim::Scenario& scenario, const std::vector<Vector6>& displacements,
-            int frames_each)
+            int frames_each, std::uint64_t first_noise)
       : scenario_(scenario),
         displacements_(displacements),
         frames_each_(frames_each),
+        first_noise_(first_noise),
         player_(scenario.trajectory, scenario.seed),
         renderer_(scenario),
         motion_(scenario.mechanics, player_, 0, 2 * renderer_.half_window() + 0.01),
@@ -79,7 +80,7 @@ class HeldShots final : public ShotSource {
     const double time = next_ / scenario_.camera.frame_rate;
     shot.time = TimePoint(Duration(std::llround(1e9 * time)));
     motion_.set_state({shot.truth, Vector6::Zero()});
-    renderer_.render(motion_, 0, shot.sequence, shot.pixels.data());
+    renderer_.render(motion_, 0, first_noise_ + shot.sequence, shot.pixels.data());
     jpeg_.apply(shot.pixels.data());
     ++next_;
     return true;
@@ -89,6 +90,7 @@ class HeldShots final : public ShotSource {
   sim::Scenario scenario_;
   std::vector<Vector6> displacements_;
   int frames_each_;
+  std::uint64_t first_noise_;
   int next_ = 0;
   sim::TrajectoryPlayer player_;
   sim::Renderer renderer_;
@@ -103,8 +105,9 @@ std::unique_ptr<ShotSource> moving_shots(const sim::Scenario& scenario, int movi
 }
 
 std::unique_ptr<ShotSource> held_shots(const sim::Scenario& scenario,
-                                       const std::vector<Vector6>& displacements, int frames_each) {
-  return std::make_unique<HeldShots>(scenario, displacements, frames_each);
+                                       const std::vector<Vector6>& displacements, int frames_each,
+                                       std::uint64_t first_noise) {
+  return std::make_unique<HeldShots>(scenario, displacements, frames_each, first_noise);
 }
 
 }  // namespace tagwrench::bench

@@ -45,8 +45,10 @@ constexpr int kRestFrames = 25;
 std::unique_ptr<ShotSource> moving_shots(const sim::Scenario& scenario, int moving_frames);
 
 /// The scenario's sensor held still at each of `displacements`, `frames_each` noise realisations;
-/// between them it travels slowly enough to be followed.
+/// between them it travels slowly enough to be followed. The first frame has the noise of this
+/// number, the others the noise of those that follow.
 std::unique_ptr<ShotSource> held_shots(const sim::Scenario& scenario,
-                                       const std::vector<Vector6>& displacements, int frames_each);
+                                       const std::vector<Vector6>& displacements, int frames_each,
+                                       std::uint64_t first_noise = 0);
 
 }  // namespace tagwrench::bench
