@@ -37,10 +37,10 @@ constexpr double kGroupsFitted = 3;
 constexpr int kMostSteps = 10;
 constexpr int kFirstSteps = 3;  ///< by then residuals have fallen, or never will
 /// Squared sizes of steps, in standard deviations, all parameters together. A step shrinks to a few
-/// percent of the one before, squared: after one as small as kSmallStep there is nothing left to
-/// gain. Below kNearStep residuals tell which patches to believe; below kKeepStep pairs of pixels
-/// stay.
-constexpr double kSmallStep = 0.3;
+/// percent of the one before, squared: what one as small as kSmallStep leaves is lost in the noise
+/// (0.3 instead changes no error by a thousandth). Below kNearStep residuals tell which patches to
+/// believe; below kKeepStep pairs of pixels stay.
+constexpr double kSmallStep = 3;
 constexpr double kNearStep = 400;
 constexpr double kKeepStep = 1000;
 
@@ -335,8 +335,11 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
       }
     }
     // Few groups leave little to compare: then the patches must do.
-    if (groups->count > 1.2 * kFitted)
-      ratio = std::max(ratio, groups->ratio * groups->count / (groups->count - kGroupsFitted));
+    if (groups->count < 1.2 * kFitted) continue;
+    const double freedom = groups->count - kGroupsFitted;
+    const double excess = groups->ratio * groups->count / freedom - 1;
+    // A variance known from so few groups makes the error Student's t, which spreads wider.
+    ratio = std::max(ratio, 1 + excess * freedom / (freedom - 2));
   }
   fit.covariance = std::max(1.0, ratio) * white;
   if (!fit.covariance.allFinite()) fit.converged = false;

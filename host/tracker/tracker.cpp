@@ -33,9 +33,10 @@ constexpr double kFarAngle = 0.026;
 constexpr Duration kStillTime = std::chrono::milliseconds(1500);
 constexpr Duration kSettling = std::chrono::milliseconds(200);
 
-/// While the platform moves less than this per frame, its picture may be learned, m and rad.
-constexpr double kStill = 3e-6;
-constexpr double kStillAngle = 0.3e-3;
+/// While the platform moves less than this per frame, its picture may be learned, m and rad: more
+/// than the edges' noise; the learner itself looks closer.
+constexpr double kStill = 15e-6;
+constexpr double kStillAngle = 1e-3;
 
 /// Covariance of the rotation vector r of exp(r), from that of a small rotation after it: the
 /// inverse of the left Jacobian of SO(3) to second order (Sola, "A micro Lie theory", arXiv

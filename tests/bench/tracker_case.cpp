@@ -26,6 +26,7 @@ double thread_time_us() {
 }
 
 /// What the maker of the scenario knows and the owner of the sensor does not: where the tags are.
+/// The rest pose is learned all the same, from the 25 frames, as displacement counts from there.
 SensorConfig with_true_geometry(SensorConfig sensor, const sim::Scenario& scenario) {
   const std::vector<sim::PlacedTag> placed = sim::placed_tags(scenario);
   for (std::size_t t = 0; t < placed.size(); ++t) {
@@ -34,8 +35,6 @@ SensorConfig with_true_geometry(SensorConfig sensor, const sim::Scenario& scenar
     pose.translation() = placed[t].platform_T_tag.position;
     sensor.target.tags[t].platform_T_tag = pose;
   }
-  sensor.rest.camera_T_platform = Eigen::Isometry3d::Identity();
-  sensor.rest.camera_T_platform->translation() = scenario.target.rest_position;
   return sensor;
 }
 
