@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+// Vectors of a length known only at run time (SVE, RVV) cannot be kept in arrays, as sums are here.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "host/tracker/pixel_sums.cpp"
 #include <hwy/foreach_target.h>
@@ -109,21 +111,20 @@ HWY_NOINLINE void find_pixels(const PixelTemplate& t, const Lens& lens, const Pi
   }
 }
 
-struct Accumulator {
-  V right[kPatchParameters];
-  V squares, weights, inside;
-};
-
 HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchView& view,
                           float inverse_cut, std::size_t first, std::size_t count,
-                          const PixelPairs& pairs, const Block& block, Accumulator& sums) {
+                          const PixelPairs& pairs, const Block& block, PatchSums& sums) {
   const Float d;
   const auto set = [&](float value) { return hn::Set(d, value); };
   const V zero = hn::Zero(d);
   const V one = set(1.0F);
   const V cut = set(inverse_cut);
   const V saturated = set(253.5F);
-  Accumulator s = sums;
+  V right[kPatchParameters];
+  for (V& sum : right) sum = zero;
+  V squares = zero;
+  V weights = zero;
+  V inside = zero;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const std::size_t at = first + i;
     const auto load = [&](const PixelArray& array) { return hn::LoadU(d, array.data() + at); };
@@ -185,31 +186,34 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
     const auto& p = view.camera_t_platform;
     const V pull_z = hn::Neg(hn::Mul(inverse, hn::MulAdd(hn::Add(x, set(p[0])), pull_x,
                                                          hn::Mul(hn::Add(y, set(p[1])), pull_y))));
-    s.right[0] = hn::Add(s.right[0], pull_x);
-    s.right[1] = hn::Add(s.right[1], pull_y);
-    s.right[2] = hn::Add(s.right[2], pull_z);
-    s.right[3] = hn::Add(s.right[3], hn::MulSub(y, pull_z, hn::Mul(z, pull_y)));
-    s.right[4] = hn::Add(s.right[4], hn::MulSub(z, pull_x, hn::Mul(x, pull_z)));
-    s.right[5] = hn::Add(s.right[5], hn::MulSub(x, pull_y, hn::Mul(y, pull_x)));
-    s.right[6] = hn::MulAdd(wrw, laplacian, s.right[6]);
-    s.right[7] = hn::MulAdd(hn::Mul(wrw, depth), laplacian, s.right[7]);
+    right[0] = hn::Add(right[0], pull_x);
+    right[1] = hn::Add(right[1], pull_y);
+    right[2] = hn::Add(right[2], pull_z);
+    right[3] = hn::Add(right[3], hn::MulSub(y, pull_z, hn::Mul(z, pull_y)));
+    right[4] = hn::Add(right[4], hn::MulSub(z, pull_x, hn::Mul(x, pull_z)));
+    right[5] = hn::Add(right[5], hn::MulSub(x, pull_y, hn::Mul(y, pull_x)));
+    right[6] = hn::MulAdd(wrw, laplacian, right[6]);
+    right[7] = hn::MulAdd(hn::Mul(wrw, depth), laplacian, right[7]);
     const V wrl = hn::Mul(wrw, middle);
-    s.right[8] = hn::Add(s.right[8], wrl);
-    s.right[9] = hn::MulAdd(wrl, across, s.right[9]);
+    right[8] = hn::Add(right[8], wrl);
+    right[9] = hn::MulAdd(wrl, across, right[9]);
     const V wrld = hn::Mul(wrl, down);
-    s.right[10] = hn::Add(s.right[10], wrld);
-    s.right[11] = hn::MulAdd(wrld, down, s.right[11]);
-    s.right[12] = hn::Add(s.right[12], wrw);
-    s.squares = hn::MulAdd(wr, residual, s.squares);
-    s.weights = hn::Add(s.weights, w);
-    s.inside = hn::Add(s.inside, valid);
+    right[10] = hn::Add(right[10], wrld);
+    right[11] = hn::MulAdd(wrld, down, right[11]);
+    right[12] = hn::Add(right[12], wrw);
+    squares = hn::MulAdd(wr, residual, squares);
+    weights = hn::Add(weights, w);
+    inside = hn::Add(inside, valid);
   }
-  sums = s;
+  const auto total = [&](V v) { return hn::GetLane(hn::SumOfLanes(d, v)); };
+  for (std::size_t k = 0; k < kPatchParameters; ++k) sums.right[k] += total(right[k]);
+  sums.squares += total(squares);
+  sums.weights += total(weights);
+  sums.inside += total(inside);
 }
 
 void sum_patches(const PixelTemplate& t, const PixelWindow& image, std::span<const PatchView> views,
                  float inverse_cut, bool keep, PixelPairs& pairs, std::span<PatchSums> sums) {
-  const Float d;
   const auto& k = t.camera.distortion;
   const Lens lens{std::any_of(k.begin(), k.end(), [](double c) { return c != 0; }),
                   static_cast<float>(t.camera.fx_px),
@@ -224,9 +228,7 @@ void sum_patches(const PixelTemplate& t, const PixelWindow& image, std::span<con
   Block block;
   for (std::size_t n = 0; n < t.patches.size(); ++n) {
     const PixelPatch& patch = t.patches[n];
-    Accumulator acc;
-    for (V& v : acc.right) v = hn::Zero(d);
-    acc.squares = acc.weights = acc.inside = hn::Zero(d);
+    sums[n] = {};
     for (std::size_t done = 0; done < patch.count; done += kBlock) {
       const std::size_t count = std::min(kBlock, patch.count - done);
       const std::size_t first = patch.first + done;
@@ -236,13 +238,8 @@ void sum_patches(const PixelTemplate& t, const PixelWindow& image, std::span<con
         for (std::size_t i = 0; i < count; ++i)
           level[i] = static_cast<float>(image.pixels[block.at[i]]);
       }
-      compare(t, lens, views[n], inverse_cut, first, count, pairs, block, acc);
+      compare(t, lens, views[n], inverse_cut, first, count, pairs, block, sums[n]);
     }
-    const auto total = [&](V v) { return hn::GetLane(hn::SumOfLanes(d, v)); };
-    for (std::size_t i = 0; i < kPatchParameters; ++i) sums[n].right[i] = total(acc.right[i]);
-    sums[n].squares = total(acc.squares);
-    sums[n].weights = total(acc.weights);
-    sums[n].inside = total(acc.inside);
   }
 }
 

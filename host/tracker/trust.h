@@ -12,7 +12,7 @@ inline bool trusted(const PhotometricFit& fit, const PhotometricState& state) no
   constexpr double kLeastGood = 0.3;
   /// Residuals of this part of the contrast, or a blur beyond what its expansion describes, px^2.
   constexpr double kMostResidualPart = 0.10;
-  constexpr double kMostBlur = 1.2;
+  constexpr double kMostBlur = 0.8;
   /// Standard deviations beyond these are of no use for a force: m, rad.
   constexpr double kDoubtTranslation = 0.3e-3;
   constexpr double kDoubtRotation = 0.03;
