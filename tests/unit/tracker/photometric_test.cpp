@@ -128,6 +128,30 @@ TEST(Photometric, LightThatFallsOffAcrossTheTagsLeavesThePoseWhereItIs) {
   })));
 }
 
+TEST(Photometric, ResidualsThatAreAlikeOverAPatchWidenTheSigmas) {
+  constexpr int kDraws = 12;
+  constexpr int kCell_px = 24;  // about a patch
+  constexpr float kStain = 0.03F;
+  Aligned bench;
+  std::normal_distribution<float> normal;
+  double squares = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    std::vector<float> stains(1000);
+    for (float& stain : stains) stain = 1 + kStain * normal(bench.random);
+    bench.state = {};
+    const PhotometricFit fit = bench.align(bench.changed([&](float level, int column, int row) {
+      return level * stains[static_cast<std::size_t>(row / kCell_px * 40 + column / kCell_px)];
+    }));
+    ASSERT_TRUE(fit.converged);
+    const Vector6 error = motion_between(bench.rest, fit.camera_T_platform);
+    squares += error.cwiseAbs2().cwiseQuotient(fit.covariance.diagonal()).sum();
+  }
+  const double mean = squares / (6 * kDraws);
+  std::printf("(e/sigma)^2 %.2f\n", mean);
+  EXPECT_LT(mean, 4);
+  EXPECT_GT(mean, 0.2);
+}
+
 TEST(Photometric, ChangeOfFocusIsTakenForBlurAndNotForMotion) {
   constexpr double kBefore_px = 1.0, kAfter_px = 1.2;
   Aligned bench;
