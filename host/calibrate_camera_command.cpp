@@ -78,6 +78,13 @@ Record open_record(const CalibrateCameraOptions& options) {
         paper.substr(paper.find('\n') + 1);
     record.sensor = parse_sensor(record.text, "the built-in sensor");
   }
+  std::error_code error;
+  if (!record.known && std::filesystem::is_regular_file(record.target, error)) {
+    throw ConfigError(fmt::format(
+        "{}: is there already, and --out makes a whole new sensor.yaml; write the camera into it "
+        "with --sensor {}, or name a new file",
+        record.target, record.target));
+  }
   check_replaceable(record.target);
   check_editable(record.text, {camera_section(record.sensor.camera, {})},
                  record.known ? options.sensor : record.target);

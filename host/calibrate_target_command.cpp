@@ -12,6 +12,7 @@
 #include "host/config/appearance_file.h"
 #include "host/config/sensor_edit.h"
 #include "host/config_error.h"
+#include "host/hint_text.h"
 #include "host/input.h"
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
@@ -33,6 +34,7 @@ class Guide {
   void say(const TargetRecorder& record, const Track& track) {
     if (track.hint == Hint::moved_while_learning)
       tell("the platform moved: hands off until the rest is learned");
+    if (is_trouble(track.hint)) tell(hint_text(track.hint, track.details));
     if (record.rest_known() && !told_to_move_) {
       told_to_move_ = true;
       tell("rest learned; now tilt and push the platform slowly, every way");

@@ -191,7 +191,7 @@ Outputs open_outputs(const RunOptions& options, const Input& input) {
   return outputs;
 }
 
-std::string summary(const RunReport& report) {
+std::string summary(const RunReport& report, const SensorConfig& sensor) {
   const double seconds = std::chrono::duration<double>(report.elapsed).count();
   std::string line = fmt::format(
       "{} frames in {:.2f} s ({:.1f} Hz), {} with numbers, {} dropped by the source", report.frames,
@@ -200,10 +200,16 @@ std::string summary(const RunReport& report) {
     line += fmt::format(", {} samples not taken by slow readers", report.skipped);
   if (report.frames > 0 && report.with_numbers == 0) {
     line += "; the target was never held: ";
-    line += report.trouble.empty()
-                ? "are the tags in view, in focus and lit, and are family, ids and number of tags "
-                  "those of sensor.yaml?"
-                : report.trouble;
+    if (!report.trouble.empty()) {
+      line += report.trouble;
+    } else if (report.frames <= static_cast<std::uint64_t>(std::max(0, sensor.rest.frames))) {
+      line += fmt::format("its rest pose is learned from the first {} frames (rest.frames)",
+                          sensor.rest.frames);
+    } else {
+      line +=
+          "are the tags in view, in focus and lit, and are family, ids and number of tags those of "
+          "sensor.yaml?";
+    }
   }
   return line;
 }
@@ -239,7 +245,7 @@ int run(const RunOptions& options) {
     tell(report.failure);
     return 1;
   }
-  tell(summary(report));
+  tell(summary(report, input.sensor));
   if (const std::string unusable = input.source->unusable(); !unusable.empty()) tell(unusable);
   return 0;
 }

@@ -27,14 +27,14 @@ constexpr int kMargin_px = 40;
 constexpr int kMisfits = 15;
 
 /// Farther from a given rest pose than anybody seats a platform twice: m and rad; how long it
-/// stands there; and how long the pose may still settle after the picture was learned.
+/// stands there; and how long it must stand near rest for rest to be right.
 constexpr double kFar = 0.3e-3;
 constexpr double kFarAngle = 0.026;
 constexpr Duration kStillTime = std::chrono::milliseconds(1500);
 constexpr Duration kSettling = std::chrono::milliseconds(200);
 
-/// While the platform moves less than this per frame, its picture may be learned, m and rad: more
-/// than the edges' noise; the learner itself looks closer.
+/// While the platform moves less than this it stands still, m and rad: more than the edges' noise.
+/// Where more matters, as when its picture is learned, one looks closer.
 constexpr double kStill = 15e-6;
 constexpr double kStillAngle = 1e-3;
 
@@ -143,6 +143,7 @@ struct Tracker::State {
   bool geometry_checked = false;
   bool far_from_rest_told = false;       ///< or known to be untrue
   std::optional<TimePoint> still_since;  ///< only while that is open
+  Vector6 still_at = Vector6::Zero();    ///< m, rad, from rest
   bool still_by_picture = false;         ///< not by edges, which lie a little elsewhere
   Motion motion;
   PhotometricAligner aligner;
@@ -258,19 +259,23 @@ void Tracker::State::say_misfit(bool fits, Track& track) noexcept {
   if (misfits >= kMisfits && track.hint == Hint::none) track.hint = Hint::appearance_does_not_fit;
 }
 
-/// Once, when the target has stood still since the start, but not where rest was given.
+/// Once, when the target has stood still, but not where rest was given; never after it was seen
+/// there.
 void Tracker::State::say_far_from_rest(TimePoint time, Track& track) noexcept {
   if (far_from_rest_told || !rest.given) return;
   const Vector6& offset = track.displacement;
-  const bool far = offset.head<3>().norm() > kFar || offset.tail<3>().norm() > kFarAngle;
-  const bool still =
-      motion.step().head<3>().norm() < kStill && motion.step().tail<3>().norm() < kStillAngle;
-  if (!still_since || still_by_picture != aligner.ready()) still_since = time;
-  still_by_picture = aligner.ready();
+  const Vector6 moved_on = offset - still_at;
+  if (!still_since || still_by_picture != aligner.ready() || moved_on.head<3>().norm() > kStill ||
+      moved_on.tail<3>().norm() > kStillAngle) {
+    still_since = time;
+    still_at = offset;
+    still_by_picture = aligner.ready();
+  }
   if (time - *still_since < kSettling) return;
-  far_from_rest_told = !far || !still;
-  if (far_from_rest_told || time - *still_since < kStillTime) return;
+  const bool far = offset.head<3>().norm() > kFar || offset.tail<3>().norm() > kFarAngle;
+  if (far && time - *still_since < kStillTime) return;
   far_from_rest_told = true;
+  if (!far) return;
   track.hint = Hint::far_from_rest;
   track.details.offset = offset;
   track.details.rest_given = true;

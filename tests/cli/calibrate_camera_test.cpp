@@ -112,6 +112,8 @@ TEST_F(CalibrateCameraCommand, LeavesTheFileAloneWhenItRefuses) {
                  {"none", "cannot be written"});
   expect_refused(calibrate({"--images", pictures(), "--sensor", file, "--out", "/dev/null"}),
                  {"/dev/null", "regular file"});
+  expect_refused(calibrate({"--images", pictures(), "--out", file}),
+                 {file.string(), "is there already", "--sensor"});
   EXPECT_EQ(read_file(file), kSensor);
 }
 

@@ -284,6 +284,23 @@ TEST(Diagnosis, HeldButFarFromTheGivenRest) {
   EXPECT_EQ(watch.last.status, Status::ok);
 }
 
+TEST(Diagnosis, HeldButFarFromTheGivenRestAfterAPushAndAHandBeforeTheLens) {
+  const Scene scene = render::roof();
+  RestOptions rest{5, render::rest_pose(scene), {}};
+  rest.camera_T_platform->translation().x() -= 0.8e-3;
+  Watch watch(scene, placed_target(scene), rest);
+  const std::vector<float> light = render::expose(scene, Vector6::Zero());
+  for (int i = 0; i < kLook; ++i) {
+    watch.show(render::develop(scene, light, watch.random));
+    if (i == kLook / 3) watch.show(paint([](int, int) { return 90; }));
+    if (i == kLook / 2)
+      watch.show(watch.take(scene, (Vector6() << 0, 1e-4, 0, 0, 0, 0).finished()));
+  }
+  EXPECT_TRUE(watch.said.empty());  // it has not stood still for long
+  for (int i = 0; i < 2 * kLook; ++i) watch.show(render::develop(scene, light, watch.random));
+  EXPECT_NEAR(watch.only(Hint::far_from_rest).offset[0], 0.8e-3, 0.05e-3);
+}
+
 TEST(Diagnosis, NearTheGivenRestNothingIsSaid) {
   const Scene scene = render::roof();
   RestOptions rest{5, render::rest_pose(scene), {}};
