@@ -203,8 +203,9 @@ std::string summary(const RunReport& report, const SensorConfig& sensor) {
     if (!report.trouble.empty()) {
       line += report.trouble;
     } else if (report.frames <= static_cast<std::uint64_t>(std::max(0, sensor.rest.frames))) {
-      line += fmt::format("its rest pose is learned from the first {} frames (rest.frames)",
-                          sensor.rest.frames);
+      line += fmt::format(
+          "its rest pose is learned from the first {} frames (rest.frames); give it more",
+          sensor.rest.frames);
     } else {
       line +=
           "are the tags in view, in focus and lit, and are family, ids and number of tags those of "
