@@ -108,6 +108,8 @@ void read_light(YamlSection s, sim::Light& l) {
   s.number("direction_rad", l.direction);
   s.number("ambient", l.ambient);
   s.number("glare_counts", l.glare_counts);
+  s.number("led_level", l.led_level);
+  s.number("room", l.room);
   s.finish();
 }
 
@@ -131,6 +133,14 @@ void read_exposure(YamlSection s, sim::Exposure& e) {
   s.number("time_ms", e.time, kMilli);
   s.number("rolling_readout_ms", e.rolling_readout, kMilli);
   e.even = s.reader().boolean_or("even", e.even);
+  s.finish();
+}
+
+void read_delivery(YamlSection s, sim::Delivery& d) {
+  s.number("latency_ms", d.latency, kMilli);
+  s.number("jitter_ms", d.jitter, kMilli);
+  s.number("stale_share", d.stale_share);
+  s.number("true_fps", d.true_frame_rate);
   s.finish();
 }
 
@@ -159,6 +169,7 @@ sim::Scenario read_scenario(YamlReader root) {
   section("light", read_light, scenario.light);
   section("trajectory", read_trajectory, scenario.trajectory);
   section("exposure", read_exposure, scenario.exposure);
+  section("delivery", read_delivery, scenario.delivery);
   section("noise", read_noise, scenario.noise);
   section("compression", read_compression, scenario.compression);
   if (root.has("disturbances")) {

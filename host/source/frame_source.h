@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "host/source/camera_light.h"
 #include "host/types.h"
 
 namespace tagwrench {
@@ -49,6 +50,9 @@ class FrameSource {
   /// Decodes the rest of the frame that the last read() delivered, in place. False: the rest is
   /// damaged, and the frame is as it was.
   virtual bool complete(Frame& /*frame*/) noexcept { return true; }
+
+  /// Exposure and gain, where the source has them; owned by it. Valid for its lifetime.
+  virtual CameraLight* camera_light() noexcept { return nullptr; }
 
   /// One line about the frames that were delivered but could not be used; empty if there were none.
   virtual std::string unusable() const { return {}; }

@@ -139,6 +139,26 @@ void ControlLock::apply(ControlPort& port, std::size_t index, std::int32_t value
   }
 }
 
+bool ControlLock::change(ControlPort& port, std::uint32_t id, std::int64_t value) {
+  for (Setting& setting : locked_) {
+    if (kControls[setting.index].id != id) continue;
+    const auto range = port.range(id);
+    if (!range) return false;
+    const std::int32_t wanted = within(*range, value);
+    if (!port.set(id, wanted)) return false;
+    setting.value = wanted;
+    return true;
+  }
+  return false;
+}
+
+std::optional<std::int32_t> ControlLock::locked(std::uint32_t id) const noexcept {
+  for (const Setting& setting : locked_) {
+    if (kControls[setting.index].id == id) return setting.value;
+  }
+  return std::nullopt;
+}
+
 void ControlLock::relock(ControlPort& port) {
   for (const Setting& setting : locked_) port.set(kControls[setting.index].id, setting.value);
 }

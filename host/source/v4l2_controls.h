@@ -52,6 +52,11 @@ class ControlLock {
   /// Stops every automatism and fixes its value where it stands, or the exposure at `exposure_us`
   /// if that is not 0.
   void lock(ControlPort& port, int exposure_us);
+  /// Another value for a control that lock() fixed, the nearest that the camera has. False: it
+  /// was not fixed, or the camera refuses.
+  bool change(ControlPort& port, std::uint32_t id, std::int64_t value);
+  /// What a control was fixed at; nothing if it was not.
+  std::optional<std::int32_t> locked(std::uint32_t id) const noexcept;
   /// Writes the locked values again, into a camera that was away.
   void relock(ControlPort& port);
   /// Puts everything back as remembered: values first, then the automatisms.

@@ -1,13 +1,16 @@
 #include "host/source/v4l2_source.h"
 
 #include <fmt/format.h>
+#include <linux/videodev2.h>
 #include <poll.h>
 #include <sys/epoll.h>
 #include <sys/timerfd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <exception>
+#include <limits>
 
 #include "host/config_error.h"
 #include "host/source/v4l2_nodes.h"
@@ -24,6 +27,7 @@ constexpr int kSettleFrames = 20;
 constexpr int kClockFrames =
     3;  ///< enough to judge the driver's clock where nothing needs to settle
 constexpr Duration kSettleAtMost = 1500ms;
+constexpr double kExposureUnit_us = 100;  ///< of V4L2_CID_EXPOSURE_ABSOLUTE
 
 int milliseconds_left(TimePoint until) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
@@ -101,6 +105,51 @@ std::string V4l2Source::unusable() const {
   if (skipped_.corrupt == 0 && skipped_.stale == 0) return {};
   return fmt::format("{} corrupt and {} stale frames were skipped", skipped_.corrupt,
                      skipped_.stale);
+}
+
+CameraLight* V4l2Source::camera_light() noexcept {
+  return controls_.locked(V4L2_CID_EXPOSURE_ABSOLUTE) ? this : nullptr;
+}
+
+/// Longer than the frame period the camera would lower its frame rate.
+CameraLight::Range V4l2Source::exposure_range_us() const noexcept {
+  const double period_us = std::chrono::duration<double, std::micro>(format_.period).count();
+  return range_of(V4L2_CID_EXPOSURE_ABSOLUTE, kExposureUnit_us, period_us);
+}
+
+double V4l2Source::exposure_us() const noexcept {
+  return kExposureUnit_us * controls_.locked(V4L2_CID_EXPOSURE_ABSOLUTE).value_or(0);
+}
+
+bool V4l2Source::set_exposure_us(double exposure_us) noexcept {
+  return set_control(V4L2_CID_EXPOSURE_ABSOLUTE, exposure_us / kExposureUnit_us);
+}
+
+CameraLight::Range V4l2Source::gain_range() const noexcept {
+  return range_of(V4L2_CID_GAIN, 1, std::numeric_limits<double>::max());
+}
+
+double V4l2Source::gain() const noexcept { return controls_.locked(V4L2_CID_GAIN).value_or(0); }
+
+bool V4l2Source::set_gain(double gain) noexcept { return set_control(V4L2_CID_GAIN, gain); }
+
+/// A camera that is away, or a control that is not locked, leaves nothing to set.
+CameraLight::Range V4l2Source::range_of(std::uint32_t control, double unit,
+                                        double most) const noexcept {
+  const double now = unit * controls_.locked(control).value_or(0);
+  if (!device_ || !controls_.locked(control)) return {now, now};
+  V4l2ControlPort port(device_->fd());
+  const auto range = port.range(control);
+  if (!range) return {now, now};
+  const double least = unit * range->minimum;
+  return {least, std::max(least, std::min(most, unit * range->maximum))};
+}
+
+bool V4l2Source::set_control(std::uint32_t control, double value) noexcept {
+  if (!device_ || !std::isfinite(value)) return false;
+  V4l2ControlPort port(device_->fd());
+  constexpr double kWide = 1e9;
+  return controls_.change(port, control, std::llround(std::clamp(value, -kWide, kWide)));
 }
 
 void V4l2Source::watch(int fd) const {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "host/os/unique_fd.h"
+#include "host/source/camera_light.h"
 #include "host/source/frame_source.h"
 #include "host/source/v4l2_controls.h"
 #include "host/source/v4l2_device.h"
@@ -23,7 +24,7 @@ struct SkippedFrames {
   std::uint64_t stale = 0;
 };
 
-class V4l2Source final : public FrameSource {
+class V4l2Source final : public FrameSource, private CameraLight {
  public:
   /// Opens the camera, chooses the mode, and streams for up to 20 frames or 1.5 s so that automatic
   /// exposure settles and the driver's clock shows what it is worth; then locks the controls.
@@ -41,10 +42,21 @@ class V4l2Source final : public FrameSource {
   bool complete(Frame& frame) noexcept override;
   std::string detail() const override { return detail_; }
   std::string unusable() const override;
+  /// Nothing where the exposure could not be locked.
+  CameraLight* camera_light() noexcept override;
 
   const SkippedFrames& skipped() const noexcept { return skipped_; }
 
  private:
+  Range exposure_range_us() const noexcept override;
+  double exposure_us() const noexcept override;
+  bool set_exposure_us(double exposure_us) noexcept override;
+  Range gain_range() const noexcept override;
+  double gain() const noexcept override;
+  bool set_gain(double gain) noexcept override;
+  Range range_of(std::uint32_t control, double unit, double most) const noexcept;
+  bool set_control(std::uint32_t control, double value) noexcept;
+
   enum class State : std::uint8_t {
     streaming,
     away,     ///< closed; tried again at every tick

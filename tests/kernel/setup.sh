@@ -9,7 +9,7 @@ mkdir -p "$1" && dir=$(readlink -f "$1") || exit 1
 export PATH=$PATH:/usr/sbin:/sbin LC_ALL=C
 
 # What the guests load. Their dependencies come along.
-guest_modules="uinput uhid hid-generic evdev joydev vivid videobuf2-v4l2 videobuf2-vmalloc"
+guest_modules="uinput uhid hid-generic evdev joydev vivid videobuf2-v4l2 videobuf2-vmalloc xhci-pci ftdi_sio"
 initramfs_modules="virtio_pci virtio_console 9pnet_virtio 9p overlay"
 
 unavailable() {

@@ -79,6 +79,8 @@ enum Stream : std::uint64_t {
   kDisturbanceOrder,
   kDirt,
   kLostFrames,
+  kDeliveryJitter,
+  kStaleFrames,
   kPrint = 100
 };
 

@@ -95,7 +95,8 @@ void Renderer::light_row(int row, double time, float* light) noexcept {
   const double half_diagonal = 0.5 * std::hypot(camera_.width_px, camera_.height_px);
   const Eigen::Vector2d gradient = light_gradient(happening_, time) / half_diagonal;
   const Eigen::Vector2d left = from_centre(0, row);
-  const double factor = light_factor(happening_, time, exposure_.time);
+  const double factor =
+      light_factor(happening_, time, exposure_.time) * brightness_[static_cast<std::size_t>(row)];
   const auto at_left = static_cast<float>(factor * (1 + gradient.dot(left)));
   const auto slope = static_cast<float>(factor * gradient.x());
   for (int i = 0; i < width; ++i) {
@@ -142,6 +143,7 @@ double Renderer::contrast_at(const Eigen::Vector2d& pixel, double middle_time) c
   }
   const double half_diagonal = 0.5 * std::hypot(camera_.width_px, camera_.height_px);
   const double factor = light_factor(happening_, time, exposure_.time) *
+                        brightness_[static_cast<std::size_t>(row)] *
                         (1 + light_gradient(happening_, time).dot(off) / half_diagonal);
   const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(camera_.width_px) +
                         static_cast<std::size_t>(column);

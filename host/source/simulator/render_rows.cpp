@@ -215,8 +215,9 @@ void Renderer::expose_row(int row, double time, Random& random, std::uint8_t* pi
 
   light_row(row, time, light);
   const float* normals = normals_.data() + random.next() % kNormals;
-  const auto read_variance = static_cast<float>(noise_.read_counts * noise_.read_counts);
-  const auto shot = static_cast<float>(noise_.shot_counts_per_count);
+  const double read_counts = noise_.read_counts * sensor_gain_;
+  const auto read_variance = static_cast<float>(read_counts * read_counts);
+  const auto shot = static_cast<float>(noise_.shot_counts_per_count * sensor_gain_);
   for (std::size_t i = 0; i < width; ++i) {
     const float level = light[i];
     const float noisy = level + std::sqrt(read_variance + shot * level) * normals[i];

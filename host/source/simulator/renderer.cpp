@@ -40,6 +40,7 @@ Renderer::Renderer(const Scenario& scenario)
       optics_(scenario.optics),
       light_(scenario.light),
       exposure_(scenario.exposure),
+      nominal_exposure_(scenario.exposure.time),
       noise_(scenario.noise),
       target_(scenario.target),
       seed_(scenario.seed),
@@ -55,6 +56,7 @@ Renderer::Renderer(const Scenario& scenario)
   blurred_.resize(pixels);
   kernels_.resize(rows * (kMaxRadius + 1));
   radii_.resize(rows);
+  brightness_.assign(rows, 1.0);
   padded_.resize(columns + 2 * kMaxRadius);
   row_.resize(columns);
   for (auto* line : {&scratch_.x, &scratch_.y, &scratch_.u, &scratch_.v, &scratch_.reflectance,
@@ -167,6 +169,7 @@ void Renderer::render(const PlatformMotion& motion, double middle_time, std::uin
                           pose_at(middle_time + 0.5 * exposure_.time));
   choose_point_spread(optics_.focus_distance + focus_shift(happening_, middle_time));
   blur_rows();
+  expose_rows(middle_time);
   Random random = Random::numbered(seed_, kNoiseOffsets, sequence);
   for (int row = 0; row < camera_.height_px; ++row) {
     expose_row(row, row_time(row, middle_time), random, pixels);
@@ -178,6 +181,30 @@ void Renderer::render(const PlatformMotion& motion, double middle_time, std::uin
 double Renderer::row_time(double row, double middle_time) const noexcept {
   const double middle_row = 0.5 * (camera_.height_px - 1);
   return middle_time + (row - middle_row) / camera_.height_px * exposure_.rolling_readout;
+}
+
+void Renderer::set_exposure(double exposure, double gain) noexcept {
+  exposure_.time = exposure;
+  sensor_gain_ = gain;
+}
+
+/// What LED, exposure and gain make of each row's brightness.
+void Renderer::expose_rows(double middle_time) noexcept {
+  const double longer = nominal_exposure_ > 0 ? exposure_.time / nominal_exposure_ : 1.0;
+  const double scale = longer * sensor_gain_;
+  const bool all_at_once = exposure_.rolling_readout <= 0;
+  for (int row = 0; row < camera_.height_px; ++row) {
+    double& brightness = brightness_[static_cast<std::size_t>(row)];
+    if (led_ == nullptr) {
+      brightness = scale;
+    } else if (row > 0 && all_at_once) {
+      brightness = brightness_.front();
+    } else {
+      const double middle = row_time(row, middle_time);
+      const double lit = led_->mean(middle - 0.5 * exposure_.time, middle + 0.5 * exposure_.time);
+      brightness = scale * (light_.room + lit / light_.led_level);
+    }
+  }
 }
 
 const Texture& Renderer::seen(const Layer& layer) const noexcept {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "host/source/simulator/disturbance_player.h"
+#include "host/source/simulator/led_light.h"
 #include "host/source/simulator/lens.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/random.h"
@@ -27,6 +28,14 @@ class Renderer {
 
   /// Seconds before and after the middle of a frame in which its picture is exposed.
   double half_window() const noexcept;
+
+  /// Lights the scene by an LED from outside, borrowed; nullptr: by the scenario's even light.
+  void set_led(LedLight* led) noexcept { led_ = led; }
+
+  /// Of the next frames; the picture's brightness goes with both, its noise as a sensor's does.
+  void set_exposure(double exposure, double gain) noexcept;
+  double exposure() const noexcept { return exposure_.time; }
+  double sensor_gain() const noexcept { return sensor_gain_; }
 
   /// Renders the frame whose middle row is exposed around `middle_time`; `pixels` holds width *
   /// height bytes. The noise depends on the seed and on `sequence` alone. No heap.
@@ -80,6 +89,7 @@ class Renderer {
   void view_layer(const Layer& layer, View& view) noexcept;
   const Texture& seen(const Layer& layer) const noexcept;
   double row_time(double row, double middle_time) const noexcept;
+  void expose_rows(double middle_time) noexcept;
   double farthest_px(const RigidPose& first, const RigidPose& last) const noexcept;
   int instants_for(const RigidPose& first, const RigidPose& middle,
                    const RigidPose& last) const noexcept;
@@ -112,6 +122,9 @@ class Renderer {
   Optics optics_;
   Light light_;
   Exposure exposure_;
+  double nominal_exposure_;  ///< s, that light_.level_counts stands for
+  double sensor_gain_ = 1;
+  LedLight* led_ = nullptr;
   Noise noise_;
   Target target_;
   std::uint64_t seed_;
@@ -127,6 +140,7 @@ class Renderer {
   std::vector<float> gain_, glare_;     ///< grey levels per reflectance; grey levels
   std::vector<float> kernels_;          ///< per row: weights 0..kMaxRadius
   std::vector<int> radii_;              ///< per row, px
+  std::vector<double> brightness_;      ///< per row, over that of the scenario's even light
   std::vector<float> padded_, row_;
   std::vector<float> normals_;  ///< standard normal numbers, entered at random places
   Scratch scratch_;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <numbers>
@@ -63,6 +64,24 @@ std::string target_problem(const Target& t) {
   return {};
 }
 
+std::string delivery_problem(const Scenario& s) {
+  const Delivery& d = s.delivery;
+  std::string found = outside({{"delivery.latency_ms", d.latency * 1e3}}, 0, 1e4);
+  if (found.empty()) found = outside({{"delivery.stale_share", d.stale_share}}, 0, 0.5);
+  if (found.empty() && d.true_frame_rate != 0)
+    found = outside({{"delivery.true_fps", d.true_frame_rate}}, 0.1, 2000);
+  if (!found.empty()) return found;
+  // Less than a tenth of the period: then stamps stay in order.
+  const double most = std::min(d.latency, 0.1 * true_period(s));
+  if (!(d.jitter >= 0 && d.jitter <= most)) {
+    return fmt::format(
+        "delivery.jitter_ms must lie between 0 and the smaller of latency_ms and a tenth of the "
+        "frame period, {:g}, is {:g}",
+        most * 1e3, d.jitter * 1e3);
+  }
+  return {};
+}
+
 std::string first_of(std::initializer_list<std::string> problems) {
   for (const std::string& text : problems) {
     if (!text.empty()) return text;
@@ -78,6 +97,11 @@ std::vector<TagPlacement> roof_placement(int upper_id, int lower_id, double tag_
   const double to_ridge = (0.5 * tag_size + border + kRidgeGap) * std::cos(slope);
   return {{upper_id, {0, -to_ridge, 0}, {-slope, 0, 0}},
           {lower_id, {0, to_ridge, 0}, {slope, 0, 0}}};
+}
+
+double true_period(const Scenario& s) {
+  const double rate = s.delivery.true_frame_rate;
+  return 1 / (rate > 0 ? rate : s.camera.frame_rate);
 }
 
 std::string problem(const Scenario& s) {
@@ -128,11 +152,14 @@ std::string problem(const Scenario& s) {
                      {"trajectory.sweep_s", j.sweep_time},
                      {"trajectory.event_s", j.event_time},
                      {"optics.focus_mm", s.optics.focus_distance}}),
+       outside({{"light.led_level", s.light.led_level}}, 0.001, 1),
        outside({{"camera.fps", s.camera.frame_rate}}, 0.1, 2000),
+       delivery_problem(s),
        outside({{"mechanics.damping_ratio", m.damping_ratio},
                 {"optics.vignetting", s.optics.vignetting},
                 {"light.unevenness", s.light.unevenness},
                 {"light.ambient", s.light.ambient},
+                {"light.room", s.light.room},
                 {"target.paper_reflectance", s.target.paper_reflectance},
                 {"target.ink_reflectance", s.target.ink_reflectance}},
                0, 1),
@@ -155,8 +182,9 @@ std::string problem(const Scenario& s) {
        outside({{"target.ink_grain", s.target.ink_grain},
                 {"target.rotation_error_rad", s.target.rotation_error}},
                0, 0.5),
-       target_problem(s.target), problem(s.disturbances, static_cast<int>(s.target.tags.size()))});
-  if (found.empty() && window * s.camera.frame_rate > 1.0) {
+       target_problem(s.target),
+       problem(s.disturbances, static_cast<int>(s.target.tags.size()))});
+  if (found.empty() && window > true_period(s)) {
     found = "exposure: time and readout together are longer than a frame period of camera.fps";
   }
   return found;

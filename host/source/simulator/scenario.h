@@ -102,6 +102,9 @@ struct Light {
   double direction = 3.7;  ///< of the bright side in the image, rad from x towards y
   double ambient = 0.65;   ///< share of light that does not depend on a surface's inclination, 0..1
   double glare_counts = 320.0;  ///< added in the blown-out corner
+  /// Of use where an LED outside of the simulation lights the scene:
+  double led_level = 0.3;  ///< its mean brightness that level_counts stands for, 0..1
+  double room = 0.05;      ///< light that is there without the LED, over level_counts
 };
 
 enum class Motion : std::uint8_t {
@@ -141,6 +144,17 @@ struct Exposure {
   bool even = false;
 };
 
+/// What a real camera, its driver and what lies between do to a picture and its time stamp. Nothing
+/// by default: the stamp is the middle of the exposure of the middle row.
+struct Delivery {
+  double latency = 0.0;  ///< mean time from the middle of the exposure to the stamp, s
+  /// Standard deviation of that time, s: a seeded exponential, so that latency - jitter is the
+  /// least.
+  double jitter = 0.0;
+  double stale_share = 0.0;      ///< of frames that show the picture before them once more, 0..0.5
+  double true_frame_rate = 0.0;  ///< Hz, where it is not the announced camera.frame_rate; 0: it is
+};
+
 struct Noise {
   double read_counts = 0.8;             ///< standard deviation without light, grey levels
   double shot_counts_per_count = 0.02;  ///< variance per grey level of light, grey levels
@@ -162,10 +176,14 @@ struct Scenario {
   Light light;
   Trajectory trajectory;
   Exposure exposure;
+  Delivery delivery;
   Noise noise;
   Compression compression;
   Disturbances disturbances;
 };
+
+/// Time between the exposures of two frames, s.
+double true_period(const Scenario& scenario);
 
 /// The first thing wrong with a scenario ("exposure: ...", what and what to do), or an empty
 /// string.

@@ -14,7 +14,9 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kWarmUp = 0.05;  // s, simulated before the first frame
+constexpr double kWarmUp = 0.05;      // s, simulated before the first frame
+constexpr double kShortest = 50e-6;   // s, exposure that can be set
+constexpr double kMostJitters = 8.0;  // more than the mean delay; keeps the stamps in order
 constexpr int kExposureSteps = 16;
 
 const sim::Scenario& checked(const sim::Scenario& scenario) {
@@ -23,8 +25,11 @@ const sim::Scenario& checked(const sim::Scenario& scenario) {
   return scenario;
 }
 
-Duration frame_period(const sim::Camera& camera) {
-  return Duration(std::llround(1e9 / camera.frame_rate));
+Duration to_duration(double seconds) { return Duration(std::llround(1e9 * seconds)); }
+
+/// Seconds before and after the middle of a frame that the longest exposure reaches.
+double longest_half_window(const sim::Scenario& scenario) {
+  return 0.5 * sim::true_period(scenario);
 }
 
 timespec to_timespec(Duration since_boot) {
@@ -32,12 +37,9 @@ timespec to_timespec(Duration since_boot) {
   return {static_cast<time_t>(ns / 1'000'000'000), static_cast<long>(ns % 1'000'000'000)};
 }
 
-UniqueFd start_timer(TimePoint start, Duration period) {
+UniqueFd make_timer() {
   UniqueFd timer(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
-  itimerspec when{};
-  when.it_value = to_timespec((start + period).time_since_epoch());
-  when.it_interval = to_timespec(period);
-  if (!timer || ::timerfd_settime(timer.get(), TFD_TIMER_ABSTIME, &when, nullptr) != 0) {
+  if (!timer) {
     throw ConfigError(fmt::format(
         "simulated sensor: no timer from the kernel ({}): close other programs and try again",
         std::strerror(errno)));
@@ -47,74 +49,135 @@ UniqueFd start_timer(TimePoint start, Duration period) {
 
 }  // namespace
 
-SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live)
+SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live, sim::LedLight* led)
     : scenario_(checked(scenario)),
       disturbances_(scenario.disturbances, scenario.seed, scenario.camera.width_px,
                     static_cast<int>(scenario.target.tags.size())),
       player_(scenario.trajectory, scenario.seed),
       renderer_(scenario),
       motion_(scenario.mechanics, player_, -renderer_.half_window() - kWarmUp,
-              2 * renderer_.half_window() + 4 * sim::PlatformMotion::kStep),
+              2 * longest_half_window(scenario) + 4 * sim::PlatformMotion::kStep),
       jpeg_(scenario.camera.width_px, scenario.camera.height_px, scenario.compression.jpeg_quality),
       pixels_(static_cast<std::size_t>(scenario.camera.width_px) *
               static_cast<std::size_t>(scenario.camera.height_px)) {
   const sim::Camera& camera = scenario_.camera;
   format_.width = camera.width_px;
   format_.height = camera.height_px;
-  format_.period = frame_period(camera);
+  format_.period = to_duration(1 / camera.frame_rate);
+  period_ = to_duration(sim::true_period(scenario_));
   format_.description = fmt::format("simulated sensor, {}x{} at {:g} Hz, {} {}", camera.width_px,
                                     camera.height_px, camera.frame_rate, scenario_.target.family,
                                     scenario_.target.tags.size() == 1 ? "tag" : "tags");
   truth_.tags = renderer_.tags();
   truth_.visible = renderer_.visible();
   truth_.rest_position = scenario_.target.rest_position;
+  renderer_.set_led(led);
   if (live) {
-    start_ = std::chrono::steady_clock::now();
-    timer_ = start_timer(start_, format_.period);
+    timer_ = make_timer();
+    start_ = std::chrono::steady_clock::now() + period_;
+    arm();
   }
 }
 
+/// The time stamp of a frame: the middle of its exposure, and what driver and cable add.
+TimePoint SimulatorSource::delivery_time(std::uint64_t sequence) const noexcept {
+  const TimePoint exposed = start_ + period_ * static_cast<std::int64_t>(sequence);
+  const sim::Delivery& delivery = scenario_.delivery;
+  if (delivery.latency <= 0) return exposed;
+  sim::Random random = sim::Random::numbered(scenario_.seed, sim::kDeliveryJitter, sequence);
+  const double exponential = std::min(-std::log(1 - random.uniform()), kMostJitters);
+  return exposed + to_duration(delivery.latency + delivery.jitter * (exponential - 1));
+}
+
+/// The newest frame from next_sequence_ on that was delivered by `now`; next_sequence_ itself if
+/// none was.
+std::uint64_t SimulatorSource::newest_delivered(TimePoint now) const noexcept {
+  const auto delay = to_duration(scenario_.delivery.latency);
+  const auto periods = (now - start_ - delay) / period_;
+  // Jitter moves a stamp by less than a period.
+  auto newest =
+      std::max(next_sequence_, static_cast<std::uint64_t>(std::max<std::int64_t>(0, periods + 1)));
+  while (newest > next_sequence_ && delivery_time(newest) > now) --newest;
+  return newest;
+}
+
+/// Wakes the reader when the next frame is delivered.
+void SimulatorSource::arm() const noexcept {
+  itimerspec when{};
+  when.it_value = to_timespec(delivery_time(next_sequence_).time_since_epoch());
+  ::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &when, nullptr);
+}
+
+/// The first frame has nothing before it.
+bool SimulatorSource::stale(std::uint64_t sequence) const noexcept {
+  if (!rendered_ || scenario_.delivery.stale_share <= 0) return false;
+  sim::Random random = sim::Random::numbered(scenario_.seed, sim::kStaleFrames, sequence);
+  return random.uniform() < scenario_.delivery.stale_share;
+}
+
+CameraLight::Range SimulatorSource::exposure_range_us() const noexcept {
+  const double longest = sim::true_period(scenario_) - scenario_.exposure.rolling_readout;
+  return {kShortest * 1e6, std::max(kShortest, longest) * 1e6};
+}
+
+bool SimulatorSource::set_exposure_us(double exposure_us) noexcept {
+  const Range range = exposure_range_us();
+  if (!std::isfinite(exposure_us)) return false;
+  renderer_.set_exposure(std::clamp(exposure_us, range.least, range.most) * 1e-6,
+                         renderer_.sensor_gain());
+  return true;
+}
+
+bool SimulatorSource::set_gain(double gain) noexcept {
+  if (!std::isfinite(gain)) return false;
+  renderer_.set_exposure(renderer_.exposure(), std::clamp(gain, 1.0, kMostGain));
+  return true;
+}
+
 ReadStatus SimulatorSource::read(Frame& frame) noexcept {
-  std::uint64_t ticks = 1;
-  if (timer_ && ::read(timer_.get(), &ticks, sizeof ticks) != sizeof ticks)
-    return ReadStatus::nothing;
-  if (ticks == 0) return ReadStatus::nothing;
-  std::uint64_t sequence = next_sequence_ + ticks - 1;
-  lost_ += static_cast<std::uint32_t>(ticks - 1);
-  while (disturbances_.frame_lost(sequence)) {
+  std::uint64_t sequence = next_sequence_;
+  if (timer_) {
+    std::uint64_t ticks = 0;
+    if (::read(timer_.get(), &ticks, sizeof ticks) != sizeof ticks) return ReadStatus::nothing;
+    sequence = newest_delivered(std::chrono::steady_clock::now());
+    lost_ += static_cast<std::uint32_t>(sequence - next_sequence_);
+  }
+  bool lost = false;
+  while ((lost = disturbances_.frame_lost(sequence))) {
     ++lost_;
     ++sequence;
-    if (timer_) {
-      next_sequence_ = sequence;
-      return ReadStatus::nothing;
-    }
+    if (timer_) break;
   }
-  next_sequence_ = sequence + 1;
+  next_sequence_ = lost ? sequence : sequence + 1;
+  if (timer_) arm();
+  if (lost) return ReadStatus::nothing;
   render(sequence);
 
   frame.image = {pixels_.data(), format_.width, format_.height, format_.width};
   frame.decoded = {};
   frame.sequence = sequence;
   frame.dropped = std::exchange(lost_, 0);
-  // The first tick came one period after the start.
-  frame.capture_time = timer_ ? start_ + format_.period + truth_.time : TimePoint(truth_.time);
+  frame.capture_time = delivery_time(sequence);
   frame.latency_origin = timer_ ? frame.capture_time : std::chrono::steady_clock::now();
   return ReadStatus::frame;
 }
 
 void SimulatorSource::render(std::uint64_t sequence) noexcept {
   truth_.sequence = sequence;
-  truth_.time = format_.period * static_cast<std::int64_t>(sequence);
+  truth_.stale = stale(sequence);
+  if (truth_.stale) return;
+  truth_.time = period_ * static_cast<std::int64_t>(sequence);
   const double time = std::chrono::duration<double>(truth_.time).count();
   motion_.advance_to(time + renderer_.half_window());
   renderer_.render(motion_, time, sequence, pixels_.data());
+  rendered_ = true;
   jpeg_.apply(pixels_.data());
   truth_.displacement = motion_.at(time).displacement;
   truth_.exposed_displacement.setZero();
   for (int i = 0; i < kExposureSteps; ++i) {
     const double share = (i + 0.5) / kExposureSteps - 0.5;
     truth_.exposed_displacement +=
-        motion_.at(time + share * scenario_.exposure.time).displacement / kExposureSteps;
+        motion_.at(time + share * renderer_.exposure()).displacement / kExposureSteps;
   }
   truth_.wrench = player_.applied_wrench(time);
   truth_.camera_T_platform = sim::platform_pose(scenario_.target, truth_.displacement);

@@ -6,8 +6,10 @@
 #include <vector>
 
 #include "host/os/unique_fd.h"
+#include "host/source/camera_light.h"
 #include "host/source/frame_source.h"
 #include "host/source/simulator/image_file.h"
+#include "host/source/simulator/led_light.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/renderer.h"
 #include "host/source/simulator/scenario.h"
@@ -15,10 +17,11 @@
 namespace tagwrench::sim {
 
 /// What the latest frame shows, exactly. All at the middle of the exposure of the image's middle
-/// row, which is also the frame's capture time.
+/// row, which is also the frame's capture time but for what the scenario's delivery adds to that.
 struct Truth {
   std::uint64_t sequence = 0;
   Duration time{};                         ///< since the simulation began
+  bool stale = false;                      ///< shows the picture before it, and so does the rest
   Vector6 displacement = Vector6::Zero();  ///< of the platform from rest, m and rad
   Vector6 exposed_displacement =
       Vector6::Zero();  ///< mean of displacement over that exposure, which is what the picture
@@ -38,27 +41,45 @@ struct Truth {
 
 namespace tagwrench {
 
-/// Two clocks. Live: a timer ticks at the frame rate, each picture shows the platform as of the
-/// tick, and ticks that passed while nobody read are dropped and counted. Not live: a virtual
-/// clock, every read() gives the next frame, as fast as it can be rendered. Both go on for ever.
-/// Frames that the scenario loses are skipped and counted on either clock.
-class SimulatorSource final : public FrameSource {
+/// Two clocks. Live: a timer ticks when a frame is delivered, each picture shows the platform as of
+/// its exposure, and frames that passed while nobody read are dropped and counted. Not live: a
+/// virtual clock, every read() gives the next frame, as fast as it can be rendered. Both go on for
+/// ever. Frames that the scenario loses are skipped and counted on either clock.
+class SimulatorSource final : public FrameSource, private CameraLight {
  public:
-  /// Throws ConfigError if the scenario cannot be simulated.
-  SimulatorSource(const sim::Scenario& scenario, bool live);
+  static constexpr double kMostGain = 8;
+
+  /// Throws ConfigError if the scenario cannot be simulated. `led`, borrowed, lights the scene in
+  /// place of the scenario's even light, if there is one.
+  SimulatorSource(const sim::Scenario& scenario, bool live, sim::LedLight* led = nullptr);
 
   const SourceFormat& format() const noexcept override { return format_; }
   int poll_fd() const noexcept override { return timer_ ? timer_.get() : -1; }
   ReadStatus read(Frame& frame) noexcept override;
+  CameraLight* camera_light() noexcept override { return this; }
 
   const sim::Truth& truth() const noexcept { return truth_; }
+  /// The instant, on the clock of Frame::capture_time, at which simulation time is 0.
+  TimePoint time_zero() const noexcept { return start_; }
 
  private:
+  Range exposure_range_us() const noexcept override;
+  double exposure_us() const noexcept override { return renderer_.exposure() * 1e6; }
+  bool set_exposure_us(double exposure_us) noexcept override;
+  Range gain_range() const noexcept override { return {1, kMostGain}; }
+  double gain() const noexcept override { return renderer_.sensor_gain(); }
+  bool set_gain(double gain) noexcept override;
+
+  TimePoint delivery_time(std::uint64_t sequence) const noexcept;
+  std::uint64_t newest_delivered(TimePoint now) const noexcept;
+  void arm() const noexcept;
+  bool stale(std::uint64_t sequence) const noexcept;
   void render(std::uint64_t sequence) noexcept;
 
   sim::Scenario scenario_;
   SourceFormat format_;
-  UniqueFd timer_;  ///< none on the virtual clock
+  Duration period_{};  ///< between exposures
+  UniqueFd timer_;     ///< none on the virtual clock
   TimePoint start_{};
   std::uint64_t next_sequence_ = 0;
   std::uint32_t lost_ = 0;  ///< frames since the last one that was delivered
@@ -68,6 +89,7 @@ class SimulatorSource final : public FrameSource {
   sim::PlatformMotion motion_;
   sim::JpegRoundTrip jpeg_;
   std::vector<std::uint8_t> pixels_;
+  bool rendered_ = false;  ///< pixels_ hold a picture
   sim::Truth truth_;
 };
 

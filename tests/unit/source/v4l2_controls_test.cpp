@@ -162,5 +162,25 @@ TEST(ControlLock, ACameraWithoutControlsIsFine) {
   EXPECT_EQ(lock.description(), "it has no controls to lock");
 }
 
+TEST(ControlLock, ALockedValueCanBeChangedAndIsThenTheLockedOne) {
+  FakeCamera camera;
+  fill(camera);
+  ControlLock lock;
+  EXPECT_FALSE(lock.change(camera, V4L2_CID_EXPOSURE_ABSOLUTE, 40)) << "nothing is locked yet";
+  lock.remember(camera);
+  lock.lock(camera, 2500);
+  EXPECT_EQ(lock.locked(V4L2_CID_EXPOSURE_ABSOLUTE), 25);
+  EXPECT_TRUE(lock.change(camera, V4L2_CID_EXPOSURE_ABSOLUTE, 40));
+  EXPECT_EQ(camera.items[V4L2_CID_EXPOSURE_ABSOLUTE].value, 40);
+  EXPECT_TRUE(lock.change(camera, V4L2_CID_EXPOSURE_ABSOLUTE, 1'000'000));
+  EXPECT_EQ(lock.locked(V4L2_CID_EXPOSURE_ABSOLUTE), 2047) << "the camera's longest";
+  EXPECT_FALSE(lock.change(camera, V4L2_CID_GAIN, 3)) << "this camera has no gain";
+  EXPECT_EQ(lock.locked(V4L2_CID_GAIN), std::nullopt);
+
+  camera.items[V4L2_CID_EXPOSURE_ABSOLUTE].value = 7;  // it was away
+  lock.relock(camera);
+  EXPECT_EQ(camera.items[V4L2_CID_EXPOSURE_ABSOLUTE].value, 2047);
+}
+
 }  // namespace
 }  // namespace tagwrench

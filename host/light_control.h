@@ -1,0 +1,69 @@
+// How bright: exposure, LED and gain such that the white of the tags has a set level. Pure: it is
+// told what a picture showed, and says what to set next.
+#pragma once
+
+#include <cstdint>
+
+namespace tagwrench {
+
+struct LightRange {
+  double least = 0;
+  double most = 0;  ///< equal to `least` where it cannot be set
+
+  constexpr bool settable() const { return most > least; }
+};
+
+/// What camera and lamp can do. Light in the picture is proportional to the product of the three.
+struct LightLimits {
+  LightRange exposure_us;
+  LightRange led_permille;  ///< `most` is what the LED may have for ever
+  LightRange gain;
+  double short_exposure_us = 4000;  ///< longer ones only when LED and gain are at their end
+};
+
+struct LightSetting {
+  double exposure_us = 0;
+  double led_permille = 0;
+  double gain = 0;
+};
+
+struct LightReading {
+  double white_counts = 0;  ///< grey level of the tags' white, 0..255
+  double clipped_part = 0;  ///< of the tags' pixels, at the sensor's upper end, 0..1
+};
+
+/// Exposure first kept short (a moving target smears), then LED, then gain (it adds noise), and a
+/// longer exposure last. Too much light is taken back in the reverse order, a short exposure
+/// shortened last. Ambient light needs no model: every step starts from a picture.
+class LightControl {
+ public:
+  enum class State : std::uint8_t {
+    settling,
+    settled,
+    too_dark,    ///< everything is at its upper end
+    too_bright,  ///< everything is at its lower end: ambient light
+  };
+  static constexpr double kTarget_counts = 190;     ///< of 255: noise and glare stay below the end
+  static constexpr double kTolerance_counts = 12;   ///< that is settled
+  static constexpr double kClipped_counts = 250;    ///< from here on the level is not known
+  static constexpr double kMostClippedPart = 2e-3;  ///< of a picture that is not too bright
+
+  /// Starts from a short exposure, the least gain and half of the LED.
+  explicit LightControl(const LightLimits& limits) noexcept;
+
+  /// To be set before the next picture.
+  const LightSetting& setting() const noexcept { return setting_; }
+  State state() const noexcept { return state_; }
+
+  /// What a picture taken with setting() showed.
+  State take(const LightReading& reading) noexcept;
+
+ private:
+  void scale(double factor) noexcept;
+
+  LightLimits limits_;
+  LightSetting setting_;
+  State state_ = State::settling;
+};
+
+}  // namespace tagwrench
