@@ -49,8 +49,10 @@ apt=(apt-get -q -o Dir::Etc::SourceList=/dev/null -o "Dir::Etc::SourceParts=$wor
 cd "$work" || exit 1
 # A package source of others may have no source packages, which update calls an error; what counts is the next step.
 "${apt[@]}" update >>"$log" 2>&1 || true
+# The archive may have replaced the generator's version by a newer one; pb.h checks whether they still go together.
 "${apt[@]}" source --download-only "nanopb${version:+=$version}" >>"$log" 2>&1 ||
-  unavailable "apt-get cannot fetch the source package nanopb${version:+ $version} (see $log)"
+  "${apt[@]}" source --download-only nanopb >>"$log" 2>&1 ||
+  unavailable "apt-get cannot fetch the source package nanopb (see $log)"
 dpkg-source --extract nanopb_*.dsc unpacked >>"$log" 2>&1 || unavailable "cannot unpack the source package (see $log)"
 for file in $files; do
   install -m 644 "unpacked/$file" "$dir/$file" || unavailable "the source package has no $file"

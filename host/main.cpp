@@ -9,6 +9,8 @@
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 
+#include "host/bandwidth_command.h"
+#include "host/board_command.h"
 #include "host/calibrate_command.h"
 #include "host/config/scenario_config.h"
 #include "host/config_error.h"
@@ -37,6 +39,7 @@ constexpr const char* kOutputs =
     "  spacemouse                    virtual 6-DOF puck for CAD programs\n"
     "  wrench                        HID force-torque sensor in N and N m\n"
     "  joystick                      six-axis joystick for games\n"
+    "  reference:FILE                as csv, beside the load cells of --board at the same time\n"
     "Without it: terminal, and every device that this machine allows";
 
 int dispatch(int argc, char** argv) {
@@ -65,6 +68,11 @@ int dispatch(int argc, char** argv) {
   run->add_option("--seconds", run_options.seconds, "end after S seconds")->check(duration);
   run->add_flag("--fast", run_options.fast,
                 "sources that are not live run as fast as they can, no frame dropped");
+  run->add_option("--board", run_options.board,
+                  "serial port of the board that lights the tags and reads load cells:\n"
+                  "a path, usb:VENDOR:PRODUCT[:SERIAL], or auto for the only one");
+  run->add_option("--cells", run_options.cells,
+                  "calibration file of its load cells; without it the one kept for this board");
 
   std::string scenario;
   std::string folder;
@@ -79,6 +87,9 @@ int dispatch(int argc, char** argv) {
 
   tagwrench::CalibrateCommand calibrate(app);
   tagwrench::TagsCommand tags(app);
+  tagwrench::BoardCommand board(app);
+
+  tagwrench::BandwidthCommand bandwidth(app);
 
   CLI::App* doctor = app.add_subcommand(
       "doctor", "say line by line what works here and what to do about the rest");
@@ -94,6 +105,8 @@ int dispatch(int argc, char** argv) {
   if (run->parsed()) return tagwrench::run(run_options);
   if (calibrate.parsed()) return calibrate.run();
   if (tags.parsed()) return tags.run();
+  if (board.parsed()) return board.run();
+  if (bandwidth.parsed()) return bandwidth.run();
   if (doctor->parsed()) return tagwrench::run_doctor(std::cout);
   if (sim->parsed()) {
     const tagwrench::sim::Scenario described =

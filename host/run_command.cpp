@@ -11,9 +11,14 @@
 #include <filesystem>
 #include <memory>
 
+#include "host/board_lamp.h"
+#include "host/board_loop.h"
+#include "host/board_output.h"
 #include "host/config/sensor_config.h"
 #include "host/config_error.h"
 #include "host/input.h"
+#include "host/light_settle.h"
+#include "host/link/cell_file.h"
 #include "host/output/csv.h"
 #include "host/output/joystick.h"
 #include "host/output/jsonl.h"
@@ -128,20 +133,26 @@ bool is_device(const std::string& kind) {
   return kind == "spacemouse" || kind == "wrench" || kind == "joystick";
 }
 
-bool is_file(const std::string& kind) { return kind == "jsonl" || kind == "csv"; }
+bool is_file(const std::string& kind) {
+  return kind == "jsonl" || kind == "csv" || kind == "reference";
+}
 
 /// Refuses what cannot be, before anything is made or overwritten.
-void check_outputs(const std::vector<Spec>& specs) {
+void check_outputs(const std::vector<Spec>& specs, bool with_board) {
   for (std::size_t i = 0; i < specs.size(); ++i) {
     const Spec& spec = specs[i];
     const bool known = spec.argument.empty() ? spec.kind == "terminal" || is_device(spec.kind)
                                              : is_file(spec.kind);
     const std::string text = spec.argument.empty() ? spec.kind : spec.kind + ":" + spec.argument;
     if (!known) {
-      throw ConfigError(
-          fmt::format("--output {}: not an output; use terminal, jsonl:FILE, csv:FILE, spacemouse, "
-                      "wrench or joystick",
-                      text));
+      throw ConfigError(fmt::format(
+          "--output {}: not an output; use terminal, jsonl:FILE, csv:FILE, reference:FILE, "
+          "spacemouse, wrench or joystick",
+          text));
+    }
+    if (spec.kind == "reference" && !with_board) {
+      throw ConfigError(fmt::format(
+          "--output {}: the load cells are a board's; name its port with --board", text));
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (spec.argument.empty() ? specs[j].kind == spec.kind : specs[j].argument == spec.argument) {
@@ -164,16 +175,64 @@ void check_outputs(const std::vector<Spec>& specs) {
   }
 }
 
-/// Devices first, because they are what may be refused; files are only then overwritten.
-Outputs open_outputs(const RunOptions& options, const Input& input) {
+/// The board of a run: connected, its light settled, its load cells' calibration known.
+class RunBoard {
+ public:
+  /// Throws ConfigError if there is no board of ours, or its load cells' file cannot be used.
+  explicit RunBoard(const BoardOptions& options)
+      : rate_(options.cell_rate), loop_(options.port, session_options(options)) {
+    connected_ = loop_.settle();
+    if (!connected_) return;
+    const std::string path = cells_path(options, loop_.session());
+    if (!path.empty())
+      cells_ = link::load_cells(path, link::id_text(loop_.session().hello().unique_id));
+  }
+
+  RunBoard(const RunBoard&) = delete;
+  RunBoard& operator=(const RunBoard&) = delete;
+  ~RunBoard() { BoardLamp(loop_.link()).set_level(0); }
+
+  /// False if a signal ended the waiting.
+  bool connected() const { return connected_; }
+
+  /// False if a signal came, or the source ended.
+  bool settle(Input& input, const UniqueFd& stop) {
+    BoardLamp lamp(loop_.link());
+    Acquirer finder(input.sensor.camera, input.sensor.target);
+    const LightReport report =
+        settle_light(*input.source, finder, input.sensor.camera.mirrored, lamp, stop);
+    if (!report.stopped) tell(light_text(report));
+    return !report.stopped;
+  }
+
+  std::unique_ptr<Output> output(const std::string& path) {
+    return std::make_unique<BoardOutput>(loop_.link(), cells_, rate_, path);
+  }
+
+ private:
+  double rate_;  ///< conversions/s
+  BoardLoop loop_;
+  link::CellCalibrations cells_{};
+  bool connected_ = false;
+};
+
+std::vector<Spec> output_specs(const RunOptions& options) {
+  std::vector<Spec> specs;
+  for (const std::string& text : options.outputs) specs.push_back(split_spec(text));
+  check_outputs(specs, !options.board.empty());
+  return specs;
+}
+
+/// Devices first, because they are what may be refused; files are only then overwritten. `board`
+/// may be null.
+Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* board) {
   Outputs outputs;
   if (options.outputs.empty()) {
     add_default_outputs(outputs, input);
+    if (board != nullptr) outputs.all.push_back(board->output({}));
     return outputs;
   }
-  std::vector<Spec> specs;
-  for (const std::string& text : options.outputs) specs.push_back(split_spec(text));
-  check_outputs(specs);
+  const std::vector<Spec> specs = output_specs(options);
   for (const Spec& spec : specs) {
     if (is_device(spec.kind)) add_device(outputs, spec.kind, input.sensor);
   }
@@ -187,6 +246,11 @@ Outputs open_outputs(const RunOptions& options, const Input& input) {
       outputs.all.push_back(std::make_unique<JsonlOutput>(spec.argument, lossless));
     if (spec.kind == "csv")
       outputs.all.push_back(std::make_unique<CsvOutput>(spec.argument, lossless));
+  }
+  if (board != nullptr) {
+    const auto reference = std::find_if(specs.begin(), specs.end(),
+                                        [](const Spec& spec) { return spec.kind == "reference"; });
+    outputs.all.push_back(board->output(reference == specs.end() ? "" : reference->argument));
   }
   return outputs;
 }
@@ -224,10 +288,19 @@ int run(const RunOptions& options) {
   const UniqueFd stop = signals_as_fd();
   check_size(input);
   check_appearance(input);
+  output_specs(options);  // before anything is lit
+  std::unique_ptr<RunBoard> board;
+  if (!options.board.empty()) {
+    BoardOptions board_options;
+    board_options.port = options.board == "auto" ? "" : options.board;
+    board_options.cells_file = options.cells;
+    board = std::make_unique<RunBoard>(board_options);
+    if (!board->connected() || !board->settle(input, stop)) return 0;
+  }
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
   const WrenchEstimator wrench(input.sensor.wrench);
   const Shaping shaping(input.sensor.shaping);
-  Outputs outputs = open_outputs(options, input);
+  Outputs outputs = open_outputs(options, input, board.get());
   tell("source: " + input.source->format().description);
 
   RunLimits limits;

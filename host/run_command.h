@@ -16,6 +16,8 @@ struct RunOptions {
   std::optional<long> frames;
   std::optional<double> seconds;
   bool fast = false;
+  std::string board;  ///< its port; empty: there is none
+  std::string cells;  ///< calibration file of its load cells; empty: by the board's id
 };
 
 /// Returns the exit status. Throws ConfigError if the run cannot start.

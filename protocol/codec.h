@@ -201,7 +201,7 @@ struct Fault {
 
 /// encode() writes a whole body (kind, sequence, message) to `body`, kMostBodyBytes of room, and
 /// returns its length. Every message of these types fits; strings and ids that are too long are
-/// cut.
+/// cut. Reports are encoded by hand (codec_board.cpp), byte for byte what nanopb makes of them.
 uint8_t encode(const HelloRequest& message, uint8_t sequence, uint8_t* body);
 uint8_t encode(const Configure& message, uint8_t sequence, uint8_t* body);
 uint8_t encode(const Led& message, uint8_t sequence, uint8_t* body);
@@ -215,15 +215,14 @@ uint8_t encode(const Status& message, uint8_t sequence, uint8_t* body);
 uint8_t encode(const Answer& message, uint8_t sequence, uint8_t* body);
 uint8_t encode(const TareResult& message, uint8_t sequence, uint8_t* body);
 uint8_t encode(const Fault& message, uint8_t sequence, uint8_t* body);
-/// The frequent ones are encoded by hand (nanopb takes a millisecond for one on an ATmega328P);
-/// byte for byte what nanopb makes of them.
 uint8_t encode(const CellSample& message, uint8_t sequence, uint8_t* body);
 uint8_t encode(const AdcSample& message, uint8_t sequence, uint8_t* body);
 uint8_t encode(const TimeReply& message, uint8_t sequence, uint8_t* body);
 
 /// decode() reads the message after a body's header. False, with `message` all zero: not a message
 /// of this type, or an enum value that this version does not know. Fields that this version does
-/// not know are skipped. What does not print in a string reads as '?'.
+/// not know are skipped; an unknown reset cause in Hello reads as unknown. What does not print in a
+/// string reads as '?'.
 bool decode(const uint8_t* bytes, uint8_t count, HelloRequest& message);
 bool decode(const uint8_t* bytes, uint8_t count, Configure& message);
 bool decode(const uint8_t* bytes, uint8_t count, Led& message);

@@ -9,50 +9,50 @@ constexpr uint8_t kDelimiter = 0;
 /// that long, so every block but the last is followed by the zero that it stands for.
 static_assert(kMostBodyBytes + kCrcBytes < 254, "a frame has blocks of any length");
 
-/// In bytes instead of words: what an 8-bit machine is fast at. `high` and `low` are the register.
-void crc_add(uint8_t byte, uint8_t& high, uint8_t& low) {
-  uint8_t x = static_cast<uint8_t>(high ^ byte);
+/// In bytes, step by step: what an 8-bit machine and its compiler are fast at.
+inline uint16_t crc_add(uint16_t crc, uint8_t byte) {
+  uint8_t x = static_cast<uint8_t>((crc >> 8) ^ byte);
   x = static_cast<uint8_t>(x ^ (x >> 4));
-  high = static_cast<uint8_t>(low ^ (x << 4) ^ (x >> 3));
-  low = static_cast<uint8_t>((x << 5) ^ x);
+  const uint8_t x_16 = static_cast<uint8_t>(x << 4);
+  const uint8_t x_32 = static_cast<uint8_t>(x_16 << 1);
+  const uint8_t x_eighth = static_cast<uint8_t>(x >> 3);
+  const uint8_t high = static_cast<uint8_t>(static_cast<uint8_t>(crc) ^ x_16 ^ x_eighth);
+  return static_cast<uint16_t>((high << 8) | static_cast<uint8_t>(x_32 ^ x));
 }
 
-/// The COBS writer's state: where the present block's code byte is, and where the next byte goes.
-struct Stuffer {
-  uint8_t* frame;
-  uint8_t code_at;
-  uint8_t end;
-
-  void add(uint8_t byte) {
-    if (byte != kDelimiter) {
-      frame[end++] = byte;
-      return;
-    }
-    close_block();
-    code_at = end++;
-  }
-  void close_block() { frame[code_at] = static_cast<uint8_t>(end - code_at); }
-};
+constexpr uint16_t kCrcStart = 0xFFFF;
 
 }  // namespace
 
 uint16_t crc16(const uint8_t* bytes, uint8_t count) {
-  uint8_t high = 0xFF;
-  uint8_t low = 0xFF;
-  for (uint8_t i = 0; i < count; ++i) crc_add(bytes[i], high, low);
-  return static_cast<uint16_t>((high << 8) | low);
+  uint16_t crc = kCrcStart;
+  for (uint8_t i = 0; i < count; ++i) crc = crc_add(crc, bytes[i]);
+  return crc;
 }
 
 uint8_t write_frame(const uint8_t* body, uint8_t count, uint8_t* frame) {
   if (count < kHeaderBytes || count > kMostBodyBytes) return 0;
-  const uint16_t crc = crc16(body, count);
-  Stuffer stuffer{frame, 0, 1};
-  for (uint8_t i = 0; i < count; ++i) stuffer.add(body[i]);
-  stuffer.add(static_cast<uint8_t>(crc & 0xFF));
-  stuffer.add(static_cast<uint8_t>(crc >> 8));
-  stuffer.close_block();
-  frame[stuffer.end++] = kDelimiter;
-  return stuffer.end;
+  uint16_t crc = kCrcStart;
+  uint8_t* code = frame;  // of the present block: will hold its length
+  uint8_t* end = frame + 1;
+  for (uint8_t left = static_cast<uint8_t>(count + kCrcBytes); left > 0; --left) {
+    uint8_t byte;
+    if (left > kCrcBytes) {
+      byte = *body++;
+      crc = crc_add(crc, byte);
+    } else {
+      byte = static_cast<uint8_t>(crc);
+      crc = static_cast<uint16_t>(crc >> 8);
+    }
+    if (byte == kDelimiter) {
+      *code = static_cast<uint8_t>(end - code);
+      code = end;
+    }
+    *end++ = byte;
+  }
+  *code = static_cast<uint8_t>(end - code);
+  *end++ = kDelimiter;
+  return static_cast<uint8_t>(end - frame);
 }
 
 void FrameReader::begin() {

@@ -23,14 +23,9 @@ constexpr uint8_t kMostFrameBytes = 1 + kMostBodyBytes + kCrcBytes + 1;
 uint16_t crc16(const uint8_t* bytes, uint8_t count);
 
 /// Writes the frame of a body to `frame` (kMostFrameBytes of room) and returns its length,
-/// delimiter included; 0 if the body is longer than kMostBodyBytes or shorter than its header.
+/// delimiter included; 0 if the body is longer than kMostBodyBytes or shorter than its header. The
+/// body may stand at frame + 1.
 uint8_t write_frame(const uint8_t* body, uint8_t count, uint8_t* frame);
-
-/// Frames of one sender that are missing between two that arrived one after the other; of 256 in a
-/// row, none is seen to be missing.
-constexpr uint8_t frames_between(uint8_t sequence, uint8_t next_sequence) {
-  return static_cast<uint8_t>(next_sequence - sequence - 1);
-}
 
 /// What one received byte completed.
 enum class Received : uint8_t {

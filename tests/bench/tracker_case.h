@@ -7,7 +7,7 @@
 
 #include "host/source/simulator/scenario.h"
 #include "tests/bench/tracker_scores.h"
-#include "tests/bench/tracker_table.h"
+#include "tests/bench/table.h"
 
 namespace tagwrench::bench {
 

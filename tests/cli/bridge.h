@@ -31,7 +31,9 @@ struct Outcome {
 /// A running bridge; read its streams, signal it, wait for it.
 class Bridge {
  public:
-  explicit Bridge(const std::vector<std::string>& arguments) {
+  /// `input` is the path of its standard input.
+  explicit Bridge(const std::vector<std::string>& arguments,
+                  const std::string& input = "/dev/null") {
     int out[2];
     int err[2];
     if (::pipe2(out, O_CLOEXEC) != 0 || ::pipe2(err, O_CLOEXEC) != 0)
@@ -45,7 +47,7 @@ class Bridge {
     argv.push_back(nullptr);
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, 0, input.c_str(), O_RDONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, out[1], 1);
     posix_spawn_file_actions_adddup2(&actions, err[1], 2);
     const int failed =
@@ -67,6 +69,13 @@ class Bridge {
   /// Waits until standard output holds `count` lines (true) or has ended (false).
   bool wait_for_lines(std::ptrdiff_t count) {
     while (std::count(outcome_.out.begin(), outcome_.out.end(), '\n') < count) {
+      if (!pump()) return false;
+    }
+    return true;
+  }
+  /// The same for a text on standard error.
+  bool wait_for_message(const std::string& text) {
+    while (outcome_.err.find(text) == std::string::npos) {
       if (!pump()) return false;
     }
     return true;

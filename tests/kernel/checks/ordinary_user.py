@@ -9,16 +9,6 @@ USER = "1500"  # no such account is needed
 FOLDER = "/run/ordinary"
 
 
-def start_udevd(rules):
-    shutil.copy(rules, "/etc/udev/rules.d/70-tagwrench.rules")
-    os.makedirs("/run/udev", exist_ok=True)
-    for command in (["/lib/systemd/systemd-udevd", "--daemon"], ["udevadm", "trigger", "--action=add"],
-                    ["udevadm", "settle", "-t", "60"]):
-        status, _, err = rig.run(*command, patience=120)
-        if status != 0:
-            raise rig.GaveUp(f"{' '.join(command)}: {err.strip()}")
-
-
 def copy_for_the_user(setup):
     """The project may lie where only its owner can go."""
     os.makedirs(FOLDER, mode=0o755)
@@ -44,7 +34,7 @@ def body(setup):
                   status == 2 and len(refused.err) == 1 and node in refused.err[0], refused.state())
 
     os.chmod("/dev/video0", 0o600)
-    start_udevd(setup.project + "/host/output/70-tagwrench.rules")
+    rig.start_udevd(setup.project + "/host/output/70-tagwrench.rules")
     bridge = setup.bridge("spacemouse", "wrench", "joystick", f"jsonl:/tmp/ordinary.jsonl", sensor=sensor, user=USER)
     rig.check("with the udev rule an ordinary user's bridge runs", bridge.wait_error("rest pose learned"), bridge.state())
     spnav = setup.client("spnav_client", user=USER)

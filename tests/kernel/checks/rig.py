@@ -153,6 +153,16 @@ def load(*modules):
             raise GaveUp(f"modprobe {module}: {err.strip()}")
 
 
+def start_udevd(rules):
+    shutil.copy(rules, "/etc/udev/rules.d/70-tagwrench.rules")
+    os.makedirs("/run/udev", exist_ok=True)
+    for command in (["/lib/systemd/systemd-udevd", "--daemon"], ["udevadm", "trigger", "--action=add"],
+                    ["udevadm", "settle", "-t", "60"]):
+        status, _, err = run(*command, patience=120)
+        if status != 0:
+            raise GaveUp(f"{' '.join(command)}: {err.strip()}")
+
+
 def input_devices(name_part):
     """The names of the kernel's input devices that contain `name_part`."""
     with open("/proc/bus/input/devices", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-#include "tests/bench/tracker_table.h"
+#include "tests/bench/table.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,146 @@
+#include "firmware/app/led.h"
+
+#include "firmware/app/elapsed.h"
+#include "protocol/pattern.h"
+
+namespace tagwrench {
+namespace firmware {
+namespace {
+
+constexpr int32_t kMostHeat = static_cast<int32_t>(1000 - kSustainedPermille) * kFullTimeMs;
+/// Half of the pattern's bits shine.
+constexpr uint16_t kPatternPermille = 500;
+/// Of a bit that shines, when limited.
+constexpr uint16_t kLimitedBitPermille = 1000ul * kSustainedPermille / kPatternPermille;
+
+constexpr uint32_t kMostAheadUs = 60000000;
+/// An edge is queued at least this long before its time, which is longer than queueing it takes,
+constexpr uint32_t kLeadUs = 500;
+/// and no earlier than this, so that a change of the limit is soon seen.
+constexpr uint32_t kHorizonUs = 200000;
+/// Steps of the pattern in one poll: half a millisecond at 16 MHz.
+constexpr uint16_t kStepsAtOnce = 400;
+
+bool in_range(const link::Led& command) {
+  const board::Traits& can = board::kTraits;
+  if (command.mode == link::LedMode::off) return true;
+  if (command.mode == link::LedMode::steady) return command.level_permille <= 1000;
+  if (command.period_us < can.strobe_period_min_us || command.period_us > can.strobe_period_max_us)
+    return false;
+  if (command.mode == link::LedMode::pattern)
+    return command.pattern_seed >= 1 && command.pattern_seed <= link::kPatternBits;
+  // Dark between two pulses for as long as a pulse lasts at least.
+  return command.width_us >= can.strobe_width_min_us &&
+         command.width_us <= can.strobe_width_max_us &&
+         command.width_us + can.strobe_width_min_us <= command.period_us;
+}
+
+uint16_t mean_permille(const link::Led& command) {
+  switch (command.mode) {
+    case link::LedMode::steady:
+      return command.level_permille;
+    case link::LedMode::strobe:
+      return static_cast<uint16_t>(command.width_us * 1000ul / command.period_us);
+    case link::LedMode::pattern:
+      return kPatternPermille;
+    default:
+      return 0;
+  }
+}
+
+}  // namespace
+
+link::Result LedDriver::command(const link::Led& command, uint32_t now_us) {
+  if (!in_range(command)) return link::Result::out_of_range;
+  command_ = command;
+  wanted_permille_ = mean_permille(command);
+  if (wanted_permille_ <= kSustainedPermille) limited_ = false;
+  drive();
+  if (command_.mode >= link::LedMode::strobe) begin_pulses(now_us);
+  return link::Result::ok;
+}
+
+void LedDriver::off() {
+  command_.mode = link::LedMode::off;
+  wanted_permille_ = 0;
+  limited_ = false;
+  drive();
+}
+
+void LedDriver::drive() {
+  if (command_.mode < link::LedMode::strobe) {
+    board::led_steady(level_permille());
+  } else if (command_.mode == link::LedMode::strobe) {
+    pulse_us_ = limited_ ? command_.period_us * kSustainedPermille / 1000 : command_.width_us;
+  } else {
+    pulse_us_ = command_.period_us * kLimitedBitPermille / 1000;
+  }
+}
+
+void LedDriver::begin_pulses(uint32_t now_us) {
+  board::led_pulses();
+  shining_ = false;
+  skip_ = 0;
+  state_ = command_.pattern_seed;
+  next_us_ = command_.start_us;
+  if (next_us_ - now_us <= kMostAheadUs) return;
+  const uint32_t periods = (now_us - next_us_) / command_.period_us + 1;
+  next_us_ += periods * command_.period_us;
+  if (command_.mode == link::LedMode::pattern)
+    skip_ = static_cast<uint16_t>(periods % link::kPatternBits);
+}
+
+void LedDriver::poll(uint32_t now_us, Faults& faults) {
+  account(now_us);
+  if (!limited_ && heat_ >= kMostHeat && wanted_permille_ > kSustainedPermille) {
+    limited_ = true;
+    drive();
+    faults.raise(link::FaultCode::led_limited, 0, now_us);
+  }
+  if (command_.mode >= link::LedMode::strobe && !catching_up()) schedule(now_us);
+}
+
+void LedDriver::account(uint32_t now_us) {
+  const int16_t above =
+      static_cast<int16_t>(static_cast<int16_t>(level_permille()) - kSustainedPermille);
+  while (now_us - accounted_us_ >= 1000) {
+    accounted_us_ += 1000;
+    heat_ += above;
+    if (heat_ < 0) heat_ = 0;
+    if (heat_ > kMostHeat) heat_ = kMostHeat;
+    if (command_.mode == link::LedMode::off || ++on_time_ms_ < 1000) continue;
+    on_time_ms_ = 0;
+    ++on_time_s_;
+  }
+}
+
+bool LedDriver::catching_up() {
+  for (uint16_t i = 0; skip_ != 0 && i < kStepsAtOnce; ++i, --skip_)
+    state_ = link::next_pattern_state(state_);
+  return skip_ != 0;
+}
+
+void LedDriver::schedule(uint32_t now_us) {
+  for (uint16_t i = 0; i < kStepsAtOnce && !reached(now_us + kLeadUs, next_us_); ++i) {
+    if (!reached(now_us + kHorizonUs, next_us_) || board::led_edge_room() < 2) return;
+    add_edges();
+    step();
+  }
+  for (uint16_t i = 0; i < kStepsAtOnce && reached(now_us + kLeadUs, next_us_); ++i) step();
+}
+
+void LedDriver::add_edges() {
+  const bool pattern = command_.mode == link::LedMode::pattern;
+  const bool shine = !pattern || link::pattern_light(state_);
+  if (shine != shining_) board::led_edge(next_us_, shine);
+  shining_ = shine && pattern && !limited_;
+  if (shine && !shining_) board::led_edge(next_us_ + pulse_us_, false);
+}
+
+void LedDriver::step() {
+  next_us_ += command_.period_us;
+  state_ = link::next_pattern_state(state_);
+}
+
+}  // namespace firmware
+}  // namespace tagwrench

@@ -1,0 +1,37 @@
+// What the files of this board share. An interrupt routine may last 20 us and all of them together
+// 40 us, because the receiver holds two bytes (40 us at 500,000 baud) before it loses one.
+#pragma once
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+
+#include "firmware/board/board.h"
+
+namespace tagwrench {
+namespace board {
+
+/// No interrupts as long as it lives. For a few instructions.
+class Atomic {
+ public:
+  Atomic() : state_(SREG) { cli(); }
+  ~Atomic() { SREG = state_; }
+  Atomic(const Atomic&) = delete;
+  Atomic& operator=(const Atomic&) = delete;
+
+ private:
+  uint8_t state_;
+};
+
+/// now_us() for where interrupts are off.
+uint32_t now_us_atomic();
+
+void start_clock();
+void start_serial();
+void start_led();
+void start_cells();
+void start_adc();
+void start_buttons();
+void start_eeprom();
+
+}  // namespace board
+}  // namespace tagwrench

@@ -1,0 +1,168 @@
+#include "host/bandwidth_command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <memory>
+#include <vector>
+
+#include "host/bandwidth_measurement.h"
+#include "host/bandwidth_report.h"
+#include "host/config/scenario_config.h"
+#include "host/config/sensor_edit.h"
+#include "host/config_error.h"
+#include "host/input.h"
+#include "host/output/dead_man.h"
+#include "host/output/wrench_hid.h"
+#include "host/simulated_lamp.h"
+#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
+#include "host/tell.h"
+#include "host/tracker/tracker.h"
+#include "host/wrench/estimate.h"
+#include "host/wrench/shaping.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+
+/// A camera and the lamp before it.
+struct Bench {
+  Input input;
+  std::unique_ptr<PatternLamp> lamp;
+  std::string lamp_description;
+};
+
+/// The simulator's own lamp, at the camera's own clock.
+Bench simulated_bench(const std::string& sensor, const std::string& source, bool fast) {
+  const Spec spec = split_spec(source);
+  if (spec.kind != "sim") {
+    throw ConfigError(fmt::format(
+        "--port sim: the simulated lamp lights the simulated sensor alone; use --source sim or "
+        "--source sim:SCENARIO.yaml with it, not {}",
+        source));
+  }
+  const sim::Scenario scenario =
+      spec.argument.empty() ? sim::Scenario{} : load_scenario(spec.argument);
+  auto lamp = std::make_unique<SimulatedLamp>(!fast);
+  Bench bench;
+  bench.input.sensor = sensor.empty()
+                           ? parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor")
+                           : load_sensor(sensor);
+  auto camera = std::make_unique<SimulatorSource>(scenario, !fast, lamp.get());
+  lamp->set_time_zero(camera->time_zero());
+  bench.input.source = std::move(camera);
+  bench.lamp = std::move(lamp);
+  bench.lamp_description = "simulated, on the camera's own clock";
+  return bench;
+}
+
+/// What a run does with a frame, to a HID device where one may be made.
+class Processing {
+ public:
+  explicit Processing(const SensorConfig& sensor)
+      : tracker_(sensor.camera, sensor.target, sensor.rest),
+        wrench_(sensor.wrench),
+        shaping_(sensor.shaping) {
+    try {
+      device_ = std::make_unique<WrenchHidOutput>(WrenchHidOptions{});
+    } catch (const ConfigError& e) {
+      tell(fmt::format("measured without HID device: {}", e.what()));
+    }
+  }
+  void take(Frame& frame) noexcept {
+    const Track track = tracker_.track(frame);
+    Sample sample{.sequence = frame.sequence,
+                  .capture_time = frame.capture_time,
+                  .latency_origin = frame.latency_origin,
+                  .dropped = frame.dropped};
+    wrench_.estimate(track, sample);
+    shaping_.shape(sample);
+    if (carries_numbers(sample.status)) ++held_;
+    if (device_) device_->send(sample);
+  }
+  int held() const { return held_; }
+  const char* output() const {
+    return device_ ? "the HID report" : "the wrench (no HID device may be made here)";
+  }
+
+ private:
+  Tracker tracker_;
+  WrenchEstimator wrench_;
+  Shaping shaping_;
+  std::unique_ptr<WrenchHidOutput> device_;
+  int held_ = 0;
+};
+
+}  // namespace
+
+BandwidthCommand::BandwidthCommand(CLI::App& app)
+    : verb_(app.add_subcommand(
+          "bandwidth",
+          "measure the camera with the LED: true frame rate, latency, jitter, read-out, stale and "
+          "missing frames")) {
+  verb_->footer(
+      "The board's LED lights the picture: steadily for 3 s, not at all for 1 s, then in a "
+      "pattern.\n"
+      "Hands off, lens where it belongs, and little light from elsewhere. Without camera and "
+      "board:\n"
+      "  tagwrench bandwidth --source sim:tests/sim/scenarios/bandwidth.yaml --port sim --fast");
+  verb_->add_option("--source", source_, "the camera: v4l2:/dev/videoN, sim or sim:SCENARIO.yaml")
+      ->required();
+  verb_
+      ->add_option("--port", port_,
+                   "the board: its serial port, usb:VENDOR:PRODUCT, or sim for the simulated lamp")
+      ->required();
+  verb_->add_option("--sensor", sensor_, "sensor.yaml of this sensor");
+  verb_->add_option("--seconds", seconds_, "length of the pattern")
+      ->check(CLI::Range(3.0, 20.0))
+      ->capture_default_str();
+  verb_->add_option("--json", json_,
+                    "write the report as JSON to this file too; - is standard output");
+  verb_->add_flag("--fast", fast_, "the simulated sensor runs as fast as it can");
+}
+
+int BandwidthCommand::run() const {
+  if (!json_.empty() && json_ != "-") check_replaceable(json_);
+  const UniqueFd stop = signals_as_fd();
+  if (port_ != "sim") {
+    throw ConfigError(fmt::format("--port {}: only the simulated lamp (sim) is there", port_));
+  }
+  Bench bench = simulated_bench(sensor_, source_, fast_);
+  check_size(bench.input);
+  tell("source: " + bench.input.source->format().description);
+  Processing processing(bench.input.sensor);
+
+  BandwidthOptions options;
+  options.seconds = seconds_;
+  options.process = [&](Frame& frame) { processing.take(frame); };
+  options.stopped = [&] { return signalled(stop); };
+  options.stop_fd = stop.get();
+  options.say = [](const std::string& line) { tell(line); };
+  const BandwidthMeasurement measured =
+      measure_bandwidth(*bench.input.source, *bench.lamp, options);
+  if (!measured.refusal.empty()) {
+    tell((measured.failed ? "bandwidth: " : "bandwidth: nothing can be told: ") + measured.refusal);
+    return kFailed;
+  }
+  if (processing.held() == 0)
+    tell(
+        "the tags were not held while the LED was steady: the processing time is that of looking "
+        "for them");
+  const BandwidthSetting setting{
+      bench.input.source->format().description, bench.lamp_description, processing.output(),
+      std::chrono::duration<double>(bench.input.source->format().period).count()};
+  const std::string json = report_json(measured, setting);
+  if (json_ == "-") {
+    fmt::print("{}", json);
+  } else {
+    fmt::print("{}", report_text(measured, setting));
+    if (!json_.empty()) write_atomically(json_, json);
+  }
+  return kDone;
+}
+
+}  // namespace tagwrench

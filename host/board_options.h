@@ -1,0 +1,45 @@
+// What `tagwrench board` is told on its command line.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/link/cell_calibration.h"
+
+namespace tagwrench {
+
+struct BoardOptions {
+  std::string port;  ///< path, usb:VID:PID[:SERIAL], or empty: the only one
+  bool json = false;
+  std::string cells_file;  ///< empty: by the board's id
+  std::string cell_input = "a128";
+  int cell_rate = 80;                ///< conversions/s
+  int adc_rate = 0;                  ///< samples/s of each channel; 0: off
+  std::optional<double> seconds;     ///< then end
+  double line_period = 0.25;         ///< s between the lines that `watch` prints for people
+
+  std::string optoforce;             ///< port of an OptoForce sensor to be shown as well
+  std::vector<double> counts_per_unit;  ///< of its axes: counts per N, then per N m
+
+  std::vector<std::string> light;    ///< words of `led`
+  int channel = 0;
+  std::vector<double> masses_kg;
+  double gravity = link::kStandardGravity;
+  int conversions = 160;             ///< averaged per mass, and for a tare
+  std::string out;                   ///< file of `log`
+
+  std::string model;                 ///< board to flash
+  std::string image;                 ///< empty: the one that was built or installed
+  bool dry_run = false;
+};
+
+int board_info(const BoardOptions& options);
+int board_watch(const BoardOptions& options);
+int board_log(const BoardOptions& options);
+int board_led(const BoardOptions& options);
+int board_tare(const BoardOptions& options);
+int board_calibrate_cell(const BoardOptions& options);
+int board_flash(const BoardOptions& options);
+
+}  // namespace tagwrench

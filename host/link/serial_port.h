@@ -1,0 +1,60 @@
+// A serial port of our own: raw bytes, never a wait.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "host/os/unique_fd.h"
+
+namespace tagwrench::link {
+
+struct SerialFailure {
+  enum class Kind : std::uint8_t { none, absent, denied, busy, no_serial_port, no_such_baud, other };
+  Kind kind = Kind::none;
+  int error = 0;  ///< errno, where there is one
+
+  explicit operator bool() const { return kind != Kind::none; }
+};
+
+class SerialPort {
+ public:
+  struct ReadResult {
+    std::size_t count = 0;
+    bool gone = false;  ///< unplugged, or hung up; the port is closed
+  };
+
+  SerialPort() = default;
+
+  /// Raw, 8N1, this program's alone; what had come before is thrown away. Throws ConfigError with
+  /// one line that names the remedy. An Arduino resets when its port is opened.
+  SerialPort(const std::string& path, unsigned baud);
+
+  /// The same without message, for a loop that tries again.
+  SerialFailure open(const char* path, unsigned baud) noexcept;
+  void close() noexcept { fd_.reset(); }
+
+  explicit operator bool() const noexcept { return static_cast<bool>(fd_); }
+  int fd() const noexcept { return fd_.get(); }
+
+  /// What is there, up to the room given.
+  ReadResult read(std::span<std::uint8_t> room) noexcept;
+
+  /// False: gone. Bytes that the driver has no room for are dropped and counted.
+  bool write(std::span<const std::uint8_t> bytes) noexcept;
+
+  /// Throws away what has come and was not read.
+  void flush_input() noexcept;
+
+  std::uint64_t dropped_bytes() const noexcept { return dropped_; }
+
+ private:
+  UniqueFd fd_;
+  std::uint64_t dropped_ = 0;
+};
+
+/// One line: what, where, remedy.
+std::string text(const SerialFailure& failure, const std::string& path, unsigned baud);
+
+}  // namespace tagwrench::link

@@ -1,0 +1,187 @@
+#include "host/study/bandwidth.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "host/study/bandwidth_fit.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr double kBitsPerFrame = 15.382;  // no fraction of small numbers comes near
+constexpr int kFewestTimed = 8;
+constexpr double kTellsTime = 0.25;  // of a bit
+constexpr double kClear = 9;         // difference of costs: three standard deviations
+constexpr double kGoodShutter = 3;   // standard deviations
+
+std::string unusable(const BandwidthInput& input) {
+  const auto frames = static_cast<int>(input.frames.size());
+  if (frames < kFewestBandwidthFrames) {
+    return fmt::format(
+        "only {} pictures came while the LED flashed, {} are needed: give it more time", frames,
+        kFewestBandwidthFrames);
+  }
+  if (input.bands.size() < 2 || input.edges.size() < 20)
+    return "there is no pattern to compare with";
+  return {};
+}
+
+double quantile(std::vector<double>& sorted, double share) {
+  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5)];
+}
+
+void copy_times(const BandwidthInput& input, const BandwidthFit& fit, BandwidthResult& result) {
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    const BandwidthFit::Picture& p = fit.pictures()[i];
+    TimedFrame frame;
+    frame.exposed = p.time;
+    frame.sigma = p.sigma;
+    frame.timed = p.good && p.alone && p.sigma < kTellsTime * input.bit && p.margin > kClear;
+    frame.freshness = !p.alone ? Freshness::stale : p.good ? Freshness::fresh : Freshness::strange;
+    if (i > 0 && frame.freshness == Freshness::fresh &&
+        fit.cost(i, fit.pictures()[i - 1].time) - fit.own_cost(i) < kClear) {
+      frame.freshness = Freshness::undecided;
+    }
+    if (frame.freshness == Freshness::strange) frame.exposed = fit.expected(i);
+    result.times.push_back(frame);
+  }
+}
+
+/// The median of the intervals between neighbours; lost frames are fewer than others.
+double usual_interval(const std::vector<TimedFrame>& times, double fallback) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    if (times[i].timed && times[i - 1].timed)
+      intervals.push_back(times[i].exposed - times[i - 1].exposed);
+  }
+  if (intervals.empty()) return fallback;
+  std::sort(intervals.begin(), intervals.end());
+  return quantile(intervals, 0.5);
+}
+
+/// Numbers the exposures, and fits a straight line through the times of those that are timed.
+void fit_rate(const BandwidthInput& input, BandwidthResult& result) {
+  double period = usual_interval(result.times, input.period);
+  // Neighbours give the period to a few parts in a thousand, and the longer the stretch that is
+  // numbered, the better it is known.
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  const TimedFrame* last = nullptr;
+  const double start = result.times.front().exposed;
+  for (TimedFrame& frame : result.times) {
+    if (last != nullptr)
+      frame.number = last->number + std::llround((frame.exposed - last->exposed) / period);
+    if (!frame.timed) continue;
+    last = &frame;
+    const auto number = static_cast<double>(frame.number);
+    const double time = frame.exposed - start;
+    n += 1;
+    x += number;
+    y += time;
+    xx += number * number;
+    xy += number * time;
+    yy += time * time;
+    const double spread = n * xx - x * x;
+    if (n >= kFewestTimed && spread > 0) period = (n * xy - x * y) / spread;
+  }
+  const double spread = n * xx - x * x;
+  if (n < kFewestTimed || spread <= 0) return;
+  const double slope = (n * xy - x * y) / spread;
+  const double offset = (y - slope * x) / n;
+  double squares = 0;
+  for (const TimedFrame& frame : result.times) {
+    if (!frame.timed) continue;
+    const double off = frame.exposed - start - offset - slope * static_cast<double>(frame.number);
+    squares += off * off;
+  }
+  const double sigma = std::sqrt(squares / (n - 2) * n / spread) / slope;
+  result.frame_rate = {1 / slope, std::hypot(sigma, input.clock_rate_sigma) / slope, true};
+}
+
+/// A straight exponential's scatter of a standard deviation is larger than a normal's; so the
+/// fourth moment is measured too.
+void fit_latency(const BandwidthInput& input, const BandwidthFit& fit, BandwidthResult& result) {
+  std::vector<double> delays;
+  double noise = 0;
+  for (std::size_t i = 0; i < result.times.size(); ++i) {
+    if (!result.times[i].timed) continue;
+    delays.push_back(input.frames[i].stamp - result.times[i].exposed);
+    noise += result.times[i].sigma * result.times[i].sigma;
+  }
+  result.timed = static_cast<int>(delays.size());
+  if (result.timed < kFewestTimed) return;
+  const auto count = static_cast<double>(delays.size());
+  double mean = 0, second = 0, fourth = 0;
+  for (const double d : delays) mean += d / count;
+  for (const double d : delays) {
+    second += std::pow(d - mean, 2) / count;
+    fourth += std::pow(d - mean, 4) / count;
+  }
+  const double variance = second * count / (count - 1);
+  const double common = fit.time_by_camera().dot(fit.covariance() * fit.time_by_camera());
+  result.latency = {
+      mean, std::sqrt(variance / count + std::max(common, 0.0) + std::pow(input.edge_sigma, 2)),
+      true};
+  const double own = std::max(variance - noise / count, 0.0);
+  const double variance_sigma = std::sqrt(std::max(fourth - second * second, 0.0) / count);
+  const double jitter = std::sqrt(own);
+  result.jitter = {jitter, variance_sigma / (2 * std::max(jitter, std::sqrt(noise / count))), true};
+  std::sort(delays.begin(), delays.end());
+  result.latency_least = delays.front();
+  result.latency_median = quantile(delays, 0.5);
+  result.latency_95 = quantile(delays, 0.95);
+  result.latency_most = delays.back();
+}
+
+void count_frames(const BandwidthInput& input, BandwidthResult& result) {
+  result.frames = static_cast<int>(result.times.size());
+  std::set<std::int64_t> seen;
+  for (std::size_t i = 0; i < result.times.size(); ++i) {
+    const TimedFrame& frame = result.times[i];
+    result.stale += frame.freshness == Freshness::stale ? 1 : 0;
+    result.undecided += frame.freshness == Freshness::undecided ? 1 : 0;
+    result.strange += frame.freshness == Freshness::strange ? 1 : 0;
+    if (frame.freshness != Freshness::stale) seen.insert(frame.number);
+    if (i > 0) result.dropped_by_driver += static_cast<int>(input.frames[i].dropped);
+  }
+  if (!seen.empty()) {
+    result.missing = static_cast<int>(*seen.rbegin() - *seen.begin() + 1 -
+                                      static_cast<std::int64_t>(seen.size()));
+  }
+  result.elapsed = input.frames.back().stamp - input.frames.front().stamp;
+}
+
+}  // namespace
+
+double BandwidthResult::new_pictures_rate() const noexcept {
+  return elapsed > 0 ? (frames - 1 - stale) / elapsed : 0;
+}
+
+double bit_period_for(double frame_period) { return frame_period / kBitsPerFrame; }
+
+BandwidthResult measure_bandwidth(const BandwidthInput& input) {
+  BandwidthResult result;
+  result.refusal = unusable(input);
+  if (!result.refusal.empty()) return result;
+  BandwidthFit fit(input);
+  if (!fit.find()) {
+    result.refusal = fmt::format(
+        "the pictures do not show the LED's pattern within {:.0f} ms: is another light flickering, "
+        "or are their times far off?",
+        1e3 * kLongestLatency);
+    return result;
+  }
+  fit.refine();
+  copy_times(input, fit, result);
+  fit_rate(input, result);
+  fit_latency(input, fit, result);
+  count_frames(input, result);
+  const Eigen::Vector2d sigma = fit.covariance().diagonal().cwiseMax(0).cwiseSqrt();
+  result.readout = {fit.camera().readout, sigma[0], sigma[0] < kGoodShutter * input.bit};
+  result.exposure = {fit.camera().exposure, sigma[1], sigma[1] < kGoodShutter * input.bit};
+  return result;
+}
+
+}  // namespace tagwrench

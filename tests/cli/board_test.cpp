@@ -1,0 +1,321 @@
+// `tagwrench board` as its users run it, against a model of a board.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "bridge.h"
+#include "served_board.h"
+
+namespace tagwrench::test {
+namespace {
+
+using link::BoardModel;
+using link::ServedBoard;
+using nlohmann::json;
+
+constexpr const char* kCells =
+    R"({"format":"tagwrench-cells-1","board":"0102030405060708","cells":[)"
+    R"({"channel":0,"newtons_per_count":0.001,"newtons_per_count_sigma":1e-7,"zero_counts":0,)"
+    R"("zero_sigma_counts":1,"noise_counts":2,"residual_n":0},)"
+    R"({"channel":1,"newtons_per_count":0.001,"newtons_per_count_sigma":1e-7,"zero_counts":0,)"
+    R"("zero_sigma_counts":1,"noise_counts":2,"residual_n":0},)"
+    R"({"channel":2,"newtons_per_count":0.001,"newtons_per_count_sigma":1e-7,"zero_counts":0,)"
+    R"("zero_sigma_counts":1,"noise_counts":2,"residual_n":0},)"
+    R"({"channel":3,"newtons_per_count":0.001,"newtons_per_count_sigma":1e-7,"zero_counts":0,)"
+    R"("zero_sigma_counts":1,"noise_counts":2,"residual_n":0}]})";
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> out;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) out.push_back(line);
+  return out;
+}
+
+class BoardCliTest : public ::testing::Test {
+ protected:
+  BoardCliTest() { ::setenv("XDG_CONFIG_HOME", folder.path().c_str(), 1); }
+
+  std::string cells_file() const {
+    write_file(folder / "cells.json", kCells);
+    return (folder / "cells.json").string();
+  }
+  TemporaryFolder folder;
+};
+
+TEST_F(BoardCliTest, InfoPrintsTheIdentity) {
+  ServedBoard board;
+  const Outcome got = run_bridge({"board", "info", "--port", board.path()});
+  EXPECT_EQ(got.status, 0) << got.err;
+  for (const char* part : {"model, firmware 0.1.0, protocol 1.", "0102030405060708", "power on",
+                           "4 load cells, 2 analogue (10 bits), 2 buttons", "5.02 V", "ppm"}) {
+    EXPECT_NE(got.out.find(part), std::string::npos) << part << " in\n" << got.out;
+  }
+  const json about = json::parse(run_bridge({"board", "info", "--json", "--port", board.path()}).out);
+  EXPECT_EQ(about["board"], "model");
+  EXPECT_EQ(about["id"], "0102030405060708");
+  EXPECT_NEAR(about["skew_ppm"].get<double>(), 300, 3000);
+}
+
+TEST_F(BoardCliTest, WatchPrintsFourCellsInNewtonsWithTimes) {
+  ServedBoard board;
+  board.set_counts(2500);
+  Bridge bridge({"board", "watch", "--json", "--port", board.path(), "--cells", cells_file()});
+  ASSERT_TRUE(bridge.wait_for_lines(100));
+  board.press();
+  ASSERT_TRUE(bridge.wait_for_lines(200));
+  bridge.signal(SIGINT);
+  const Outcome got = bridge.finish();
+  EXPECT_EQ(got.status, 0) << got.err;
+  std::set<int> channels;
+  std::int64_t last[4] = {};
+  bool pressed = false;
+  for (const std::string& text : lines_of(got.out)) {
+    const json line = json::parse(text);
+    if (line["kind"] == "button") pressed = line["button"] == 1 && line["pressed"] == true;
+    if (line["kind"] != "cell") continue;
+    const int channel = line["channel"];
+    channels.insert(channel);
+    EXPECT_NEAR(line["f_n"].get<double>(), 2.5 + 0.01 * channel, 0.0011);
+    EXPECT_GT(line["f_sigma_n"].get<double>(), 0.001);
+    EXPECT_GT(line["t_ns"].get<std::int64_t>(), last[channel]);
+    EXPECT_GT(line["t_sigma_ns"].get<std::int64_t>(), 0);
+    last[channel] = line["t_ns"];
+  }
+  EXPECT_EQ(channels.size(), 4u);
+  EXPECT_TRUE(pressed);
+}
+
+TEST_F(BoardCliTest, WatchForPeopleShowsNewtonsCountsAndWhatIsNotWired) {
+  ServedBoard board(/*wired=*/0b1011);
+  board.set_counts(-1234);
+  std::string cells = kCells;  // without channel 3
+  cells = cells.substr(0, cells.find(R"(,{"channel":3)")) + "]}";
+  write_file(folder / "three.json", cells);
+  Bridge bridge({"board", "watch", "--every", "0.05", "--port", board.path(), "--cells",
+                 (folder / "three.json").string()});
+  ASSERT_TRUE(bridge.wait_for_lines(10));
+  bridge.signal(SIGTERM);
+  const Outcome got = bridge.finish();
+  EXPECT_EQ(got.status, 0);
+  const std::string line = lines_of(got.out)[8];
+  EXPECT_NE(line.find("cell 0   -1.23"), std::string::npos) << line;
+  EXPECT_NE(line.find("cell 2 is not wired"), std::string::npos) << line;
+  EXPECT_NE(line.find("cell 3     -12"), std::string::npos) << line;
+  EXPECT_NE(line.find("counts"), std::string::npos) << line;
+  EXPECT_NE(got.err.find("load cell 2 does not answer"), std::string::npos) << got.err;
+}
+
+TEST_F(BoardCliTest, LogWritesWholeLinesOfCsv) {
+  ServedBoard board;
+  const std::string file = (folder / "log.csv").string();
+  const Outcome got = run_bridge(
+      {"board", "log", "--out", file, "--seconds", "0.5", "--port", board.path()});
+  EXPECT_EQ(got.status, 0) << got.err;
+  const std::string text = read_file(file);
+  const std::vector<std::string> lines = lines_of(text);
+  ASSERT_GT(lines.size(), 20u);
+  EXPECT_EQ(lines[0], "kind,channel,t_ns,t_sigma_ns,counts,value,sigma,sequence,lost_before");
+  EXPECT_EQ(text.back(), '\n');
+  for (const std::string& line : lines) EXPECT_EQ(std::count(line.begin(), line.end(), ','), 8);
+}
+
+TEST_F(BoardCliTest, AFullDiskIsOneLineAndExit1) {
+  ServedBoard board;
+  const Outcome got =
+      run_bridge({"board", "log", "--out", "/dev/full", "--port", board.path()});
+  EXPECT_EQ(got.status, 1);
+  EXPECT_NE(got.err.find("/dev/full: cannot be written: No space left"), std::string::npos)
+      << got.err;
+}
+
+TEST_F(BoardCliTest, LedStaysUntilCtrlCAndThenGoesOut) {
+  ServedBoard board;
+  Bridge bridge({"board", "led", "20%", "--port", board.path()});
+  EXPECT_TRUE(board.wait_for([](const BoardModel& m) { return m.leds.size() >= 3; }))
+      << "it is repeated";
+  bridge.signal(SIGINT);
+  EXPECT_EQ(bridge.finish().status, 0);
+  EXPECT_TRUE(board.wait_for([](const BoardModel& m) {
+    return m.leds.front().mode == link::LedMode::steady && m.leds.front().level_permille == 200 &&
+           m.leds.back().mode == link::LedMode::off;
+  }));
+}
+
+TEST_F(BoardCliTest, StrobeBeginsAtAMultipleOfItsPeriod) {
+  ServedBoard board;
+  Bridge bridge({"board", "led", "strobe", "40000", "500", "1000", "--port", board.path()});
+  ASSERT_TRUE(board.wait_for([](const BoardModel& m) { return !m.leds.empty(); }));
+  bridge.signal(SIGINT);
+  bridge.finish();
+  EXPECT_TRUE(board.wait_for([](const BoardModel& m) {
+    const link::Led& led = m.leds.front();
+    return led.mode == link::LedMode::strobe && led.period_us == 40'000 && led.width_us == 500;
+  }));
+}
+
+TEST_F(BoardCliTest, ALightBeyondTheLimitsIsRefusedHereOrByTheBoard) {
+  EXPECT_EQ(run_bridge({"board", "led", "101%", "--port", "/dev/null"}).status, 2);
+  EXPECT_EQ(run_bridge({"board", "led", "nan%", "--port", "/dev/null"}).status, 2);
+  EXPECT_EQ(run_bridge({"board", "led", "strobe", "5", "--port", "/dev/null"}).status, 2);
+  ServedBoard board(0xF, [](BoardModel& m) { m.led_result = link::Result::out_of_range; });
+  const Outcome got =
+      run_bridge({"board", "led", "strobe", "10", "5", "--port", board.path()});
+  EXPECT_EQ(got.status, 2);
+  EXPECT_NE(got.err.find("beyond its limits"), std::string::npos) << got.err;
+}
+
+TEST_F(BoardCliTest, CalibrateCellMakesNewtonsThatWatchShows) {
+  ServedBoard board;
+  const std::string keys = (folder / "keys").string();
+  ASSERT_EQ(::mkfifo(keys.c_str(), 0600), 0);
+  UniqueFd keyboard(::open(keys.c_str(), O_RDWR | O_CLOEXEC));
+  board.set_counts(1000);
+  Bridge bridge({"board", "calibrate-cell", "--channel", "0", "--mass", "0,0.5", "--port",
+                 board.path(), "--conversions", "20"},
+                keys);
+  ASSERT_TRUE(bridge.wait_for_message("take everything off"));
+  ASSERT_EQ(::write(keyboard.get(), "\n", 1), 1);
+  ASSERT_TRUE(bridge.wait_for_message("put 0.5 kg"));
+  board.set_counts(1000 + 49'033);
+  ASSERT_EQ(::write(keyboard.get(), "\n", 1), 1);
+  const Outcome got = bridge.finish();
+  EXPECT_EQ(got.status, 0) << got.err;
+  EXPECT_NE(got.out.find("board-0102030405060708.json"), std::string::npos) << got.out;
+
+  Bridge watch({"board", "watch", "--json", "--port", board.path()});
+  ASSERT_TRUE(watch.wait_for_lines(20));
+  watch.signal(SIGINT);
+  for (const std::string& text : lines_of(watch.finish().out)) {
+    const json line = json::parse(text);
+    if (line["channel"] == 0) {
+      EXPECT_NEAR(line["f_n"].get<double>(), 4.9033, 1e-3);
+    } else {
+      EXPECT_TRUE(line["f_n"].is_null()) << "not calibrated: no newtons";
+    }
+  }
+  // The zero follows a tare (the model always answers 1234).
+  const Outcome tare = run_bridge({"board", "tare", "--port", board.path()});
+  EXPECT_EQ(tare.status, 0) << tare.err;
+  EXPECT_NE(tare.out.find("cell 0: zero moved by +0.0234 N"), std::string::npos) << tare.out;
+}
+
+TEST_F(BoardCliTest, MassesThatDoNotSpanAreRefused) {
+  const Outcome same =
+      run_bridge({"board", "calibrate-cell", "--channel", "0", "--mass", "0.5,0.5"});
+  EXPECT_EQ(same.status, 2);
+  EXPECT_NE(same.err.find("do not span"), std::string::npos) << same.err;
+  ServedBoard board;
+  write_file(folder / "keys", "\n\n");
+  Bridge bridge({"board", "calibrate-cell", "--channel", "0", "--mass", "0,0.5", "--port",
+                 board.path(), "--conversions", "10"},
+                (folder / "keys").string());
+  const Outcome unmoved = bridge.finish();
+  EXPECT_EQ(unmoved.status, 2) << "nothing was put on";
+  EXPECT_NE(unmoved.err.find("take a larger mass"), std::string::npos) << unmoved.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "tagwrench"));
+}
+
+TEST_F(BoardCliTest, AnUnwiredCellIsSaidWhenItIsCalibrated) {
+  ServedBoard board(0b1110);
+  write_file(folder / "keys", "\n\n");
+  Bridge bridge({"board", "calibrate-cell", "--channel", "0", "--mass", "0,0.5", "--port",
+                 board.path(), "--conversions", "10"},
+                (folder / "keys").string());
+  const Outcome got = bridge.finish();
+  EXPECT_EQ(got.status, 2);
+  EXPECT_NE(got.err.find("check the wires"), std::string::npos) << got.err;
+}
+
+TEST_F(BoardCliTest, AnotherVersionSaysWhichSideToUpdate) {
+  ServedBoard old(0xF, [](BoardModel& m) { m.hello.protocol_major = 0; });
+  const Outcome board_old = run_bridge({"board", "info", "--port", old.path()});
+  EXPECT_EQ(board_old.status, 2);
+  EXPECT_NE(board_old.err.find("update the board"), std::string::npos) << board_old.err;
+  ServedBoard recent(0xF, [](BoardModel& m) { m.hello.protocol_major = 9; });
+  const Outcome host_old = run_bridge({"board", "info", "--port", recent.path()});
+  EXPECT_EQ(host_old.status, 2);
+  EXPECT_NE(host_old.err.find("update tagwrench"), std::string::npos) << host_old.err;
+}
+
+TEST_F(BoardCliTest, ASecondHostIsToldWhoHasThePort) {
+  ServedBoard board;
+  Bridge first({"board", "watch", "--json", "--port", board.path()});
+  ASSERT_TRUE(first.wait_for_lines(5));
+  const Outcome second = run_bridge({"board", "info", "--port", board.path()});
+  EXPECT_EQ(second.status, 2);
+  EXPECT_NE(second.err.find("in use by tagwrench (process "), std::string::npos) << second.err;
+  first.signal(SIGINT);
+  EXPECT_EQ(first.finish().status, 0);
+}
+
+TEST_F(BoardCliTest, WhatIsNoBoardIsSaid) {
+  ServedBoard silent(0xF, [](BoardModel& m) { m.answers = false; });
+  const Outcome got = run_bridge({"board", "info", "--port", silent.path()});
+  EXPECT_EQ(got.status, 2);
+  EXPECT_NE(got.err.find("nothing answers"), std::string::npos) << got.err;
+}
+
+class FlashTest : public BoardCliTest {
+ protected:
+  FlashTest() {
+    write_file(folder / "image.hex", ":100000000C9434000C943E000C943E000C943E0082\n:00000001FF\n");
+    path_before = std::getenv("PATH");
+    ::setenv("PATH", (folder.path() + ":" + path_before).c_str(), 1);
+  }
+  ~FlashTest() override { ::setenv("PATH", path_before.c_str(), 1); }
+
+  /// What stands for avrdude: keeps its arguments and ends as told.
+  void avrdude(const std::string& last_line) const {
+    write_file(folder / "avrdude",
+               "#!/bin/sh\nprintf '%s\\n' \"$@\" > '" + (folder / "arguments").string() + "'\n" +
+                   last_line + "\n");
+    std::filesystem::permissions(folder / "avrdude", std::filesystem::perms::owner_all);
+  }
+  std::string image() const { return (folder / "image.hex").string(); }
+  std::string path_before;
+};
+
+TEST_F(FlashTest, ADryRunPrintsTheArgumentsAndRunsNothing) {
+  avrdude("exit 0");
+  const Outcome got = run_bridge({"board", "flash", "--board", "nano-old", "--port", "/dev/ttyX",
+                                  "--image", image(), "--dry-run"});
+  EXPECT_EQ(got.status, 0) << got.err;
+  EXPECT_EQ(got.out, "avrdude -p m328p -c arduino -b 57600 -P /dev/ttyX -D -U flash:w:" + image() +
+                         ":i\n");
+  EXPECT_FALSE(std::filesystem::exists(folder / "arguments"));
+}
+
+TEST_F(FlashTest, TheBoardIsAskedForItsVersionAfterwards) {
+  avrdude("exit 0");
+  ServedBoard board;
+  const Outcome got = run_bridge(
+      {"board", "flash", "--board", "uno", "--port", board.path(), "--image", image()});
+  EXPECT_EQ(got.status, 0) << got.err;
+  EXPECT_NE(got.err.find("firmware 0.1.0"), std::string::npos) << got.err;
+  EXPECT_EQ(read_file(folder / "arguments"), "-p\nm328p\n-c\narduino\n-b\n115200\n-P\n" +
+                                                 board.path() + "\n-D\n-U\nflash:w:" + image() +
+                                                 ":i\n");
+}
+
+TEST_F(FlashTest, AnotherChipIsRefusedByAvrdudeAndSaid) {
+  avrdude("echo 'Expected signature for ATmega328P is 1E 95 0F' >&2; exit 1");
+  ServedBoard board;
+  const Outcome got = run_bridge(
+      {"board", "flash", "--board", "uno", "--port", board.path(), "--image", image()});
+  EXPECT_EQ(got.status, 1);
+  EXPECT_NE(got.err.find("is it a uno with an ATmega328P?"), std::string::npos) << got.err;
+}
+
+TEST_F(FlashTest, WhatIsNoImageIsRefused) {
+  write_file(folder / "image.hex", "\x7f" "ELF and so on");
+  const Outcome got = run_bridge(
+      {"board", "flash", "--board", "uno", "--image", image(), "--dry-run"});
+  EXPECT_EQ(got.status, 2);
+  EXPECT_NE(got.err.find("not an Intel HEX file"), std::string::npos) << got.err;
+}
+
+}  // namespace
+}  // namespace tagwrench::test

@@ -1,0 +1,502 @@
+#include "tests/firmware/avr_core.h"
+
+#include <avr_eeprom.h>
+#include <avr_ioport.h>
+#include <avr_watchdog.h>
+#include <sim_avr.h>
+#include <sim_core.h>
+#include <sim_elf.h>
+#include <sim_interrupts.h>
+#include <sim_io.h>
+
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "tests/firmware/avr_registers.h"
+
+namespace tagwrench::emulator {
+
+namespace {
+
+constexpr std::uint32_t kDataOffset = 0x800000;
+constexpr std::uint32_t kEepromOffset = 0x810000;
+/// Vector entry takes four cycles (datasheet, section 7.7.1); simavr counts none.
+constexpr unsigned kEntryCycles = 4;
+constexpr VirtualTime kEepromWrite = std::chrono::microseconds(3400);
+
+void log_errors(avr_t*, int level, const char* format, va_list arguments) {
+  if (level == LOG_ERROR) std::vfprintf(stderr, format, arguments);
+}
+
+std::uint16_t pin_register(char port) {
+  return static_cast<std::uint16_t>(reg::kPinB + 3 * (port - 'B'));
+}
+
+}  // namespace
+
+// ---- CycleTimer ----
+
+CycleTimer::CycleTimer(AvrCore& core, std::function<void(Cycle)> callback)
+    : core_(core), callback_(std::move(callback)) {
+  core_.timers_.push_back(this);
+}
+
+CycleTimer::~CycleTimer() {
+  cancel();
+  std::erase(core_.timers_, this);
+}
+
+void CycleTimer::at(Cycle due) {
+  due_ = due;
+  arm();
+}
+
+void CycleTimer::cancel() {
+  if (due_ && core_.avr_ != nullptr) avr_cycle_timer_cancel(core_.avr_, &fire, this);
+  due_.reset();
+}
+
+void CycleTimer::arm() {
+  const Cycle now = core_.cycle();
+  avr_cycle_timer_register(core_.avr_, *due_ > now ? *due_ - now : 0, &fire, this);
+}
+
+std::uint64_t CycleTimer::fire(avr_t*, std::uint64_t, void* self) {
+  auto& timer = *static_cast<CycleTimer*>(self);
+  const Cycle due = *timer.due_;
+  timer.due_.reset();
+  timer.callback_(due);
+  return 0;
+}
+
+// ---- Hooks ----
+
+struct AvrCore::Hook {
+  AvrCore* core;
+  std::uint16_t address;
+  avr_io_write_t original;
+  void* original_parameter;
+  Read read;
+  std::vector<Write> after;
+  Write instead;
+
+  static std::uint8_t on_read(avr_t*, avr_io_addr_t, void* self) {
+    auto& hook = *static_cast<Hook*>(self);
+    return hook.core->data(hook.address) = hook.read();
+  }
+  static void on_write(avr_t*, avr_io_addr_t, std::uint8_t value, void* self) {
+    auto& hook = *static_cast<Hook*>(self);
+    if (hook.instead) {
+      hook.instead(value);
+    } else {
+      hook.write_original(value);
+    }
+    for (const Write& write : hook.after) write(value);
+  }
+  void write_original(std::uint8_t value) {
+    if (original != nullptr) {
+      original(core->avr_, address, value, original_parameter);
+    } else {
+      core->data(address) = value;
+    }
+  }
+};
+
+/// First of simavr's modules: it is told of each WDR instruction and each reset.
+struct AvrCore::Spy {
+  avr_io_t io{};  // first member: simavr knows this alone
+  AvrCore* core = nullptr;
+
+  static int on_ioctl(avr_io_t* io, std::uint32_t request, void*) {
+    if (request == AVR_IOCTL_WATCHDOG_RESET) {
+      AvrCore& core = *reinterpret_cast<Spy*>(io)->core;
+      if (core.last_kick_ != 0) core.figures_.loop.add(core.cycle() - core.last_kick_);
+      core.last_kick_ = core.cycle();
+    }
+    return -1;  // the next module may have it
+  }
+  static void on_reset(avr_io_t* io) { reinterpret_cast<Spy*>(io)->core->reset_seen_ = true; }
+};
+
+struct AvrCore::VectorWatch {
+  AvrCore* core;
+  avr_int_vector_t* vector;
+  Cycle raised = 0;
+  bool waiting = false;
+  Cycle entered = 0;
+
+  static void on_pending(avr_irq_t*, std::uint32_t value, void* self) {
+    auto& watch = *static_cast<VectorWatch*>(self);
+    if (value == 0) return;
+    watch.waiting = avr_regbit_get(watch.core->avr_, watch.vector->enable) != 0;
+    watch.raised = watch.core->cycle();
+  }
+  static void on_running(avr_irq_t*, std::uint32_t value, void* self) {
+    auto& watch = *static_cast<VectorWatch*>(self);
+    AvrCore& core = *watch.core;
+    const std::uint8_t number = watch.vector->vector;
+    if (value != 0) {
+      core.avr_->cycle += kEntryCycles;
+      watch.entered = core.cycle();
+      core.figures_.lowest_stack = std::min(core.figures_.lowest_stack, core.word(reg::kSpl));
+      if (watch.waiting) core.figures_.latency[number].add(watch.entered - watch.raised);
+      watch.waiting = false;
+    } else {
+      core.figures_.duration[number].add(core.cycle() - watch.entered);
+      core.figures_.interrupt_cycles += core.cycle() - watch.entered + kEntryCycles;
+      if (core.after_handler_[number]) core.after_handler_[number]();
+    }
+  }
+};
+
+// ---- AvrCore ----
+
+AvrCore::AvrCore(const std::filesystem::path& elf, double clock_ppm)
+    : hz_(kNominalHz * (1 + clock_ppm * 1e-6)) {
+  avr_global_logger_set(&log_errors);
+  avr_ = avr_make_mcu_by_name("atmega328p");
+  if (avr_ == nullptr) throw std::runtime_error("libsimavr does not know the atmega328p");
+  avr_init(avr_);
+  avr_->frequency = static_cast<std::uint32_t>(kNominalHz);
+  avr_->vcc = avr_->avcc = avr_->aref = 5000;
+  avr_->sleep = [](avr_t*, avr_cycle_count_t) {};
+  try {
+    load(elf);
+  } catch (...) {
+    avr_terminate(avr_);
+    std::free(avr_);
+    throw;
+  }
+  spy_ = std::make_unique<Spy>();
+  spy_->core = this;
+  spy_->io.kind = "spy";
+  spy_->io.ioctl = &Spy::on_ioctl;
+  spy_->io.reset = &Spy::on_reset;
+  avr_register_io(avr_, &spy_->io);
+  watch_vectors();
+  watch_flag_registers();
+  watch_eeprom();
+  stop_ = std::make_unique<CycleTimer>(*this, [](Cycle) {});
+  reset(1);
+}
+
+AvrCore::~AvrCore() {
+  stop_.reset();
+  eeprom_timer_.reset();
+  avr_terminate(avr_);
+  std::free(avr_);
+  avr_ = nullptr;
+}
+
+void AvrCore::load(const std::filesystem::path& elf) {
+  elf_firmware_t image{};
+  if (!std::filesystem::is_regular_file(elf) || elf_read_firmware(elf.c_str(), &image) != 0)
+    throw std::runtime_error(elf.string() + ": cannot be read");
+  if (image.flashsize == 0 || image.flashsize > avr_->flashend + 1)
+    throw std::runtime_error(elf.string() + ": not an image of an ATmega328P");
+  avr_load_firmware(avr_, &image);
+  avr_->frequency = static_cast<std::uint32_t>(kNominalHz);
+  sizes_.flash_bytes = image.flashsize;
+  sizes_.ram_end = static_cast<std::uint16_t>(avr_->ramend);
+  for (std::uint32_t i = 0; i < image.symbolcount; ++i) {
+    const std::uint32_t address = image.symbol[i]->addr;
+    if (address < kEepromOffset) symbols_.emplace(image.symbol[i]->symbol, address);
+    std::free(image.symbol[i]);
+  }
+  std::free(image.symbol);
+  std::free(image.flash);
+  std::free(image.eeprom);
+  std::free(image.fuse);
+  if (const auto end = symbol("_end")) sizes_.static_bytes = *end - kDataOffset - reg::kRamBegin;
+  entry_.assign((avr_->flashend + 1) / 2, nullptr);
+  for (std::uint32_t at = 0; at + 1 < image.flashsize && hang_at_ == 0; at += 2) {
+    if (flash(at) == 0xFF && flash(at + 1) == 0xCF) hang_at_ = at;  // rjmp .-2
+  }
+}
+
+Cycle AvrCore::cycle() const { return avr_->cycle; }
+
+VirtualTime AvrCore::time_of(Cycle cycle) const {
+  return VirtualTime(std::llround(static_cast<double>(cycle) * (1e9 / hz_)));
+}
+
+Cycle AvrCore::cycle_at(VirtualTime time) const {
+  const double cycles = std::ceil(static_cast<double>(time.count()) * (hz_ * 1e-9) - 1e-3);
+  return cycles > 0 ? static_cast<Cycle>(cycles) : 0;
+}
+
+void AvrCore::run_until(VirtualTime time) {
+  const Cycle end = cycle_at(time);
+  stop_->at(end);  // a sleeping processor wakes there
+  while (avr_->cycle < end) step();
+  stop_->cancel();
+}
+
+void AvrCore::watch_every_instruction(bool on) {
+  watching_ = on;
+  set_batch();
+}
+
+/// How many cycles simavr may run on without coming back between two timers.
+void AvrCore::set_batch() { avr_->run_cycle_limit = watching_ ? 1 : 1000000; }
+
+void AvrCore::step() {
+  const std::uint32_t pc = avr_->pc;
+  if (watching_ && entry_[pc >> 1] != nullptr) note_call(pc);
+  const int state = avr_run(avr_);
+  if (reset_seen_) finish_reset();
+  if (watching_) note_stack(pc);
+  if (state == cpu_Crashed || state == cpu_Done || state == cpu_Stopped)
+    fail("the program crashed, or sleeps for ever");
+  if (!failure_.empty()) throw std::runtime_error("emulated board: " + failure_);
+}
+
+void AvrCore::note_stack(std::uint32_t pc) {
+  const std::uint16_t stack = word(reg::kSpl);
+  while (!open_calls_.empty() && stack > open_calls_.back().stack) {
+    const Call& call = open_calls_.back();
+    call_counts_[*call.name].add(cycle() - call.begin -
+                                 (figures_.interrupt_cycles - call.interrupts_before));
+    open_calls_.pop_back();
+  }
+  if (stack >= figures_.lowest_stack) return;
+  // Between OUT SPH and OUT SPL the pointer is half old, half new.
+  const unsigned opcode = flash(pc) | flash(pc + 1) << 8;
+  if ((opcode & 0xFE0F) == 0xBE0E) stack_torn_ = true;
+  if ((opcode & 0xFE0F) == 0xBE0D) stack_torn_ = false;
+  if (!stack_torn_ && stack >= reg::kRamBegin) figures_.lowest_stack = stack;
+}
+
+void AvrCore::note_call(std::uint32_t pc) {
+  const std::uint16_t stack = word(reg::kSpl);
+  if (!open_calls_.empty() && open_calls_.back().stack == stack) return;
+  open_calls_.push_back({entry_[pc >> 1], stack, cycle(), figures_.interrupt_cycles});
+}
+
+bool AvrCore::count_calls(const std::string& part) {
+  call_names_.push_back(part);
+  bool found = false;
+  for (const auto& [name, address] : symbols_) {
+    if (name.find(part) == std::string::npos || address >= sizes_.flash_bytes) continue;
+    entry_[address / 2] = &call_names_.back();
+    found = true;
+  }
+  return found;
+}
+
+void AvrCore::reset(std::uint8_t mcusr) {
+  next_mcusr_ = mcusr;
+  avr_reset(avr_);
+  finish_reset();
+}
+
+void AvrCore::finish_reset() {
+  reset_seen_ = false;
+  ++resets_;
+  last_kick_ = 0;
+  set_batch();
+  stack_torn_ = false;
+  open_calls_.clear();
+  if (next_mcusr_) {
+    data(reg::kMcusr) = *next_mcusr_;
+    next_mcusr_.reset();
+  }
+  for (VectorWatch& watch : watches_) watch.waiting = false;
+  for (CycleTimer* timer : timers_) {
+    if (timer->due_) timer->arm();
+  }
+  for (char port = 'B'; port <= 'D'; ++port) {  // the pins are as they were
+    const auto i = static_cast<std::size_t>(port - 'B');
+    data(pin_register(port)) = static_cast<std::uint8_t>(levels_[i] & driven_[i]);
+  }
+  for (const auto& callback : after_reset_) callback();
+}
+
+void AvrCore::hang(bool interrupts_off) {
+  if (hang_at_ == 0) throw std::runtime_error("emulated board: no endless loop in the image");
+  // In the main program, or the handler that is left would never end.
+  while (avr_->interrupts.running_ptr != 0 || avr_->sreg[S_I] == 0) step();
+  avr_->pc = hang_at_;
+  if (interrupts_off) avr_sreg_set(avr_, S_I, 0);
+}
+
+bool AvrCore::hanging() const { return avr_->pc == hang_at_; }
+
+std::uint8_t& AvrCore::data(std::uint16_t address) { return avr_->data[address]; }
+
+std::uint16_t AvrCore::word(std::uint16_t address) {
+  return static_cast<std::uint16_t>(data(address) | data(static_cast<std::uint16_t>(address + 1))
+                                                        << 8);
+}
+
+std::uint8_t AvrCore::flash(std::uint32_t address) const { return avr_->flash[address]; }
+
+AvrCore::Hook& AvrCore::hook(std::uint16_t address) {
+  auto& slot = hooks_[address];
+  if (!slot) {
+    auto& io = avr_->io[AVR_DATA_TO_IO(address)];
+    slot = std::make_unique<Hook>(Hook{this, address, io.w.c, io.w.param, {}, {}, {}});
+    io.w.c = &Hook::on_write;
+    io.w.param = slot.get();
+  }
+  return *slot;
+}
+
+void AvrCore::replace_read(std::uint16_t address, Read read) {
+  Hook& with = hook(address);
+  with.read = std::move(read);
+  avr_->io[AVR_DATA_TO_IO(address)].r.c = &Hook::on_read;
+  avr_->io[AVR_DATA_TO_IO(address)].r.param = &with;
+}
+
+void AvrCore::replace_write(std::uint16_t address, Write write) {
+  hook(address).instead = std::move(write);
+}
+
+void AvrCore::after_write(std::uint16_t address, Write write) {
+  hook(address).after.push_back(std::move(write));
+}
+
+void AvrCore::original_write(std::uint16_t address, std::uint8_t value) {
+  hook(address).write_original(value);
+}
+
+std::uint8_t AvrCore::written_flags(std::uint8_t value) const {
+  const bool sbi = flash(avr_->pc + 1) == 0x9A;
+  return sbi ? static_cast<std::uint8_t>(1U << (flash(avr_->pc) & 7)) : value;
+}
+
+avr_int_vector_t* AvrCore::vector(std::uint8_t number) const { return vectors_.at(number); }
+
+void AvrCore::raise(std::uint8_t number) { avr_raise_interrupt(avr_, vector(number)); }
+
+void AvrCore::clear(std::uint8_t number) {
+  avr_int_vector_t* const which = vector(number);
+  avr_clear_interrupt(avr_, which);
+  if (which->raised.reg != 0) avr_regbit_clear(avr_, which->raised);
+}
+
+bool AvrCore::enabled(std::uint8_t number) const {
+  return avr_regbit_get(avr_, vector(number)->enable) != 0;
+}
+
+bool AvrCore::flag(std::uint8_t number) const {
+  return avr_regbit_get(avr_, vector(number)->raised) != 0;
+}
+
+void AvrCore::after_handler(std::uint8_t number, std::function<void()> callback) {
+  after_handler_[number] = std::move(callback);
+}
+
+void AvrCore::after_reset(std::function<void()> callback) {
+  callback();
+  after_reset_.push_back(std::move(callback));
+}
+
+void AvrCore::watch_vectors() {
+  for (unsigned i = 0; i < avr_->interrupts.vector_count; ++i) {
+    avr_int_vector_t* const which = avr_->interrupts.vector[i];
+    if (which->vector >= reg::kVectors) continue;
+    vectors_[which->vector] = which;
+    watches_.push_back({this, which});
+    avr_irq_register_notify(which->irq + AVR_INT_IRQ_PENDING, &VectorWatch::on_pending,
+                            &watches_.back());
+    avr_irq_register_notify(which->irq + AVR_INT_IRQ_RUNNING, &VectorWatch::on_running,
+                            &watches_.back());
+  }
+}
+
+/// simavr stores what is written to PCIFR instead of clearing flags.
+void AvrCore::watch_flag_registers() {
+  replace_write(reg::kPcifr, [this](std::uint8_t value) {
+    const std::uint8_t flags = written_flags(value);
+    for (unsigned port = 0; port < 3; ++port) {
+      if ((flags >> port & 1) != 0) clear(static_cast<std::uint8_t>(reg::kPcint0 + port));
+    }
+  });
+}
+
+/// simavr finishes a write at once, where silicon is busy for 3.4 ms; and "ready" interrupts as
+/// long as it holds.
+void AvrCore::watch_eeprom() {
+  constexpr std::uint8_t kProgram = 1 << 1;
+  constexpr std::uint8_t kMasterProgram = 1 << 2;
+  const auto update_level = [this] {
+    if (!eeprom_busy_ && enabled(reg::kEepromReady)) raise(reg::kEepromReady);
+  };
+  eeprom_timer_ = std::make_unique<CycleTimer>(*this, [this, update_level](Cycle) {
+    eeprom_busy_ = false;
+    data(reg::kEecr) = static_cast<std::uint8_t>(data(reg::kEecr) & ~kProgram);
+    update_level();
+  });
+  after_handler_[reg::kEepromReady] = update_level;
+  replace_write(reg::kEecr, [this, update_level](std::uint8_t value) {
+    const bool armed = (data(reg::kEecr) & kMasterProgram) != 0;
+    if (eeprom_busy_) value = static_cast<std::uint8_t>(value & ~kProgram);
+    original_write(reg::kEecr, value);
+    if (armed && (value & kProgram) != 0) {
+      eeprom_busy_ = true;
+      clear(reg::kEepromReady);
+      eeprom_timer_->at(cycle() + cycles_of(kEepromWrite));
+    }
+    if (eeprom_busy_) data(reg::kEecr) = static_cast<std::uint8_t>(data(reg::kEecr) | kProgram);
+    update_level();
+  });
+}
+
+void AvrCore::set_external(char port) {
+  const auto i = static_cast<std::size_t>(port - 'B');
+  avr_ioport_external_t external{};
+  external.name = port;
+  external.mask = driven_[i];
+  external.value = static_cast<std::uint8_t>(levels_[i] & driven_[i]);
+  avr_ioctl(avr_, AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &external);
+}
+
+void AvrCore::drive(char port, std::uint8_t bit, bool level) {
+  const auto i = static_cast<std::size_t>(port - 'B');
+  const auto mask = static_cast<std::uint8_t>(1U << bit);
+  driven_[i] = static_cast<std::uint8_t>(driven_[i] | mask);
+  levels_[i] = static_cast<std::uint8_t>(level ? levels_[i] | mask : levels_[i] & ~mask);
+  set_external(port);
+  avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(port), bit), level ? 1 : 0);
+}
+
+void AvrCore::release(char port, std::uint8_t bit) {
+  const auto i = static_cast<std::size_t>(port - 'B');
+  const auto mask = static_cast<std::uint8_t>(1U << bit);
+  driven_[i] = static_cast<std::uint8_t>(driven_[i] & ~mask);
+  set_external(port);
+  const std::uint16_t pin = pin_register(port);
+  const bool pulled_up = (data(static_cast<std::uint16_t>(pin + 2)) & mask) != 0 &&
+                         (data(static_cast<std::uint16_t>(pin + 1)) & mask) == 0;
+  avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(port), bit), pulled_up ? 1 : 0);
+}
+
+std::vector<std::uint8_t> AvrCore::eeprom() const {
+  std::vector<std::uint8_t> bytes(avr_->e2end + 1);
+  avr_eeprom_desc_t all{bytes.data(), 0, static_cast<std::uint32_t>(bytes.size())};
+  avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &all);
+  return bytes;
+}
+
+void AvrCore::set_eeprom(std::uint16_t offset, const std::vector<std::uint8_t>& bytes) {
+  std::vector<std::uint8_t> copy = bytes;
+  avr_eeprom_desc_t part{copy.data(), offset, static_cast<std::uint32_t>(copy.size())};
+  avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &part);
+}
+
+std::optional<std::uint32_t> AvrCore::symbol(const std::string& name) const {
+  const auto found = symbols_.find(name);
+  if (found == symbols_.end()) return std::nullopt;
+  return found->second;
+}
+
+void AvrCore::fail(std::string reason) {
+  if (failure_.empty()) failure_ = std::move(reason);
+}
+
+}  // namespace tagwrench::emulator

@@ -1,0 +1,61 @@
+"""The board on a real USB serial driver: found by its stable path and by its USB identity, refused to an ordinary user,
+pulled out in the middle of a stream and plugged in again. Its image runs on the emulated board outside of the guest."""
+import glob
+import json
+import os
+import shutil
+
+import rig
+
+USER = "1500"
+IDENTITY = "usb:0403:6001"
+
+
+def touch(path):
+    with open(path, "w", encoding="utf-8"):
+        pass
+
+
+def cells(lines):
+    return [sample for sample in map(json.loads, lines) if sample["kind"] == "cell"]
+
+
+def body(setup):
+    rig.load("xhci-pci", "ftdi_sio", "uhid", "hid-generic", "evdev")
+    rig.start_udevd(setup.project + "/host/output/70-tagwrench.rules")
+    ports = rig.wait_until(lambda: glob.glob("/dev/serial/by-id/*"))
+    rig.check("the serial driver and udev make a stable path", ports, os.listdir("/dev"))
+    port = ports[0]
+
+    status, out, err = rig.run(setup.tagwrench, "board", "info", "--port", port, patience=60)
+    rig.check("board info prints the board's identity", status == 0 and "atmega328p" in out, out + err)
+    status, out, err = rig.run(setup.tagwrench, "board", "info", "--port", IDENTITY, patience=60)
+    rig.check("it is found by its USB identity", status == 0 and "atmega328p" in out, out + err)
+    status, out, err = rig.run(setup.tagwrench, "board", "info", patience=60)
+    rig.check("the only port needs no name", status == 0 and "atmega328p" in out, out + err)
+    shutil.copy(setup.tagwrench, "/run/tagwrench")  # the project may lie where only its owner can go
+    status, _, err = rig.run(*rig.as_user(USER), "/run/tagwrench", "board", "info", "--port", port, patience=60,
+                             env={"HOME": "/tmp", "PATH": os.environ["PATH"]})
+    rig.check("without permission one line names the group",
+              status == 2 and "dialout" in err and err.count("\n") == 1, err)
+
+    watch = rig.Program("watch", [setup.tagwrench, "board", "watch", "--port", port, "--json"])
+    watch.wait_line("{", patience=60)
+    second, _, err = rig.run(setup.tagwrench, "board", "info", "--port", port, patience=60)
+    rig.check("a second host is told that the port is taken", second == 2 and err.count("\n") == 1, err)
+    touch("/run/rig/usb-unplug")
+    rig.check("an unplugged board is said to be gone", watch.wait_error("unplugged"), watch.state())
+    rig.check("and its device node goes", rig.wait_until(lambda: not os.path.exists(port)), port)
+    seen = len(watch.out)
+    touch("/run/rig/usb-plug")
+    watch.wait_line("{", since=seen, patience=60)
+    rig.check("plugged in again it goes on by itself", watch.running(), watch.state())
+    rig.wait_until(lambda: len({s["channel"] for s in cells(watch.out[seen:])}) == 4)
+    channels = sorted({sample["channel"] for sample in cells(watch.out[seen:])})
+    rig.check("with all four load cells", channels == [0, 1, 2, 3], channels)
+    times = [sample["t_ns"] for sample in cells(watch.out) if sample["channel"] == 0]
+    rig.check("time stamps go on growing", all(a < b for a, b in zip(times, times[1:])), times[:5])
+    rig.check("Ctrl-C ends it with status 0", watch.stop(rig.signal.SIGINT) == 0, watch.state())
+
+
+rig.main(body)
