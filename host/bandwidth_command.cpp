@@ -9,6 +9,8 @@
 
 #include "host/bandwidth_measurement.h"
 #include "host/bandwidth_report.h"
+#include "host/board_loop.h"
+#include "host/board_pattern_lamp.h"
 #include "host/config/scenario_config.h"
 #include "host/config/sensor_edit.h"
 #include "host/config_error.h"
@@ -31,6 +33,7 @@ constexpr int kFailed = 1;
 
 /// A camera and the lamp before it.
 struct Bench {
+  std::unique_ptr<BoardLoop> board;  ///< of the lamp; nothing for the simulator's
   Input input;
   std::unique_ptr<PatternLamp> lamp;
   std::string lamp_description;
@@ -57,6 +60,34 @@ Bench simulated_bench(const std::string& sensor, const std::string& source, bool
   bench.input.source = std::move(camera);
   bench.lamp = std::move(lamp);
   bench.lamp_description = "simulated, on the camera's own clock";
+  return bench;
+}
+
+/// A board's LED before a camera. No lamp: a signal came.
+Bench board_bench(const std::string& sensor, const std::string& source, const std::string& port,
+                  bool fast) {
+  if (fast) throw ConfigError("--fast: a board has its own time; leave it out, or use --port sim");
+  if (split_spec(source).kind != "v4l2") {
+    throw ConfigError(fmt::format(
+        "--port {}: a board lights cameras; use --source v4l2:/dev/videoN with it, or --port sim "
+        "for the simulated sensor",
+        port));
+  }
+  Bench bench;
+  bench.board = std::make_unique<BoardLoop>(port, link::new_session());
+  tell("waiting for the board's clock to be known");
+  if (!bench.board->settle()) return bench;
+  bench.input = open_input({sensor, source, false});
+  link::BoardLink& link = bench.board->link();
+  bench.lamp = std::make_unique<BoardPatternLamp>(
+      link.session(),
+      [&link] {
+        link.send();
+        link.service();
+      },
+      link.poll_fd());
+  bench.lamp_description =
+      fmt::format("LED of board {} at {}", bench.board->session().hello().board, link.port());
   return bench;
 }
 
@@ -128,10 +159,9 @@ BandwidthCommand::BandwidthCommand(CLI::App& app)
 int BandwidthCommand::run() const {
   if (!json_.empty() && json_ != "-") check_replaceable(json_);
   const UniqueFd stop = signals_as_fd();
-  if (port_ != "sim") {
-    throw ConfigError(fmt::format("--port {}: only the simulated lamp (sim) is there", port_));
-  }
-  Bench bench = simulated_bench(sensor_, source_, fast_);
+  Bench bench = port_ == "sim" ? simulated_bench(sensor_, source_, fast_)
+                               : board_bench(sensor_, source_, port_, fast_);
+  if (!bench.lamp) return kFailed;
   check_size(bench.input);
   tell("source: " + bench.input.source->format().description);
   Processing processing(bench.input.sensor);

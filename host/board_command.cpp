@@ -31,24 +31,18 @@ BoardCommand::BoardCommand(CLI::App& app)
       tare_(add("tare", "take what the load cells show now as zero")),
       calibrate_cell_(add("calibrate-cell", "a load cell in newtons, from known masses")),
       flash_(add("flash", "put the firmware on an Arduino, by avrdude")),
-      log_(add("log", "all samples to a CSV file")) {
+      log_(add("log", "all samples to a CSV file")),
+      optoforce_(verb_->add_subcommand(
+          "optoforce", "an OptoForce force-torque sensor on a serial port, live")) {
   verb_->require_subcommand(1);
 
   info_->add_flag("--json", options_.json, "as one JSON object");
 
   add_samples(watch_);
-  watch_->add_flag("--json", options_.json, "one line of JSON per sample, event or fault");
-  watch_->add_option("--every", options_.line_period, "seconds between lines without --json")
-      ->check(number(0.01, 3600, "a number of seconds"));
-  watch_->add_option("--optoforce", options_.optoforce,
-                     "port of an OptoForce force-torque sensor, shown beside the load cells");
-  watch_
-      ->add_option("--counts-per-unit", options_.counts_per_unit,
-                   "of that sensor, from its data sheet: counts per N of Fx,Fy,Fz, and per N m of "
-                   "Tx,Ty,Tz where it has them")
-      ->delimiter(',');
+  add_lines(watch_, "one line of JSON per sample, event or fault");
 
   add_samples(log_);
+  add_seconds(log_);
   log_->add_option("--out", options_.out, "CSV file; - is standard output")->required();
 
   led_->add_option("light", options_.light, kLight)->required()->expected(1, 4);
@@ -78,6 +72,35 @@ BoardCommand::BoardCommand(CLI::App& app)
       ->check(CLI::IsMember({"nano", "nano-old", "uno"}));
   flash_->add_option("--image", options_.image, "Intel HEX file; without it the one built here");
   flash_->add_flag("--dry-run", options_.dry_run, "print what would be run, and do nothing");
+
+  add_optoforce();
+}
+
+void BoardCommand::add_optoforce() {
+  optoforce_->add_option("--port", options_.port, "its serial port")->required();
+  optoforce_
+      ->add_option("--counts-per-unit", options_.counts_per_unit,
+                   "from its data sheet: counts per N of Fx,Fy,Fz, then per N m of Tx,Ty,Tz where it "
+                   "has them")
+      ->required()
+      ->delimiter(',');
+  optoforce_->add_option("--rate", options_.force_rate, "Hz: 1000, 333, 100, 30 or 10");
+  optoforce_->add_option("--filter", options_.force_filter,
+                         "Hz: 500, 150, 50, 15, 5, 1.5 or 0 for none");
+  optoforce_->add_flag("--zero", options_.force_zero, "what it shows now is zero");
+  add_lines(optoforce_, "one line of JSON per sample");
+}
+
+void BoardCommand::add_lines(CLI::App* verb, const char* json) {
+  verb->add_flag("--json", options_.json, json);
+  verb->add_option("--every", options_.line_period, "seconds between lines without --json")
+      ->check(number(0.01, 3600, "a number of seconds"));
+  add_seconds(verb);
+}
+
+void BoardCommand::add_seconds(CLI::App* verb) {
+  verb->add_option("--seconds", options_.seconds, "end after S seconds")
+      ->check(number(1e-3, 1e9, "a number of seconds"));
 }
 
 CLI::App* BoardCommand::add(const char* name, const char* what) {
@@ -101,8 +124,6 @@ void BoardCommand::add_samples(CLI::App* verb) {
   add_cells_file(verb);
   verb->add_option("--adc", options_.adc_rate, "samples per second of the analogue inputs")
       ->check(CLI::Range(1, 200));
-  verb->add_option("--seconds", options_.seconds, "end after S seconds")
-      ->check(number(1e-3, 1e9, "a number of seconds"));
 }
 
 int BoardCommand::run() const {
@@ -112,6 +133,7 @@ int BoardCommand::run() const {
   if (led_->parsed()) return board_led(options_);
   if (tare_->parsed()) return board_tare(options_);
   if (calibrate_cell_->parsed()) return board_calibrate_cell(options_);
+  if (optoforce_->parsed()) return board_optoforce(options_);
   return board_flash(options_);
 }
 

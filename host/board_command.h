@@ -20,6 +20,9 @@ class BoardCommand {
   CLI::App* add(const char* name, const char* what);
   void add_samples(CLI::App* verb);
   void add_cells_file(CLI::App* verb);
+  void add_optoforce();
+  void add_lines(CLI::App* verb, const char* json);
+  void add_seconds(CLI::App* verb);
 
   CLI::App* verb_;
   CLI::App* info_;
@@ -29,6 +32,7 @@ class BoardCommand {
   CLI::App* calibrate_cell_;
   CLI::App* flash_;
   CLI::App* log_;
+  CLI::App* optoforce_;
   BoardOptions options_;
 };
 

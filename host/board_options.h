@@ -19,8 +19,10 @@ struct BoardOptions {
   std::optional<double> seconds;     ///< then end
   double line_period = 0.25;         ///< s between the lines that `watch` prints for people
 
-  std::string optoforce;             ///< port of an OptoForce sensor to be shown as well
-  std::vector<double> counts_per_unit;  ///< of its axes: counts per N, then per N m
+  std::vector<double> counts_per_unit;  ///< of an OptoForce sensor: per N, then per N m
+  int force_rate = 100;              ///< of that sensor, Hz
+  double force_filter = 15;          ///< Hz
+  bool force_zero = false;           ///< what it shows now is zero
 
   std::vector<std::string> light;    ///< words of `led`
   int channel = 0;
@@ -37,6 +39,7 @@ struct BoardOptions {
 int board_info(const BoardOptions& options);
 int board_watch(const BoardOptions& options);
 int board_log(const BoardOptions& options);
+int board_optoforce(const BoardOptions& options);
 int board_led(const BoardOptions& options);
 int board_tare(const BoardOptions& options);
 int board_calibrate_cell(const BoardOptions& options);

@@ -64,7 +64,7 @@ std::string_view BoardOutput::service() noexcept {
   try {
     for (link::News news; link_.next(news);) {
       if (!said_.empty()) said_ += "; ";
-      said_ += "board: " + link::text(news);
+      said_ += link::text(news);
     }
   } catch (const std::exception&) {
     said_.clear();  // out of memory: unsaid

@@ -18,6 +18,7 @@
 #include <optional>
 #include <ostream>
 
+#include "host/link/serial_places.h"
 #include "host/os/unique_fd.h"
 #include "host/source/v4l2_nodes.h"
 
@@ -111,6 +112,25 @@ void say_cameras(Report& report) {
         Mark::absent,
         "no camera that can be used: plug one in, or use --source sim (the simulated sensor)");
   }
+}
+
+/// Opening a port would reset the board behind it, so it is only asked whether one may.
+void say_serial_ports(Report& report) {
+  const std::vector<std::string> ports = link::stable_ports();
+  for (const std::string& port : ports) {
+    if (::access(port.c_str(), R_OK | W_OK) == 0) {
+      const std::string holder = link::holder_of(port);
+      report.line(Mark::ok, fmt::format("serial port {}{}; `tagwrench board info` asks who it is",
+                                        port, holder.empty() ? "" : ", in use by " + holder));
+    } else {
+      report.line(Mark::missing,
+                  fmt::format("serial port {}: no permission; sudo usermod -aG {} $USER, then log "
+                              "in again",
+                              port, link::group_of(port)));
+    }
+  }
+  if (ports.empty())
+    report.line(Mark::absent, "no USB serial port: no board for light and load cells");
 }
 
 /// Whether a virtual device can be made through this node.
@@ -252,6 +272,7 @@ int run_doctor(std::ostream& out) {
   say_machine(report);
   say_groups(report);
   say_cameras(report);
+  say_serial_ports(report);
   const bool uhid =
       say_device_node(report, "/dev/uhid", "uhid", "the outputs spacemouse and wrench");
   const bool uinput = say_device_node(report, "/dev/uinput", "uinput", "the output joystick");

@@ -11,14 +11,9 @@
 #include <filesystem>
 #include <memory>
 
-#include "host/board_lamp.h"
-#include "host/board_loop.h"
-#include "host/board_output.h"
 #include "host/config/sensor_config.h"
 #include "host/config_error.h"
 #include "host/input.h"
-#include "host/light_settle.h"
-#include "host/link/cell_file.h"
 #include "host/output/csv.h"
 #include "host/output/joystick.h"
 #include "host/output/jsonl.h"
@@ -26,6 +21,7 @@
 #include "host/output/terminal.h"
 #include "host/output/wrench_hid.h"
 #include "host/pipeline.h"
+#include "host/run_board.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/tell.h"
 
@@ -175,47 +171,6 @@ void check_outputs(const std::vector<Spec>& specs, bool with_board) {
   }
 }
 
-/// The board of a run: connected, its light settled, its load cells' calibration known.
-class RunBoard {
- public:
-  /// Throws ConfigError if there is no board of ours, or its load cells' file cannot be used.
-  explicit RunBoard(const BoardOptions& options)
-      : rate_(options.cell_rate), loop_(options.port, session_options(options)) {
-    connected_ = loop_.settle();
-    if (!connected_) return;
-    const std::string path = cells_path(options, loop_.session());
-    if (!path.empty())
-      cells_ = link::load_cells(path, link::id_text(loop_.session().hello().unique_id));
-  }
-
-  RunBoard(const RunBoard&) = delete;
-  RunBoard& operator=(const RunBoard&) = delete;
-  ~RunBoard() { BoardLamp(loop_.link()).set_level(0); }
-
-  /// False if a signal ended the waiting.
-  bool connected() const { return connected_; }
-
-  /// False if a signal came, or the source ended.
-  bool settle(Input& input, const UniqueFd& stop) {
-    BoardLamp lamp(loop_.link());
-    Acquirer finder(input.sensor.camera, input.sensor.target);
-    const LightReport report =
-        settle_light(*input.source, finder, input.sensor.camera.mirrored, lamp, stop);
-    if (!report.stopped) tell(light_text(report));
-    return !report.stopped;
-  }
-
-  std::unique_ptr<Output> output(const std::string& path) {
-    return std::make_unique<BoardOutput>(loop_.link(), cells_, rate_, path);
-  }
-
- private:
-  double rate_;  ///< conversions/s
-  BoardLoop loop_;
-  link::CellCalibrations cells_{};
-  bool connected_ = false;
-};
-
 std::vector<Spec> output_specs(const RunOptions& options) {
   std::vector<Spec> specs;
   for (const std::string& text : options.outputs) specs.push_back(split_spec(text));
@@ -295,7 +250,7 @@ int run(const RunOptions& options) {
     board_options.port = options.board == "auto" ? "" : options.board;
     board_options.cells_file = options.cells;
     board = std::make_unique<RunBoard>(board_options);
-    if (!board->connected() || !board->settle(input, stop)) return 0;
+    if (!board->connected() || !board->settle_light(input, stop)) return 0;
   }
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
   const WrenchEstimator wrench(input.sensor.wrench);

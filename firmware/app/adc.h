@@ -13,6 +13,7 @@ class Adc {
   void poll(Link& link) {
     board::Measurement measured;
     if (!board::adc_take(measured)) return;
+    link.count_dropped(measured.lost);
     uint16_t& sequence = sequence_[measured.channel];
     sequence = static_cast<uint16_t>(sequence + measured.lost);
     link.send(link::AdcSample{measured.channel, measured.counts, measured.time_us, sequence});

@@ -37,6 +37,8 @@ class Link {
   void answer_time();
 
   uint16_t damaged_frames() const { return reader_.damaged_frames(); }
+  /// Reports that were never made, because what they are of was gone when there was room.
+  void count_dropped(uint8_t reports) { dropped_ = static_cast<uint16_t>(dropped_ + reports); }
   uint16_t dropped_reports() const { return dropped_; }
 
  private:

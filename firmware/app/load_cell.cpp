@@ -72,17 +72,16 @@ void LoadCells::take(const board::Conversion& conversion, Link& link, Faults& fa
     cell.state = State::running;
     return;
   }
+  link.count_dropped(conversion.lost);
   cell.sequence = static_cast<uint16_t>(cell.sequence + conversion.lost);
   cell.missed = static_cast<uint16_t>(cell.missed + conversion.lost);
   cell.rate_count = static_cast<uint16_t>(cell.rate_count + conversion.lost);
   measure_rate(cell, conversion.time_us);
   add(cell.tare, conversion.counts);
   const bool saturated = conversion.counts >= kMostCounts || conversion.counts <= kLeastCounts;
-  const bool sent =
-      link.send(link::CellSample{conversion.channel, conversion.counts, conversion.time_us,
-                                 cell.sequence, cell.missed, saturated});
+  link.send(link::CellSample{conversion.channel, conversion.counts, conversion.time_us,
+                             cell.sequence, cell.missed, saturated});
   ++cell.sequence;
-  if (!sent) ++cell.missed;
 }
 
 bool LoadCells::send_tare(Link& link) {

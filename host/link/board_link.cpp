@@ -61,7 +61,10 @@ BoardLink::BoardLink(const std::string& port, const BoardSessionOptions& options
   arm(clock_now());
 }
 
-void BoardLink::watch_serial() noexcept { watch(epoll_.get(), serial_.fd()); }
+void BoardLink::watch_serial() noexcept {
+  mark_.set(path_.c_str());
+  watch(epoll_.get(), serial_.fd());
+}
 
 void BoardLink::service() noexcept {
   std::uint64_t expirations = 0;
@@ -110,7 +113,7 @@ void BoardLink::try_again(TimePoint now) noexcept {
   } catch (...) {
     return;  // out of memory: at the next try
   }
-  if (serial_.open(path_.c_str(), baud_)) return;
+  if (!mark_.may_reopen(path_.c_str()) || serial_.open(path_.c_str(), baud_)) return;
   watch_serial();
   session_.reconnect();
   news_.push({News::Kind::plugged, 0, 0});

@@ -55,6 +55,7 @@ class BoardLink {
   std::optional<UsbIdentity> identity_;
   unsigned baud_;
   SerialPort serial_;
+  TerminalMark mark_;
   BoardSession session_;
   UniqueFd epoll_;
   UniqueFd timer_;

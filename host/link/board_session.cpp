@@ -68,10 +68,7 @@ std::uint8_t BoardSession::put(const Message& message) noexcept {
 std::size_t BoardSession::poll(TimePoint now, std::uint8_t* out) noexcept {
   out_ = out;
   out_bytes_ = 0;
-  if (state_ >= BoardState::configuring && now - last_frame_ > kSilence) {
-    state_ = BoardState::waiting;
-    next_hello_ = now;
-  }
+  if (state_ >= BoardState::configuring && now - last_frame_ > kSilence) greet_again(now);
   if (state_ == BoardState::waiting || state_ == BoardState::other_version) {
     if (now >= next_hello_) {
       put(HelloRequest{kProtocolMajor, kProtocolMinor, options_.session});

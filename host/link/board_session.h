@@ -166,6 +166,7 @@ class BoardSession {
   void take_fault(const Fault& fault, TimePoint arrival) noexcept;
   void watch_frame_sequence(std::uint8_t sequence) noexcept;
   void restart_streams() noexcept;
+  void greet_again(TimePoint now) noexcept;
   void tell(News::Kind kind, std::uint32_t value = 0, std::uint32_t other = 0) noexcept;
   HostTime host_time(std::uint32_t board_us, TimePoint arrival) const noexcept;
   static std::uint16_t lost_between(SequenceWatch& watch, std::uint16_t sequence) noexcept;
@@ -219,6 +220,7 @@ class BoardSession {
   std::array<SentRequest, 8> requests_;
   std::size_t next_request_ = 0;
   HalfExchange half_;
+  unsigned misfits_ = 0;  ///< exchanges in a row that the clock rejected
 
   Ring<CellReading, 1024> cells_;
   Ring<AdcReading, 1024> adc_;

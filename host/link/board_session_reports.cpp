@@ -12,6 +12,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr Duration kMostTimeError = seconds(2);  ///< between a stamp and its arrival
+constexpr unsigned kMisfitsOfARestart = 4;  ///< in a row: its clock may have started anew
 constexpr unsigned kQuickRequests = 20;  ///< at the start, for the clock to converge soon
 
 /// The board's words are a stranger's bytes: no control codes to a terminal.
@@ -99,10 +100,7 @@ void BoardSession::watch_frame_sequence(std::uint8_t sequence) noexcept {
 void BoardSession::take_hello(const Hello& hello, TimePoint arrival) noexcept {
   if (hello.session != options_.session) {
     // It started anew, or answers another host: ask whom it listens to.
-    if (state_ == BoardState::ready || state_ == BoardState::configuring) {
-      state_ = BoardState::waiting;
-      next_hello_ = arrival;
-    }
+    if (state_ >= BoardState::configuring) greet_again(arrival);
     return;
   }
   const bool restarted = has_hello_ && hello.boot_id != boot_id_;
@@ -194,8 +192,13 @@ void BoardSession::take_status(const Status& status, TimePoint arrival) noexcept
     other_host_told_ = true;
     tell(News::Kind::other_host, status.session);
   }
+  greet_again(arrival);
+}
+
+/// Its answer's boot id says whether it started anew.
+void BoardSession::greet_again(TimePoint now) noexcept {
   state_ = BoardState::waiting;
-  next_hello_ = arrival;
+  next_hello_ = now;
 }
 
 void BoardSession::take_tare(const TareResult& result) noexcept { tares_.push(result); }
@@ -205,7 +208,11 @@ void BoardSession::take_time_reply(const TimeReply& reply, TimePoint arrival,
   if (half_.waiting && reply.previous_valid &&
       reply.previous_request_sequence == half_.request_sequence) {
     half_.exchange.board_sent_us = reply.previous_sent_us;
-    clock_.add(half_.exchange);
+    misfits_ = clock_.add(half_.exchange) ? 0 : misfits_ + 1;
+    if (misfits_ == kMisfitsOfARestart && state_ >= BoardState::configuring) {
+      misfits_ = 0;
+      greet_again(arrival);
+    }
   }
   half_.waiting = false;
   for (SentRequest& request : requests_) {

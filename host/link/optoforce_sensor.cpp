@@ -45,6 +45,7 @@ OptoforceSensor::OptoforceSensor(const OptoforceOptions& options)
 }
 
 void OptoforceSensor::begin(TimePoint now) noexcept {
+  mark_.set(options_.port.c_str());
   parser_.reset();
   clock_.restart();
   serial_.write(command_);
@@ -57,7 +58,8 @@ void OptoforceSensor::service() noexcept {
   if (!serial_) {
     if (now < next_try_) return;
     next_try_ = now + kRetryPeriod;
-    if (!serial_.open(options_.port.c_str(), options_.baud)) begin(now);
+    const char* path = options_.port.c_str();
+    if (mark_.may_reopen(path) && !serial_.open(path, options_.baud)) begin(now);
     return;
   }
   std::array<std::uint8_t, 4096> room;

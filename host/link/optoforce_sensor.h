@@ -58,6 +58,7 @@ class OptoforceSensor {
   std::array<std::uint8_t, 9> command_;
   std::array<double, OptoforceFrame::kMostAxes> scale_{};  ///< N or N m per count; 0: not told
   SerialPort serial_;
+  TerminalMark mark_;
   OptoforceParser parser_;
   CounterClock clock_;
   TimePoint flushed_until_{};

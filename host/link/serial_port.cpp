@@ -2,10 +2,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/major.h>
 #include <linux/serial.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 
 #include <array>
@@ -127,6 +129,30 @@ bool SerialPort::write(std::span<const std::uint8_t> bytes) noexcept {
 
 void SerialPort::flush_input() noexcept {
   if (fd_) tcflush(fd_.get(), TCIFLUSH);
+}
+
+bool TerminalMark::look(const char* path, TerminalMark& mark) noexcept {
+  struct stat about {};
+  if (::lstat(path, &about) != 0) return false;
+  const bool link = S_ISLNK(about.st_mode);
+  mark.link_inode_ = link ? about.st_ino : 0;
+  mark.link_time_ns_ =
+      link ? std::int64_t{about.st_mtim.tv_sec} * 1'000'000'000 + about.st_mtim.tv_nsec : 0;
+  return true;
+}
+
+void TerminalMark::set(const char* path) noexcept { look(path, *this); }
+
+bool TerminalMark::may_reopen(const char* path) const noexcept {
+  struct stat about {};
+  TerminalMark now;
+  if (::stat(path, &about) != 0 || !look(path, now)) return false;
+  const unsigned number = major(about.st_rdev);
+  const bool pseudo = number >= UNIX98_PTY_SLAVE_MAJOR &&
+                      number < UNIX98_PTY_SLAVE_MAJOR + UNIX98_PTY_MAJOR_COUNT;
+  if (!pseudo) return true;
+  return now.link_inode_ != 0 &&
+         (now.link_inode_ != link_inode_ || now.link_time_ns_ != link_time_ns_);
 }
 
 std::string text(const SerialFailure& failure, const std::string& path, unsigned baud) {

@@ -54,6 +54,22 @@ class SerialPort {
   std::uint64_t dropped_ = 0;
 };
 
+/// The number of a pseudo-terminal that was closed is given to whoever opens one next, a shell say.
+/// This remembers which one a path stood for, so that only another one is opened again.
+class TerminalMark {
+ public:
+  /// Of a path that was just opened.
+  void set(const char* path) noexcept;
+  /// False for a pseudo-terminal, if the path is not a link that was made anew.
+  bool may_reopen(const char* path) const noexcept;
+
+ private:
+  static bool look(const char* path, TerminalMark& mark) noexcept;
+
+  std::uint64_t link_inode_ = 0;  ///< 0: no link
+  std::int64_t link_time_ns_ = 0;
+};
+
 /// One line: what, where, remedy.
 std::string text(const SerialFailure& failure, const std::string& path, unsigned baud);
 

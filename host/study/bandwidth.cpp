@@ -7,15 +7,17 @@
 #include <set>
 
 #include "host/study/bandwidth_fit.h"
+#include "host/study/global_shutter.h"
 
 namespace tagwrench {
 namespace {
 
 constexpr double kBitsPerFrame = 15.382;  // no fraction of small numbers comes near
 constexpr int kFewestTimed = 8;
-constexpr double kTellsTime = 0.25;  // of a bit
-constexpr double kClear = 9;         // difference of costs: three standard deviations
-constexpr double kGoodShutter = 3;   // standard deviations
+constexpr double kTellsTime = 0.25;      // of a bit
+constexpr double kClear = 9;             // difference of costs: three standard deviations
+constexpr double kGoodShutter = 3;       // standard deviations
+constexpr double kGlobalReadout = 0.05;  // of a bit: what a read-out of 0 may be
 
 std::string unusable(const BandwidthInput& input) {
   const auto frames = static_cast<int>(input.frames.size());
@@ -135,6 +137,35 @@ void fit_latency(const BandwidthInput& input, const BandwidthFit& fit, Bandwidth
   result.latency_most = delays.back();
 }
 
+void count_frames(const BandwidthInput& input, BandwidthResult& result);
+
+/// Pictures of a global shutter tell their times only together.
+void measure_global_shutter(const BandwidthInput& input, BandwidthFit& fit,
+                            BandwidthResult& result) {
+  GlobalShutter start;
+  start.latency.value = fit.camera().latency;
+  start.jitter.value = fit.camera().jitter;
+  start.exposure.value = fit.camera().exposure;
+  const GlobalShutter found = fit_global_shutter(input, fit.light(), start);
+  fit.set_camera({found.latency.value, found.jitter.value, 0, found.exposure.value});
+  copy_times(input, fit, result);
+  for (std::size_t i = 0; i < result.times.size(); ++i) {
+    TimedFrame& frame = result.times[i];
+    if (frame.freshness == Freshness::stale) continue;
+    frame.exposed = found.times[i];
+    frame.sigma = found.sigmas[i];
+    frame.timed = frame.freshness != Freshness::strange && frame.sigma < kTellsTime * input.bit;
+  }
+  fit_rate(input, result);
+  fit_latency(input, fit, result);
+  count_frames(input, result);
+  result.latency = found.latency;
+  result.latency.sigma = std::hypot(found.latency.sigma, input.edge_sigma);
+  result.jitter = found.jitter;
+  result.exposure = found.exposure;
+  result.readout = {0, kGlobalReadout * input.bit, true};
+}
+
 void count_frames(const BandwidthInput& input, BandwidthResult& result) {
   result.frames = static_cast<int>(result.times.size());
   std::set<std::int64_t> seen;
@@ -174,6 +205,10 @@ BandwidthResult measure_bandwidth(const BandwidthInput& input) {
     return result;
   }
   fit.refine();
+  if (!fit.rolls()) {
+    measure_global_shutter(input, fit, result);
+    return result;
+  }
   copy_times(input, fit, result);
   fit_rate(input, result);
   fit_latency(input, fit, result);

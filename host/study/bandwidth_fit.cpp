@@ -109,6 +109,20 @@ void BandwidthFit::refine() {
   fit_delay();
 }
 
+bool BandwidthFit::rolls() const noexcept {
+  constexpr double kLeastPart = 0.1;  // of a bit: less tells no more than a global shutter
+  return std::abs(camera_.readout) > kLeastPart * input_.bit;
+}
+
+void BandwidthFit::set_camera(const CameraTimes& camera) {
+  camera_ = camera;
+  for (std::size_t i = 0; i < pictures_.size(); ++i) search(i);
+  fit_bands();
+  for (std::size_t i = 0; i < pictures_.size(); ++i) search(i);
+  judge();
+  find_repeats();
+}
+
 /// Pictures that fit no time do not take part.
 void BandwidthFit::judge() noexcept {
   std::vector<double> costs;

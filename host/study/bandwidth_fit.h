@@ -37,6 +37,12 @@ class BandwidthFit {
   bool find();
   /// From there to the best fit.
   void refine();
+  /// Whether rows are exposed one after the other, so that pictures tell their times.
+  bool rolls() const noexcept;
+  /// Takes what is alike in all pictures from elsewhere, and their times from that.
+  void set_camera(const CameraTimes& camera);
+
+  const LightSignal& light() const noexcept { return light_; }
 
   const CameraTimes& camera() const noexcept { return camera_; }
   const std::vector<Picture>& pictures() const noexcept { return pictures_; }

@@ -8,6 +8,7 @@
 
 #include "bridge.h"
 #include "served_board.h"
+#include "tests/unit/link/optoforce_frames.h"
 
 namespace tagwrench::test {
 namespace {
@@ -96,7 +97,7 @@ TEST_F(BoardCliTest, WatchForPeopleShowsNewtonsCountsAndWhatIsNotWired) {
   write_file(folder / "three.json", cells);
   Bridge bridge({"board", "watch", "--every", "0.05", "--port", board.path(), "--cells",
                  (folder / "three.json").string()});
-  ASSERT_TRUE(bridge.wait_for_lines(10));
+  ASSERT_TRUE(bridge.wait_for_lines(10)) << bridge.err();
   bridge.signal(SIGTERM);
   const Outcome got = bridge.finish();
   EXPECT_EQ(got.status, 0);
@@ -186,7 +187,7 @@ TEST_F(BoardCliTest, CalibrateCellMakesNewtonsThatWatchShows) {
   EXPECT_NE(got.out.find("board-0102030405060708.json"), std::string::npos) << got.out;
 
   Bridge watch({"board", "watch", "--json", "--port", board.path()});
-  ASSERT_TRUE(watch.wait_for_lines(20));
+  ASSERT_TRUE(watch.wait_for_lines(20)) << watch.err();
   watch.signal(SIGINT);
   for (const std::string& text : lines_of(watch.finish().out)) {
     const json line = json::parse(text);
@@ -243,7 +244,7 @@ TEST_F(BoardCliTest, AnotherVersionSaysWhichSideToUpdate) {
 TEST_F(BoardCliTest, ASecondHostIsToldWhoHasThePort) {
   ServedBoard board;
   Bridge first({"board", "watch", "--json", "--port", board.path()});
-  ASSERT_TRUE(first.wait_for_lines(5));
+  ASSERT_TRUE(first.wait_for_lines(5)) << first.err();
   const Outcome second = run_bridge({"board", "info", "--port", board.path()});
   EXPECT_EQ(second.status, 2);
   EXPECT_NE(second.err.find("in use by tagwrench (process "), std::string::npos) << second.err;
@@ -256,6 +257,27 @@ TEST_F(BoardCliTest, WhatIsNoBoardIsSaid) {
   const Outcome got = run_bridge({"board", "info", "--port", silent.path()});
   EXPECT_EQ(got.status, 2);
   EXPECT_NE(got.err.find("nothing answers"), std::string::npos) << got.err;
+}
+
+TEST_F(BoardCliTest, AnOptoforceSensorIsShownInNewtons) {
+  link::Pty device;
+  Bridge bridge({"board", "optoforce", "--json", "--port", device.path(), "--counts-per-unit",
+                 "100,100,20,5000,5000,8000"});
+  ASSERT_TRUE(link::readable(device.fd(), 20'000)) << "it is configured";
+  std::uint16_t counter = 0;
+  while (!bridge.has_lines(20)) {
+    device.write(link::optoforce_frame(counter++, 1 << 9, {150, 0, 0, 0, 0, 0}));
+    ::poll(nullptr, 0, 10);  // the sensor's own pace
+  }
+  bridge.signal(SIGINT);
+  const Outcome got = bridge.finish();
+  EXPECT_EQ(got.status, 0) << got.err;
+  const json line = json::parse(lines_of(got.out)[5]);
+  EXPECT_DOUBLE_EQ(line["values"][0].get<double>(), 1.5);
+  EXPECT_EQ(line["trouble"], "overload Fx");
+  EXPECT_EQ(run_bridge({"board", "optoforce", "--port", device.path(), "--counts-per-unit", "1,2"})
+                .status,
+            2);
 }
 
 class FlashTest : public BoardCliTest {

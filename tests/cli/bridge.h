@@ -33,14 +33,15 @@ class Bridge {
  public:
   /// `input` is the path of its standard input.
   explicit Bridge(const std::vector<std::string>& arguments,
-                  const std::string& input = "/dev/null") {
+                  const std::string& input = "/dev/null",
+                  const std::string& program = TAGWRENCH_PROGRAM) {
     int out[2];
     int err[2];
     if (::pipe2(out, O_CLOEXEC) != 0 || ::pipe2(err, O_CLOEXEC) != 0)
       throw std::runtime_error("pipe");
     out_.reset(out[0]);
     err_.reset(err[0]);
-    std::vector<std::string> all(1, TAGWRENCH_PROGRAM);
+    std::vector<std::string> all(1, program);
     all.insert(all.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv;
     for (std::string& a : all) argv.push_back(a.data());
@@ -51,11 +52,11 @@ class Bridge {
     posix_spawn_file_actions_adddup2(&actions, out[1], 1);
     posix_spawn_file_actions_adddup2(&actions, err[1], 2);
     const int failed =
-        ::posix_spawn(&pid_, TAGWRENCH_PROGRAM, &actions, nullptr, argv.data(), environ);
+        ::posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     ::close(out[1]);
     ::close(err[1]);
-    if (failed != 0) throw std::runtime_error("cannot start " TAGWRENCH_PROGRAM);
+    if (failed != 0) throw std::runtime_error("cannot start " + program);
   }
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
@@ -73,13 +74,20 @@ class Bridge {
     }
     return true;
   }
-  /// The same for a text on standard error.
+  /// Takes what is there, and says whether standard output holds `count` lines. Does not wait.
+  bool has_lines(std::ptrdiff_t count) {
+    pollfd waiting{out_.get(), POLLIN, 0};
+    while (out_ && ::poll(&waiting, 1, 0) > 0) take(out_, outcome_.out);
+    return std::count(outcome_.out.begin(), outcome_.out.end(), '\n') >= count;
+  }
+  /// wait_for_lines() for a text on standard error.
   bool wait_for_message(const std::string& text) {
     while (outcome_.err.find(text) == std::string::npos) {
       if (!pump()) return false;
     }
     return true;
   }
+  const std::string& err() const { return outcome_.err; }
   void close_stdout() { out_.reset(); }
   void close_stderr() { err_.reset(); }
   void signal(int number) { ::kill(pid_, number); }

@@ -1,6 +1,7 @@
 #include "tests/firmware/avr_core.h"
 
 #include <avr_eeprom.h>
+#include <avr_extint.h>
 #include <avr_ioport.h>
 #include <avr_watchdog.h>
 #include <sim_avr.h>
@@ -109,14 +110,16 @@ struct AvrCore::Hook {
 struct AvrCore::Spy {
   avr_io_t io{};  // first member: simavr knows this alone
   AvrCore* core = nullptr;
+  avr_io_t* watchdog = nullptr;
 
-  static int on_ioctl(avr_io_t* io, std::uint32_t request, void*) {
-    if (request == AVR_IOCTL_WATCHDOG_RESET) {
-      AvrCore& core = *reinterpret_cast<Spy*>(io)->core;
-      if (core.last_kick_ != 0) core.figures_.loop.add(core.cycle() - core.last_kick_);
-      core.last_kick_ = core.cycle();
-    }
-    return -1;  // the next module may have it
+  static int on_ioctl(avr_io_t* io, std::uint32_t request, void* parameter) {
+    if (request != AVR_IOCTL_WATCHDOG_RESET) return -1;  // the next module may have it
+    const Spy& spy = *reinterpret_cast<Spy*>(io);
+    AvrCore& core = *spy.core;
+    if (core.last_kick_ != 0) core.figures_.loop.add(core.cycle() - core.last_kick_);
+    core.last_kick_ = core.cycle();
+    // Directly: asking each module in turn would take much of the emulator's time.
+    return spy.watchdog->ioctl(spy.watchdog, request, parameter);
   }
   static void on_reset(avr_io_t* io) { reinterpret_cast<Spy*>(io)->core->reset_seen_ = true; }
 };
@@ -173,6 +176,9 @@ AvrCore::AvrCore(const std::filesystem::path& elf, double clock_ppm)
   spy_ = std::make_unique<Spy>();
   spy_->core = this;
   spy_->io.kind = "spy";
+  for (avr_io_t* io = avr_->io_port; io != nullptr; io = io->next) {
+    if (std::string_view(io->kind) == "watchdog") spy_->watchdog = io;
+  }
   spy_->io.ioctl = &Spy::on_ioctl;
   spy_->io.reset = &Spy::on_reset;
   avr_register_io(avr_, &spy_->io);
@@ -304,6 +310,8 @@ void AvrCore::finish_reset() {
     data(reg::kMcusr) = *next_mcusr_;
     next_mcusr_.reset();
   }
+  // It would look at INT0 and INT1 every cycle, which nobody uses.
+  for (const std::uint8_t number : {0, 1}) avr_extint_set_strict_lvl_trig(avr_, number, 0);
   for (VectorWatch& watch : watches_) watch.waiting = false;
   for (CycleTimer* timer : timers_) {
     if (timer->due_) timer->arm();

@@ -31,10 +31,15 @@ EmulatedBoard::EmulatedBoard(const std::filesystem::path& elf, const BoardOption
   }
   timer1_.on_output([this](Cycle when) { pins_changed(when); });
   timer1_.on_compare_b([this](Cycle when) { adc_.trigger(when); });
-  for (const std::uint16_t address :
-       {reg::kPortB, reg::kDdrB, reg::kPinB, reg::kPortD, reg::kDdrD, reg::kPinD}) {
-    core_.after_write(address, [this](std::uint8_t) { pins_changed(core_.cycle()); });
+  for (const std::uint16_t address : {reg::kPortB, reg::kDdrB, reg::kPortD, reg::kDdrD}) {
+    core_.replace_write(address, [this, address](std::uint8_t value) {
+      if (core_.data(address) == value) return;
+      core_.original_write(address, value);
+      pins_changed(core_.cycle());
+    });
   }
+  for (const std::uint16_t address : {reg::kPinB, reg::kPinD})
+    core_.after_write(address, [this](std::uint8_t) { pins_changed(core_.cycle()); });
   // Timer 2 makes the LED's level alone; its edges are not simulated one by one.
   for (const std::uint16_t address :
        {reg::kTccr2a, reg::kTccr2b, reg::kOcr2a, reg::kOcr2b, reg::kTcnt2}) {
@@ -119,7 +124,8 @@ void EmulatedBoard::move_button(unsigned button, bool pressed, VirtualTime at, u
   auto& moves = contacts_.at(button);
   moves.push_back({at, pressed});
   std::vector<VirtualTime> times;
-  std::uniform_int_distribution<std::int64_t> when(1000, bounce_time.count());
+  // Shorter contacts than an interrupt takes to look are seen by nobody.
+  std::uniform_int_distribution<std::int64_t> when(100000, bounce_time.count());
   for (unsigned i = 0; i < 2 * bounces; ++i) times.push_back(at + VirtualTime(when(random_)));
   std::sort(times.begin(), times.end());
   for (unsigned i = 0; i < times.size(); ++i)

@@ -57,9 +57,7 @@ TEST_F(LedTest, IsOffFromResetUntilCommanded) {
 TEST_F(LedTest, ShinesAtTheLevelThatIsAsked) {
   for (const std::uint16_t permille : {1, 4, 50, 137, 300, 0}) {
     ASSERT_EQ(client.ask(steady(permille)), link::Result::ok);
-    EXPECT_NEAR(1000 * board.led().level(), permille, permille == 0 ? 0 : 4.0) << "permille";
-    EXPECT_LE(1000 * board.led().level(), std::max(permille + 0.5, 4.0))
-        << "one step of 256 is 3.9 permille";
+    EXPECT_NEAR(1000 * board.led().level(), permille, permille == 0 ? 0 : 2.5) << "permille";
   }
   EXPECT_EQ(board.led().level(), 0) << "exactly dark, without the PWM's spike";
 }

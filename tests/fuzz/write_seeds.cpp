@@ -1,5 +1,5 @@
 // write_seeds DIR: one example of every message kind as first inputs of the fuzzers, in DIR/frames,
-// DIR/messages and DIR/streams.
+// DIR/messages, DIR/streams and DIR/board.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -34,6 +34,7 @@ int main(int argc, char** argv) try {
   const std::filesystem::path dir = argv[1];
   Bytes requests;
   Bytes reports;
+  Bytes board{0, 0, 0, 1};
   std::uint8_t sequence = 0;
   Examples{}.each([&](Kind kind, const char* name, const auto& message) {
     const Bytes body = body_of(message, sequence++);
@@ -42,9 +43,14 @@ int main(int argc, char** argv) try {
     write(dir / "messages" / name, kind_and_message);
     write(dir / "frames" / name, frame_of(body));
     append(static_cast<std::uint8_t>(kind) < 0x80 ? requests : reports, frame_of(body));
+    // board_app.cpp's steps: a good frame, some time, and a conversion of channel 0.
+    board.insert(board.end(), {1, static_cast<std::uint8_t>(body.size() - kHeaderBytes)});
+    append(board, body);
+    board.insert(board.end(), {3, 1, 4, 0, 0, 1, 2, 3, 0, 1, 2, 100});
   });
   write(dir / "streams" / "requests", requests);
   write(dir / "streams" / "reports", reports);
+  write(dir / "board" / "requests", board);
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "write_seeds: " << error.what() << '\n';

@@ -27,8 +27,8 @@ struct FakeBoard {
   std::vector<std::uint8_t> sent;
   std::uint8_t room = 255;  ///< what serial_room() says
   std::uint16_t overruns = 0;
-  bool stamped = false;  ///< stamped bytes were sent,
-  bool departed = true;  ///< and have begun to leave,
+  bool stamped = false;            ///< stamped bytes were sent,
+  bool departed = true;            ///< and have begun to leave,
   std::uint32_t departure_us = 0;  ///< at this time
 
   bool pulses = false;

@@ -95,6 +95,20 @@ TEST_F(BoardLinkTest, UnpluggedAndPluggedInAgainItGoesOnByItself) {
   EXPECT_EQ(link.session().counters().restarts, 3u);
 }
 
+TEST_F(BoardLinkTest, ATerminalThatGotTheSameNumberIsLeftAlone) {
+  BoardLink link(port, new_session());
+  ASSERT_TRUE(serve(link, [&] { return link.session().state() == BoardState::ready; }));
+  const std::string number = device.path();
+  device.unplug();  // the link stays, as after a crash
+  device.open();
+  ASSERT_EQ(device.path(), number);
+  const double end = now() + 1.2;
+  serve(link, [&] { return now() > end; });
+  EXPECT_FALSE(link.plugged()) << "it belongs to somebody else now";
+  plug();
+  EXPECT_TRUE(serve(link, [&] { return link.plugged(); }));
+}
+
 TEST_F(BoardLinkTest, NothingThatAnswersIsSaid) {
   BoardLink link(port, new_session());
   const double end = now() + 0.3;

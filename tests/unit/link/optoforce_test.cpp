@@ -10,27 +10,10 @@
 #include <vector>
 
 #include "host/config_error.h"
+#include "optoforce_frames.h"
 
 namespace tagwrench::link {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
-
-void append16(Bytes& out, unsigned value) {
-  out.push_back(static_cast<std::uint8_t>(value >> 8));
-  out.push_back(static_cast<std::uint8_t>(value));
-}
-
-Bytes frame(std::uint16_t counter, std::uint16_t status, const std::vector<std::int16_t>& counts) {
-  Bytes out{0xAA, 0x07, 0x08, static_cast<std::uint8_t>(4 + 2 * counts.size())};
-  append16(out, counter);
-  append16(out, status);
-  for (const std::int16_t value : counts) append16(out, static_cast<std::uint16_t>(value));
-  unsigned sum = 0;
-  for (const std::uint8_t byte : out) sum += byte;
-  append16(out, sum & 0xFFFF);
-  return out;
-}
 
 std::vector<OptoforceFrame> parse(OptoforceParser& parser, const Bytes& bytes) {
   std::vector<OptoforceFrame> out;
@@ -40,7 +23,7 @@ std::vector<OptoforceFrame> parse(OptoforceParser& parser, const Bytes& bytes) {
 
 TEST(OptoforceTest, SixAxisFrameOf22BytesIsRead) {
   OptoforceParser parser;
-  const Bytes bytes = frame(513, 0, {100, -200, 300, -1, 32767, -32768});
+  const Bytes bytes = optoforce_frame(513, 0, {100, -200, 300, -1, 32767, -32768});
   ASSERT_EQ(bytes.size(), 22u);
   EXPECT_EQ(bytes[3], 0x10);
   const auto frames = parse(parser, bytes);
@@ -54,9 +37,9 @@ TEST(OptoforceTest, SixAxisFrameOf22BytesIsRead) {
 
 TEST(OptoforceTest, ThreeAxisAndFourSensorFramesAreRead) {
   OptoforceParser parser;
-  EXPECT_EQ(frame(1, 0, {1, 2, 3}).size(), 16u);
-  EXPECT_EQ(parse(parser, frame(1, 0, {1, 2, 3}))[0].axes, 3);
-  const Bytes four = frame(2, 0, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12});
+  EXPECT_EQ(optoforce_frame(1, 0, {1, 2, 3}).size(), 16u);
+  EXPECT_EQ(parse(parser, optoforce_frame(1, 0, {1, 2, 3}))[0].axes, 3);
+  const Bytes four = optoforce_frame(2, 0, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12});
   EXPECT_EQ(four.size(), 34u);
   const auto frames = parse(parser, four);
   ASSERT_EQ(frames.size(), 1u);
@@ -65,14 +48,14 @@ TEST(OptoforceTest, ThreeAxisAndFourSensorFramesAreRead) {
 }
 
 TEST(OptoforceTest, AnyFlippedBitIsSeenAndTheNextFrameIsRead) {
-  const Bytes good = frame(7, 0, {10, 20, 30, 40, 50, 60});
+  const Bytes good = optoforce_frame(7, 0, {10, 20, 30, 40, 50, 60});
   for (std::size_t bit = 0; bit < good.size() * 8; ++bit) {
-    Bytes bytes = frame(6, 0, {1, 1, 1, 1, 1, 1});
+    Bytes bytes = optoforce_frame(6, 0, {1, 1, 1, 1, 1, 1});
     Bytes hit = good;
     hit[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
     bytes.insert(bytes.end(), hit.begin(), hit.end());
     for (std::uint16_t after = 8; after < 11; ++after) {  // a hit size byte may swallow one more
-      const Bytes next = frame(after, 0, {2, 2, 2, 2, 2, 2});
+      const Bytes next = optoforce_frame(after, 0, {2, 2, 2, 2, 2, 2});
       bytes.insert(bytes.end(), next.begin(), next.end());
     }
     OptoforceParser parser;
@@ -85,7 +68,7 @@ TEST(OptoforceTest, AnyFlippedBitIsSeenAndTheNextFrameIsRead) {
 }
 
 TEST(OptoforceTest, AFrameCutOrStuffedAtAnyByteCostsItselfAlone) {
-  const Bytes good = frame(7, 0, {10, 20, 30, 40, 50, 60});
+  const Bytes good = optoforce_frame(7, 0, {10, 20, 30, 40, 50, 60});
   for (std::size_t at = 0; at < good.size(); ++at) {
     for (const bool cut : {true, false}) {
       Bytes hit = good;
@@ -95,10 +78,10 @@ TEST(OptoforceTest, AFrameCutOrStuffedAtAnyByteCostsItselfAlone) {
       } else {
         hit.insert(place, 0xAA);
       }
-      Bytes bytes = frame(6, 0, {1, 1, 1, 1, 1, 1});
+      Bytes bytes = optoforce_frame(6, 0, {1, 1, 1, 1, 1, 1});
       bytes.insert(bytes.end(), hit.begin(), hit.end());
       for (std::uint16_t after = 8; after < 11; ++after) {
-        const Bytes next = frame(after, 0, {2, 2, 2, 2, 2, 2});
+        const Bytes next = optoforce_frame(after, 0, {2, 2, 2, 2, 2, 2});
         bytes.insert(bytes.end(), next.begin(), next.end());
       }
       OptoforceParser parser;
@@ -117,17 +100,17 @@ TEST(OptoforceTest, NoiseNeverStopsTheParser) {
   OptoforceParser parser;
   parse(parser, noise);
   parse(parser, Bytes(40, 0));
-  const auto frames = parse(parser, frame(99, 0, {1, 2, 3}));
+  const auto frames = parse(parser, optoforce_frame(99, 0, {1, 2, 3}));
   ASSERT_EQ(frames.size(), 1u);
   EXPECT_EQ(frames[0].counter, 99);
 }
 
 TEST(OptoforceTest, CounterGapsAreLostFramesAcrossItsWrap) {
   OptoforceParser parser;
-  parse(parser, frame(65534, 0, {0, 0, 0}));
-  parse(parser, frame(65535, 0, {0, 0, 0}));
-  EXPECT_EQ(parse(parser, frame(0, 0, {0, 0, 0}))[0].lost_before, 0);
-  EXPECT_EQ(parse(parser, frame(5, 0, {0, 0, 0}))[0].lost_before, 4);
+  parse(parser, optoforce_frame(65534, 0, {0, 0, 0}));
+  parse(parser, optoforce_frame(65535, 0, {0, 0, 0}));
+  EXPECT_EQ(parse(parser, optoforce_frame(0, 0, {0, 0, 0}))[0].lost_before, 0);
+  EXPECT_EQ(parse(parser, optoforce_frame(5, 0, {0, 0, 0}))[0].lost_before, 4);
   EXPECT_EQ(parser.counters().lost_frames, 4u);
   EXPECT_EQ(parser.counters().interruptions, 0u) << "no byte was foreign";
 }
@@ -156,10 +139,10 @@ TEST(OptoforceTest, ConfigurationCommandIsThePublishedOne) {
 
 TEST(OptoforceTest, AReplyIsNoInterruption) {
   OptoforceParser parser;
-  Bytes bytes = frame(1, 0, {0, 0, 0});
+  Bytes bytes = optoforce_frame(1, 0, {0, 0, 0});
   const Bytes reply{0xAA, 0x00, 0x50, 0x01, 0x02, 0x00, 0xFD};
   bytes.insert(bytes.end(), reply.begin(), reply.end());
-  const Bytes next = frame(2, 0, {0, 0, 0});
+  const Bytes next = optoforce_frame(2, 0, {0, 0, 0});
   bytes.insert(bytes.end(), next.begin(), next.end());
   EXPECT_EQ(parse(parser, bytes).size(), 2u);
   EXPECT_EQ(parser.counters().replies, 1u);

@@ -128,6 +128,19 @@ TEST(Codec, HandDecodersReadAndRefuseWhatNanopbDoes) {
   EXPECT_EQ(types, 6);
 }
 
+TEST(Codec, OfAFieldThatIsThereTwiceTheLastCounts) {
+  SetId set_id;
+  ASSERT_TRUE(decode_bytes({0x0A, 0x03, 1, 2, 3, 0x0A, 0x01, 9}, set_id));
+  const SetId last{{.bytes = {9}, .count = 1}};
+  EXPECT_TRUE(same(set_id, last));
+}
+
+TEST(Codec, AMessageIsReadToItsEnd) {
+  TimeRequest request;
+  EXPECT_TRUE(decode_bytes({0x08, 0x01, 0x10, 0x01}, request));
+  EXPECT_FALSE(decode_bytes({0x08, 0x01, 0x10}, request));
+}
+
 TEST(Codec, HandDecodersReadListsThatAreNotPacked) {
   Configure configure;
   ASSERT_TRUE(decode_bytes({0x10, 0x01, 0x12, 0x02, 0x02, 0x03, 0x10, 0x01}, configure));

@@ -1,0 +1,24 @@
+// A global shutter's picture has one brightness, which fits many times: nothing but all pictures
+// together, and their stamps, tell latency, jitter and exposure.
+#pragma once
+
+#include <vector>
+
+#include "host/study/bandwidth.h"
+#include "host/study/light_signal.h"
+
+namespace tagwrench {
+
+struct GlobalShutter {
+  Figure latency, jitter, exposure;  ///< s; less the uncertainty of the clocks
+  std::vector<double> times;         ///< per picture, middle of the exposure, host clock, s
+  std::vector<double> sigmas;        ///< s, of stamp and picture together
+};
+
+/// Greatest likelihood, each picture's time integrated out: its delay normal about the latency, its
+/// brightness that of the light at that time, but for a few outliers (stale ones). `start` is where
+/// to look: latency to half a bit, jitter and exposure to a factor of two.
+GlobalShutter fit_global_shutter(const BandwidthInput& input, const LightSignal& light,
+                                 const GlobalShutter& start);
+
+}  // namespace tagwrench
