@@ -17,6 +17,8 @@
 #include "host/input.h"
 #include "host/output/dead_man.h"
 #include "host/output/wrench_hid.h"
+#include "host/screen_measurement.h"
+#include "host/screen_window.h"
 #include "host/simulated_lamp.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
@@ -30,6 +32,8 @@ namespace {
 
 constexpr int kDone = 0;
 constexpr int kFailed = 1;
+constexpr double kShortest = 3;  // s: enough pictures at 25 Hz
+constexpr double kLongest = 20;  // s: a bare LED stays cool enough
 
 /// A camera and the lamp before it.
 struct Bench {
@@ -91,6 +95,15 @@ Bench board_bench(const std::string& sensor, const std::string& source, const st
   return bench;
 }
 
+void check_report_file(const std::string& file) {
+  try {
+    check_replaceable(file);
+  } catch (const ConfigError&) {
+    throw ConfigError(
+        fmt::format("--json {}: cannot be written; name a file in a folder of yours", file));
+  }
+}
+
 /// What a run does with a frame, to a HID device where one may be made.
 class Processing {
  public:
@@ -101,7 +114,7 @@ class Processing {
     try {
       device_ = std::make_unique<WrenchHidOutput>(WrenchHidOptions{});
     } catch (const ConfigError& e) {
-      tell(fmt::format("measured without HID device: {}", e.what()));
+      tell(fmt::format("measured up to the wrench, without HID device: {}", e.what()));
     }
   }
   void take(Frame& frame) noexcept {
@@ -116,9 +129,7 @@ class Processing {
     if (device_) device_->send(sample);
   }
   int held() const { return held_; }
-  const char* output() const {
-    return device_ ? "the HID report" : "the wrench (no HID device may be made here)";
-  }
+  const char* output() const { return device_ ? "HID report" : "wrench"; }
 
  private:
   Tracker tracker_;
@@ -136,20 +147,30 @@ BandwidthCommand::BandwidthCommand(CLI::App& app)
           "measure the camera with the LED: true frame rate, latency, jitter, read-out, stale and "
           "missing frames")) {
   verb_->footer(
-      "The board's LED lights the picture: steadily for 3 s, not at all for 1 s, then in a "
-      "pattern.\n"
-      "Hands off, lens where it belongs, and little light from elsewhere. Without camera and "
-      "board:\n"
+      "With a board, its LED lights the picture: steadily for 3 s, not at all for 1 s, then in a\n"
+      "pattern. Hands off, and little light from elsewhere. Without a board, --screen shows a "
+      "window\n"
+      "that flips between black and white, for the camera to look at; that tells frame rate and\n"
+      "latency alone, the screen's own latency included. Without either:\n"
       "  tagwrench bandwidth --source sim:tests/sim/scenarios/bandwidth.yaml --port sim --fast");
   verb_->add_option("--source", source_, "the camera: v4l2:/dev/videoN, sim or sim:SCENARIO.yaml")
       ->required();
-  verb_
-      ->add_option("--port", port_,
-                   "the board: its serial port, usb:VENDOR:PRODUCT, or sim for the simulated lamp")
-      ->required();
+  auto* port = verb_->add_option(
+      "--port", port_,
+      "the board: its serial port, usb:VENDOR:PRODUCT, or sim for the simulated lamp");
+  verb_->add_flag("--screen", screen_, "a window instead of a board's LED")->excludes(port);
   verb_->add_option("--sensor", sensor_, "sensor.yaml of this sensor");
   verb_->add_option("--seconds", seconds_, "length of the pattern")
-      ->check(CLI::Range(3.0, 20.0))
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            double seconds = 0;  // not CLI::Range, which lets "nan" through
+            const bool usable = CLI::detail::lexical_cast(text, seconds) && seconds >= kShortest &&
+                                seconds <= kLongest;
+            return usable ? std::string()
+                          : fmt::format("'{}' is not a number of seconds from {:g} to {:g}", text,
+                                        kShortest, kLongest);
+          },
+          "SECONDS"))
       ->capture_default_str();
   verb_->add_option("--json", json_,
                     "write the report as JSON to this file too; - is standard output");
@@ -157,7 +178,53 @@ BandwidthCommand::BandwidthCommand(CLI::App& app)
 }
 
 int BandwidthCommand::run() const {
-  if (!json_.empty() && json_ != "-") check_replaceable(json_);
+  if (!screen_ && port_.empty())
+    throw ConfigError(
+        "bandwidth: needs a light: --port PORT for a board's LED, --port sim or --screen");
+  if (!json_.empty() && json_ != "-") check_report_file(json_);
+  return screen_ ? run_with_screen() : run_with_lamp();
+}
+
+void BandwidthCommand::print(const std::string& text, const std::string& json) const {
+  fmt::print("{}", json_ == "-" ? json : text);
+  if (!json_.empty() && json_ != "-") write_atomically(json_, json);
+}
+
+int BandwidthCommand::run_with_screen() const {
+  const UniqueFd stop = signals_as_fd();
+  Bench bench;
+  std::unique_ptr<ScreenWindow> window;
+  FlipPatch* patch = nullptr;
+  std::string screen = "simulated, without latency";
+  if (split_spec(source_).kind == "sim") {
+    bench = simulated_bench(sensor_, source_, fast_);
+    patch = dynamic_cast<FlipPatch*>(bench.lamp.get());
+  } else {
+    if (fast_) throw ConfigError("--fast: a camera has its own time; leave it out");
+    window = std::make_unique<ScreenWindow>();
+    screen = window->description();
+    patch = window.get();
+    bench.input = open_input({sensor_, source_, false});
+  }
+  FrameSource& source = *bench.input.source;
+  tell("source: " + source.format().description);
+  tell("point the camera at the flipping patch, so that it fills the picture");
+  ScreenOptions options;
+  options.seconds = seconds_;
+  options.stopped = [&] { return signalled(stop); };
+  options.stop_fd = stop.get();
+  const ScreenMeasurement measured = measure_screen(source, *patch, options);
+  if (!measured.refusal.empty()) {
+    tell("bandwidth: " + measured.refusal);
+    return kFailed;
+  }
+  const double period = std::chrono::duration<double>(source.format().period).count();
+  print(report_text(measured, source.format().description, screen, period),
+        report_json(measured, source.format().description, screen, period));
+  return kDone;
+}
+
+int BandwidthCommand::run_with_lamp() const {
   const UniqueFd stop = signals_as_fd();
   Bench bench = port_ == "sim" ? simulated_bench(sensor_, source_, fast_)
                                : board_bench(sensor_, source_, port_, fast_);
@@ -185,13 +252,7 @@ int BandwidthCommand::run() const {
   const BandwidthSetting setting{
       bench.input.source->format().description, bench.lamp_description, processing.output(),
       std::chrono::duration<double>(bench.input.source->format().period).count()};
-  const std::string json = report_json(measured, setting);
-  if (json_ == "-") {
-    fmt::print("{}", json);
-  } else {
-    fmt::print("{}", report_text(measured, setting));
-    if (!json_.empty()) write_atomically(json_, json);
-  }
+  print(report_text(measured, setting), report_json(measured, setting));
   return kDone;
 }
 

@@ -16,12 +16,17 @@ class BandwidthCommand {
   int run() const;
 
  private:
+  int run_with_screen() const;
+  int run_with_lamp() const;
+  void print(const std::string& text, const std::string& json) const;
+
   CLI::App* verb_;
   std::string source_;
   std::string port_;
   std::string sensor_;
   std::string json_;
   double seconds_ = 10;
+  bool screen_ = false;
   bool fast_ = false;
 };
 

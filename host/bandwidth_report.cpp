@@ -62,8 +62,8 @@ class Lines {
 void add_latency(const BandwidthMeasurement& m, Lines& lines) {
   const BandwidthResult& r = m.result;
   lines.add("latency", milliseconds(r.latency),
-            "mean, from the middle of the middle row's exposure to the kernel's time stamp");
-  if (r.latency.known) {
+            "mean, from the middle of the exposure to the kernel's time stamp");
+  if (r.latency.known && r.timed > 0) {
     lines.add("", fmt::format("{:.1f} to {:.1f} ms", 1e3 * r.latency_least, 1e3 * r.latency_most),
               fmt::format("median {:.1f}, 95 % within {:.1f}", 1e3 * r.latency_median,
                           1e3 * r.latency_95));
@@ -106,7 +106,8 @@ std::string report_text(const BandwidthMeasurement& m, const BandwidthSetting& s
   add_processing(m, setting, lines);
   lines.add("stale frames", percent(r.stale, r.frames),
             r.undecided > 0
-                ? fmt::format("that show the picture before them; {} more may be", r.undecided)
+                ? fmt::format("that show the picture before them; of {} more it cannot be told",
+                              r.undecided)
                 : "that show the picture before them");
   lines.add("missing", fmt::format("{} pictures", r.missing),
             fmt::format("by the light; the driver told of {}, stale frames took the place of {}",
@@ -120,10 +121,12 @@ std::string report_text(const BandwidthMeasurement& m, const BandwidthSetting& s
     lines.add("", fmt::format("exposure {:.1f} ms", 1e-3 * m.exposure_set_us),
               "set for this measurement, or the LED had made the picture white");
   }
-  lines.add("clock", fmt::format("+/- {:.3f} ms", 1e3 * m.edge_sigma),
-            fmt::format("of the lamp's edges on this computer's clock; bits of {:.3f} ms, {} of {} "
-                        "pictures timed",
-                        1e3 * m.bit, r.timed, r.frames));
+  lines.add(
+      "clock",
+      m.edge_sigma > 0 ? fmt::format("+/- {:.3f} ms", 1e3 * m.edge_sigma) : std::string("the same"),
+      "of the lamp's edges on this computer's clock");
+  lines.add("pattern", fmt::format("bits of {:.3f} ms", 1e3 * m.bit),
+            fmt::format("{} of {} pictures tell when they were taken", r.timed, r.frames));
   return lines.take();
 }
 

@@ -120,10 +120,11 @@ int board_calibrate_cell(const BoardOptions& options) {
   std::vector<link::CellPoint> points;
   double variance = 0;
   for (const double mass : options.masses_kg) {
-    tell(mass == 0 ? fmt::format("take everything off load cell {}, let it come to rest, press Enter",
-                                 options.channel)
-                   : fmt::format("put {:g} kg on load cell {}, let it come to rest, press Enter",
-                                 mass, options.channel));
+    tell(mass == 0
+             ? fmt::format("take everything off load cell {}, let it come to rest, press Enter",
+                           options.channel)
+             : fmt::format("put {:g} kg on load cell {}, let it come to rest, press Enter", mass,
+                           options.channel));
     const Key key = wait_for_key(loop);
     if (key == Key::stopped) {
       tell("stopped; nothing was changed");
@@ -144,8 +145,8 @@ int board_calibrate_cell(const BoardOptions& options) {
           "a smaller mass, a smaller gain (--input a64), or check its wires",
           options.channel, mass));
     }
-    tell(fmt::format("{:g} kg: {:.1f} counts, each +- {:.1f}", mass, mean->mean,
-                     mean->deviation()));
+    tell(
+        fmt::format("{:g} kg: {:.1f} counts, each +- {:.1f}", mass, mean->mean, mean->deviation()));
     points.push_back({mass, mean->mean, mean->deviation() / std::sqrt(mean->count)});
     variance += mean->deviation() * mean->deviation();
   }

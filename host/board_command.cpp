@@ -9,10 +9,10 @@ CLI::Validator number(double least, double most, const char* what) {
             double value = 0;
             const bool usable =
                 CLI::detail::lexical_cast(text, value) && value >= least && value <= most;
-            return usable ? std::string()
-                          : "'" + text + "' is not " + what + " from " +
-                                CLI::detail::to_string(least) + " to " +
-                                CLI::detail::to_string(most);
+            return usable
+                       ? std::string()
+                       : "'" + text + "' is not " + what + " from " +
+                             CLI::detail::to_string(least) + " to " + CLI::detail::to_string(most);
           },
           "NUMBER"};
 }
@@ -32,8 +32,8 @@ BoardCommand::BoardCommand(CLI::App& app)
       calibrate_cell_(add("calibrate-cell", "a load cell in newtons, from known masses")),
       flash_(add("flash", "put the firmware on an Arduino, by avrdude")),
       log_(add("log", "all samples to a CSV file")),
-      optoforce_(verb_->add_subcommand(
-          "optoforce", "an OptoForce force-torque sensor on a serial port, live")) {
+      optoforce_(verb_->add_subcommand("optoforce",
+                                       "an OptoForce force-torque sensor on a serial port, live")) {
   verb_->require_subcommand(1);
 
   info_->add_flag("--json", options_.json, "as one JSON object");
@@ -56,9 +56,10 @@ BoardCommand::BoardCommand(CLI::App& app)
       ->required()
       ->check(CLI::Range(0, static_cast<int>(link::kMostChannels) - 1));
   calibrate_cell_
-      ->add_option("--mass", options_.masses_kg,
-                   "known masses in kg, two or more, in the order in which they will be put on; for "
-                   "example 0,0.5")
+      ->add_option(
+          "--mass", options_.masses_kg,
+          "known masses in kg, two or more, in the order in which they will be put on; for "
+          "example 0,0.5")
       ->required()
       ->delimiter(',')
       ->check(number(-1000, 1000, "a mass in kg"));
@@ -79,9 +80,10 @@ BoardCommand::BoardCommand(CLI::App& app)
 void BoardCommand::add_optoforce() {
   optoforce_->add_option("--port", options_.port, "its serial port")->required();
   optoforce_
-      ->add_option("--counts-per-unit", options_.counts_per_unit,
-                   "from its data sheet: counts per N of Fx,Fy,Fz, then per N m of Tx,Ty,Tz where it "
-                   "has them")
+      ->add_option(
+          "--counts-per-unit", options_.counts_per_unit,
+          "from its data sheet: counts per N of Fx,Fy,Fz, then per N m of Tx,Ty,Tz where it "
+          "has them")
       ->required()
       ->delimiter(',');
   optoforce_->add_option("--rate", options_.force_rate, "Hz: 1000, 333, 100, 30 or 10");

@@ -35,9 +35,9 @@ std::string find_image() {
   for (const fs::path& folder : {above / "firmware", above / "share" / "tagwrench"}) {
     if (fs::exists(folder / kImageName, error)) return (folder / kImageName).string();
   }
-  throw ConfigError(fmt::format(
-      "board flash: {} was not built here; run `./run firmware`, or give --image FILE",
-      kImageName));
+  throw ConfigError(
+      fmt::format("board flash: {} was not built here; run `./run firmware`, or give --image FILE",
+                  kImageName));
 }
 
 void check_image(const std::string& path) {
@@ -46,11 +46,12 @@ void check_image(const std::string& path) {
     throw ConfigError(fmt::format("{}: there is no such file; give --image FILE.hex", path));
   std::ifstream in(path);
   std::string line;
-  if (fs::file_size(path, error) > kMostImageBytes || !std::getline(in, line) ||
-      line.size() < 11 || line[0] != ':')
-    throw ConfigError(fmt::format("{}: not an Intel HEX file of an ATmega328P; give --image "
-                                  "FILE.hex",
-                                  path));
+  if (fs::file_size(path, error) > kMostImageBytes || !std::getline(in, line) || line.size() < 11 ||
+      line[0] != ':')
+    throw ConfigError(
+        fmt::format("{}: not an Intel HEX file of an ATmega328P; give --image "
+                    "FILE.hex",
+                    path));
 }
 
 std::string flash_port(const BoardOptions& options) {

@@ -35,27 +35,26 @@ std::string for_people(const BoardSession& session, const std::string& port) {
                               hello.boot_id));
   line("inputs", fmt::format("{} load cells, {} analogue ({} bits), {} buttons", can.cells,
                              can.adc_channels, can.adc_bits, can.buttons));
-  line("LED", fmt::format("{} levels; {:.0f} % for ever, full for {:.0f} s from cold",
-                          can.led_levels, can.led_sustained_permille / 10.0,
-                          can.led_full_time_ms / 1000.0));
-  line("strobe", fmt::format("pulses of {} to {} us, one every {} to {} us",
-                             can.strobe_width_min_us, can.strobe_width_max_us,
-                             can.strobe_period_min_us, can.strobe_period_max_us));
+  line("LED",
+       fmt::format("{} levels; {:.0f} % for ever, full for {:.0f} s from cold", can.led_levels,
+                   can.led_sustained_permille / 10.0, can.led_full_time_ms / 1000.0));
+  line("strobe",
+       fmt::format("pulses of {} to {} us, one every {} to {} us", can.strobe_width_min_us,
+                   can.strobe_width_max_us, can.strobe_period_min_us, can.strobe_period_max_us));
   line("clock", fmt::format("{:+.1f} +- {:.1f} ppm to this host, in steps of {} ns; times are good "
                             "to {:.0f} us, {:.0f} us of it common to all{}",
                             clock.skew_ppm, clock.skew_sigma_ppm, can.time_step_ns,
                             std::hypot(us(clock.random_sigma), us(clock.asymmetry_sigma)),
                             us(clock.asymmetry_sigma), clock.converged ? "" : "; not settled yet"));
   if (session.has_status()) {
-    line("supply", can.measures_supply ? fmt::format("{:.2f} V", status.supply_mv / 1000.0)
-                                       : "not measured");
+    line("supply",
+         can.measures_supply ? fmt::format("{:.2f} V", status.supply_mv / 1000.0) : "not measured");
     if (can.measures_temperature)
       line("temperature", fmt::format("{:.1f} C", status.temperature_centidegree / 100.0));
     line("loop", fmt::format("longest {} us; {} bytes of stack never used", status.longest_loop_us,
                              status.stack_free_bytes));
-    line("board lost",
-         fmt::format("{} bad frames, {} bytes, {} reports", status.bad_frames, status.overruns,
-                     status.dropped_reports));
+    line("board lost", fmt::format("{} bad frames, {} bytes, {} reports", status.bad_frames,
+                                   status.overruns, status.dropped_reports));
   }
   line("host lost", fmt::format("{} bad frames, {} frames missing", counters.damaged_frames,
                                 counters.lost_frames));

@@ -49,9 +49,8 @@ BoardLoop::BoardLoop(const std::string& port, const link::BoardSessionOptions& o
 bool BoardLoop::turn(TimePoint until, int other_fd) {
   const auto left =
       std::chrono::ceil<milliseconds>(std::max<Duration>(until - clock_now(), Duration(0)));
-  std::array<pollfd, 3> fds{{{link_.poll_fd(), POLLIN, 0},
-                             {stop_.get(), POLLIN, 0},
-                             {other_fd, POLLIN, 0}}};
+  std::array<pollfd, 3> fds{
+      {{link_.poll_fd(), POLLIN, 0}, {stop_.get(), POLLIN, 0}, {other_fd, POLLIN, 0}}};
   ::poll(fds.data(), fds.size(), static_cast<int>(std::min<std::int64_t>(left.count(), 60'000)));
   if (fds[1].revents != 0) return false;
   link_.service();

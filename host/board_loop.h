@@ -24,7 +24,8 @@ class BoardLoop {
   /// The same, and until the clock is known well and a status has come, or that has taken too long.
   bool settle();
 
-  /// Waits for the link, another descriptor or `until`, and serves the link; false if a signal came.
+  /// Waits for the link, another descriptor or `until`, and serves the link; false if a signal
+  /// came.
   bool turn(TimePoint until, int other_fd = -1);
 
   link::BoardLink& link() { return link_; }

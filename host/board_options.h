@@ -14,25 +14,25 @@ struct BoardOptions {
   bool json = false;
   std::string cells_file;  ///< empty: by the board's id
   std::string cell_input = "a128";
-  int cell_rate = 80;                ///< conversions/s
-  int adc_rate = 0;                  ///< samples/s of each channel; 0: off
-  std::optional<double> seconds;     ///< then end
-  double line_period = 0.25;         ///< s between the lines that `watch` prints for people
+  int cell_rate = 80;             ///< conversions/s
+  int adc_rate = 0;               ///< samples/s of each channel; 0: off
+  std::optional<double> seconds;  ///< then end
+  double line_period = 0.25;      ///< s between the lines that `watch` prints for people
 
   std::vector<double> counts_per_unit;  ///< of an OptoForce sensor: per N, then per N m
-  int force_rate = 100;              ///< of that sensor, Hz
-  double force_filter = 15;          ///< Hz
-  bool force_zero = false;           ///< what it shows now is zero
+  int force_rate = 100;                 ///< of that sensor, Hz
+  double force_filter = 15;             ///< Hz
+  bool force_zero = false;              ///< what it shows now is zero
 
-  std::vector<std::string> light;    ///< words of `led`
+  std::vector<std::string> light;  ///< words of `led`
   int channel = 0;
   std::vector<double> masses_kg;
   double gravity = link::kStandardGravity;
-  int conversions = 160;             ///< averaged per mass, and for a tare
-  std::string out;                   ///< file of `log`
+  int conversions = 160;  ///< averaged per mass, and for a tare
+  std::string out;        ///< file of `log`
 
-  std::string model;                 ///< board to flash
-  std::string image;                 ///< empty: the one that was built or installed
+  std::string model;  ///< board to flash
+  std::string image;  ///< empty: the one that was built or installed
   bool dry_run = false;
 };
 

@@ -105,8 +105,9 @@ class ForceWatch {
   void watch_port(TimePoint begin) {
     if (sensor_.plugged() != plugged_) {
       plugged_ = sensor_.plugged();
-      tell(options_.port + (plugged_ ? ": the port is back" : ": the port is gone; plug it in "
-                                                              "again, this program waits"));
+      tell(options_.port + (plugged_ ? ": the port is back"
+                                     : ": the port is gone; plug it in "
+                                       "again, this program waits"));
     }
     if (!silence_told_ && sensor_.counters().frames == 0 && clock_now() - begin > kPatience) {
       silence_told_ = true;

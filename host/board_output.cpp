@@ -30,9 +30,10 @@ link::Newtons newtons(const link::CellCalibration& cell, const link::Aligned& co
 }  // namespace
 
 BoardOutput::BoardOutput(link::BoardLink& link, const link::CellCalibrations& cells,
-                         double cell_rate, const std::string& path)
+                         double cell_rate, double camera_latency, const std::string& path)
     : link_(link),
       cells_(cells),
+      latency_(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(camera_latency))),
       counts_{link::SampleHistory({.period = 1 / cell_rate}),
               link::SampleHistory({.period = 1 / cell_rate}),
               link::SampleHistory({.period = 1 / cell_rate}),
@@ -84,7 +85,7 @@ void BoardOutput::take_readings() noexcept {
 bool BoardOutput::ripe(const Row& row, TimePoint now) const noexcept {
   if (now - row.sent >= kPatience) return true;
   return std::none_of(counts_.begin(), counts_.end(), [&](const link::SampleHistory& counts) {
-    return counts.at(row.sample.capture_time).status == link::AlignStatus::too_new;
+    return counts.at(row.sample.capture_time - latency_).status == link::AlignStatus::too_new;
   });
 }
 
@@ -111,7 +112,7 @@ std::string_view BoardOutput::text(const Row& row) noexcept {
   char* out = std::copy(sample.begin(), sample.end() - 1, line_.data());
   const char* end = line_.data() + line_.size() - 1;
   for (std::size_t i = 0; i < counts_.size(); ++i) {
-    const link::Aligned counts = counts_[i].at(row.sample.capture_time);
+    const link::Aligned counts = counts_[i].at(row.sample.capture_time - latency_);
     const auto room = static_cast<std::size_t>(end - out);
     if (counts.status != link::AlignStatus::ok) {
       out = fmt::format_to_n(out, room, ",,,").out;

@@ -20,10 +20,11 @@ class BoardOutput final : public Output {
  public:
   /// Borrows the link. `path`: CSV file, `-` is standard output, empty for none: the columns of
   /// `csv`, then counts, newtons and their standard deviation of each load cell; a field is empty
-  /// where samples are missing or the cell is not calibrated. Throws ConfigError if the file cannot
-  /// be written.
+  /// where samples are missing or the cell is not calibrated. The cells' time is the frame's less
+  /// `camera_latency` (s), which the LED measures on the board's own clock: where that clock is off
+  /// from the host's, both are alike. Throws ConfigError if the file cannot be written.
   BoardOutput(link::BoardLink& link, const link::CellCalibrations& cells, double cell_rate,
-              const std::string& path);
+              double camera_latency, const std::string& path);
   ~BoardOutput() override;
 
   /// A row waits until the cells have spoken about its time, half a second at most.
@@ -48,6 +49,7 @@ class BoardOutput final : public Output {
 
   link::BoardLink& link_;
   link::CellCalibrations cells_;
+  Duration latency_;
   std::array<link::SampleHistory, link::kMostChannels> counts_;
   std::optional<TextSink> sink_;
   link::Ring<Row, kMostRows> rows_;

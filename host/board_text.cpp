@@ -72,18 +72,17 @@ std::string json_line(const link::AdcReading& reading) {
 }
 
 std::string json_line(const link::ButtonReading& reading) {
-  return fmt::format(
-      R"({{"kind":"button","button":{},"t_ns":{},"t_sigma_ns":{},"pressed":{}}})"
-      "\n",
-      reading.button, ns(reading.time.time), reading.time.sigma.count(), reading.pressed);
+  return fmt::format(R"({{"kind":"button","button":{},"t_ns":{},"t_sigma_ns":{},"pressed":{}}})"
+                     "\n",
+                     reading.button, ns(reading.time.time), reading.time.sigma.count(),
+                     reading.pressed);
 }
 
 std::string json_line(const link::FaultReading& reading) {
-  return fmt::format(
-      R"({{"kind":"fault","fault":"{}","channel":{},"t_ns":{},"t_sigma_ns":{}}})"
-      "\n",
-      link::fault_name(static_cast<std::uint32_t>(reading.code)), reading.channel,
-      ns(reading.time.time), reading.time.sigma.count());
+  return fmt::format(R"({{"kind":"fault","fault":"{}","channel":{},"t_ns":{},"t_sigma_ns":{}}})"
+                     "\n",
+                     link::fault_name(static_cast<std::uint32_t>(reading.code)), reading.channel,
+                     ns(reading.time.time), reading.time.sigma.count());
 }
 
 void BoardView::take(const link::CellReading& reading) {

@@ -30,8 +30,8 @@ class Watch {
     if (!loop_.settle()) return 0;
     load_calibrations();
     const TimePoint begin = clock_now();
-    const TimePoint end = options_.seconds ? begin + in_seconds(*options_.seconds)
-                                           : TimePoint::max();
+    const TimePoint end =
+        options_.seconds ? begin + in_seconds(*options_.seconds) : TimePoint::max();
     next_line_ = begin + period();
     bool good = style_ != Style::csv || write(kBoardCsvHeader);
     while (good && clock_now() < end) {

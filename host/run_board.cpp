@@ -60,8 +60,8 @@ bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
   return !report.stopped;
 }
 
-std::unique_ptr<Output> RunBoard::output(const std::string& path) {
-  return std::make_unique<BoardOutput>(loop_.link(), cells_, rate_, path);
+std::unique_ptr<Output> RunBoard::output(const SensorConfig& sensor, const std::string& path) {
+  return std::make_unique<BoardOutput>(loop_.link(), cells_, rate_, sensor.camera_latency, path);
 }
 
 }  // namespace tagwrench

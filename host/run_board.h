@@ -28,7 +28,7 @@ class RunBoard {
   bool settle_light(Input& input, const UniqueFd& stop);
 
   /// Serves the link from the run's loop; see BoardOutput. Must not outlive this.
-  std::unique_ptr<Output> output(const std::string& path);
+  std::unique_ptr<Output> output(const SensorConfig& sensor, const std::string& path);
 
  private:
   double rate_;  ///< conversions/s

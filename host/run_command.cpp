@@ -184,7 +184,7 @@ Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* bo
   Outputs outputs;
   if (options.outputs.empty()) {
     add_default_outputs(outputs, input);
-    if (board != nullptr) outputs.all.push_back(board->output({}));
+    if (board != nullptr) outputs.all.push_back(board->output(input.sensor, {}));
     return outputs;
   }
   const std::vector<Spec> specs = output_specs(options);
@@ -205,7 +205,8 @@ Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* bo
   if (board != nullptr) {
     const auto reference = std::find_if(specs.begin(), specs.end(),
                                         [](const Spec& spec) { return spec.kind == "reference"; });
-    outputs.all.push_back(board->output(reference == specs.end() ? "" : reference->argument));
+    outputs.all.push_back(
+        board->output(input.sensor, reference == specs.end() ? "" : reference->argument));
   }
   return outputs;
 }

@@ -7,10 +7,21 @@
 
 namespace tagwrench {
 
-void SimulatedLamp::begin(Order order) {
+/// When an order can be carried out at the earliest, simulation time, s.
+double SimulatedLamp::now() const noexcept {
   const std::chrono::duration<double> now = std::chrono::steady_clock::now() - zero_;
-  order.since = live_ ? std::max(now.count(), 0.0) : seen_;
+  return live_ ? std::max(now.count(), 0.0) : seen_;
+}
+
+void SimulatedLamp::begin(Order order) {
+  order.since = std::max(order.since, now());
   orders_.push_back(order);
+}
+
+TimePoint SimulatedLamp::show(bool white, TimePoint when) {
+  const std::chrono::duration<double> since = when - zero_;
+  begin({.since = since.count(), .kind = Kind::steady, .level = white ? 1.0 : 0.0});
+  return zero_ + Duration(std::llround(1e9 * orders_.back().since));
 }
 
 void SimulatedLamp::steady(int level_permille) {

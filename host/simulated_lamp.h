@@ -4,11 +4,12 @@
 #include <vector>
 
 #include "host/pattern_lamp.h"
+#include "host/screen_measurement.h"
 #include "host/source/simulator/led_light.h"
 
 namespace tagwrench {
 
-class SimulatedLamp final : public PatternLamp, public sim::LedLight {
+class SimulatedLamp final : public PatternLamp, public FlipPatch, public sim::LedLight {
  public:
   /// `live`: orders are carried out now, by the steady clock; else after the last instant that a
   /// picture has seen.
@@ -18,6 +19,8 @@ class SimulatedLamp final : public PatternLamp, public sim::LedLight {
   void set_time_zero(TimePoint zero) noexcept { zero_ = zero; }
 
   void off() override { begin({.kind = Kind::steady, .level = 0}); }
+  /// As a patch on a screen without latency.
+  TimePoint show(bool white, TimePoint when) override;
   void steady(int level_permille) override;
   void pattern(Duration bit, std::uint16_t seed) override;
   std::optional<PatternTiming> timing() const override;
@@ -33,6 +36,7 @@ class SimulatedLamp final : public PatternLamp, public sim::LedLight {
     double bit = 0;    ///< of pattern, s
     std::uint16_t seed = 1;
   };
+  double now() const noexcept;
   void begin(Order order);
   double on_time(const Order& order, double from, double to) const noexcept;
 

@@ -220,7 +220,7 @@ void App::send_status(uint32_t now_us) {
   status.bad_frames = link_.damaged_frames();
   status.unknown_kinds = unknown_kinds_;
   status.overruns = board::serial_overruns();
-  status.dropped_reports = link_.dropped_reports();
+  status.dropped_reports = static_cast<uint16_t>(link_.dropped_reports() + faults_.lost());
   status.cell_count = board::kTraits.cells;
   for (uint8_t i = 0; i < status.cell_count; ++i)
     status.cell_rate_centihertz[i] = cells_.rate_centihertz(i);

@@ -9,10 +9,15 @@ namespace firmware {
 class Faults {
  public:
   void raise(link::FaultCode code, uint8_t channel, uint32_t now_us) {
-    if (count_ == kMost) return;
+    if (count_ == kMost) {
+      ++lost_;
+      return;
+    }
     waiting_[count_++] = {code, channel, now_us};
   }
   bool waiting() const { return count_ != 0; }
+  /// Of those that came while too many waited; wraps.
+  uint8_t lost() const { return lost_; }
   /// The oldest one; only if one waits.
   void send_one(Link& link) {
     if (!link.send(waiting_[0])) return;
@@ -25,6 +30,7 @@ class Faults {
   static constexpr uint8_t kMost = link::kMostCells + 1;
   link::Fault waiting_[kMost] = {};
   uint8_t count_ = 0;
+  uint8_t lost_ = 0;
 };
 
 }  // namespace firmware

@@ -4,9 +4,6 @@ namespace tagwrench {
 namespace firmware {
 namespace {
 
-/// TimeReply is the longest: 18 bytes of message.
-constexpr uint8_t kMostAnswerBytes = 1 + link::kHeaderBytes + 18 + link::kCrcBytes + 1;
-
 /// A poll that is fed without end must come to its end.
 constexpr uint8_t kMostBytesAtOnce = 2 * link::kMostFrameBytes;
 

@@ -9,8 +9,10 @@ namespace firmware {
 
 class Link {
  public:
-  /// On the wire: a CellSample's 22 bytes of message are the most.
+  /// On the wire, of a sample (CellSample has at most 22 bytes of message), and of an answer
+  /// (TimeReply: 18).
   static constexpr uint8_t kMostSampleBytes = 1 + link::kHeaderBytes + 22 + link::kCrcBytes + 1;
+  static constexpr uint8_t kMostAnswerBytes = 1 + link::kHeaderBytes + 18 + link::kCrcBytes + 1;
 
   /// Takes bytes that have come, up to the end of one frame. True: that frame is a good one, and
   /// kind() and the others speak of it until the next call. Takes nothing while there is no room

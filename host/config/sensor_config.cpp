@@ -86,13 +86,12 @@ CameraRecord read_camera_record(YamlReader node) {
   return record;
 }
 
-double read_readout_ms(YamlReader& node) {
-  constexpr double kLongest = 200;
-  const double readout_ms = node.number_or("readout_ms", 0.0);
-  if (readout_ms < 0 || readout_ms > kLongest)
-    node.fail("readout_ms",
-              fmt::format("must be from 0 (all rows at once) to {}, is {}", kLongest, readout_ms));
-  return readout_ms;
+/// From 0, which `zero` explains, up to `longest`; 0 if it is left out.
+double read_ms(YamlReader& node, const char* key, double longest, const char* zero) {
+  const double ms = node.number_or(key, 0.0);
+  if (ms < 0 || ms > longest)
+    node.fail(key, fmt::format("must be from 0 ({}) to {}, is {}", zero, longest, ms));
+  return ms;
 }
 
 /// Where the distortion folds the image, px: looking outward, its pixels begin to show again what
@@ -138,7 +137,7 @@ std::optional<Eigen::Vector2d> fold(const CameraModel& camera) {
   return std::nullopt;
 }
 
-CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record) {
+CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record, double& latency) {
   CameraModel camera;
   camera.width_px = node.integer("width", 16, 16384);
   camera.height_px = node.integer("height", 16, 16384);
@@ -155,7 +154,8 @@ CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record) {
                           at->x(), at->y()));
   }
   camera.mirrored = node.boolean_or("mirrored", false);
-  camera.readout = read_readout_ms(node) * 1e-3;
+  camera.readout = read_ms(node, "readout_ms", 200, "all rows at once") * 1e-3;
+  latency = read_ms(node, "latency_ms", 500, "not known") * 1e-3;
   if (node.has("calibrated")) record = read_camera_record(node.child("calibrated"));
   node.finish();
   return camera;
@@ -321,7 +321,8 @@ HidIdentity read_identity(YamlReader node) {
 
 SensorConfig read_sensor(YamlReader root) {
   SensorConfig sensor;
-  sensor.camera = read_camera(root.child("camera"), sensor.camera_calibrated);
+  sensor.camera =
+      read_camera(root.child("camera"), sensor.camera_calibrated, sensor.camera_latency);
   sensor.target = read_target(root.child("target"));
   if (root.has("rest")) sensor.rest = read_rest(root.child("rest"), sensor.camera);
   sensor.wrench = read_wrench(root.child("wrench"), sensor);

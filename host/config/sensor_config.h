@@ -28,6 +28,7 @@ struct CameraRecord {
 struct SensorConfig {
   CameraModel camera;
   std::optional<CameraRecord> camera_calibrated;
+  double camera_latency = 0;  ///< from the middle of the exposure to the frame's time, s
   TargetDescription target;
   RestOptions rest;
   WrenchModel wrench;

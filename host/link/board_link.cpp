@@ -68,8 +68,7 @@ void BoardLink::watch_serial() noexcept {
 
 void BoardLink::service() noexcept {
   std::uint64_t expirations = 0;
-  [[maybe_unused]] const ssize_t taken =
-      ::read(timer_.get(), &expirations, sizeof expirations);
+  [[maybe_unused]] const ssize_t taken = ::read(timer_.get(), &expirations, sizeof expirations);
   if (serial_) receive();
   if (!serial_) try_again(clock_now());
   send();
@@ -144,8 +143,8 @@ std::string BoardLink::why_no_board() const {
   }
   std::string hex;
   std::string plain;
-  for (const std::uint8_t byte : session_.first_bytes().first(
-           std::min<std::size_t>(session_.first_bytes().size(), 16))) {
+  for (const std::uint8_t byte :
+       session_.first_bytes().first(std::min<std::size_t>(session_.first_bytes().size(), 16))) {
     hex += fmt::format("{:02x} ", byte);
     plain += byte >= 0x20 && byte < 0x7F ? static_cast<char>(byte) : '.';
   }

@@ -1,5 +1,5 @@
-// A board on a serial port: the session's bytes come and go, and a port that was unplugged is opened
-// again. One descriptor to wait for, never a wait inside.
+// A board on a serial port: the session's bytes come and go, and a port that was unplugged is
+// opened again. One descriptor to wait for, never a wait inside.
 #pragma once
 
 #include <optional>

@@ -125,9 +125,8 @@ std::string text(const News& news) {
     case News::Kind::configuration_refused:
       return fmt::format("board: refused its configuration: {}", result_name(news.value));
     case News::Kind::led_refused:
-      return fmt::format(
-          "board: refused this light: {}; `tagwrench board info` shows the limits",
-          result_name(news.value));
+      return fmt::format("board: refused this light: {}; `tagwrench board info` shows the limits",
+                         result_name(news.value));
     case News::Kind::request_refused:
       return fmt::format("board: refused {}: {}", request_name(news.value),
                          result_name(news.other));

@@ -8,16 +8,16 @@ namespace tagwrench::link {
 
 struct News {
   enum class Kind : std::uint8_t {
-    connected,          ///< value: protocol major << 8 | minor of the board
-    restarted,          ///< the board started anew; value: ResetCause
-    board_too_old,      ///< value: its protocol major << 8 | minor
-    host_too_old,       ///< value: the board's protocol major << 8 | minor
-    id_given,           ///< the board had no unique id
+    connected,              ///< value: protocol major << 8 | minor of the board
+    restarted,              ///< the board started anew; value: ResetCause
+    board_too_old,          ///< value: its protocol major << 8 | minor
+    host_too_old,           ///< value: the board's protocol major << 8 | minor
+    id_given,               ///< the board had no unique id
     configuration_refused,  ///< value: Result
-    led_refused,        ///< value: Result
-    request_refused,    ///< value: Kind of the request, other: Result
-    other_host,         ///< value: the other session
-    fault,              ///< value: FaultCode, other: channel
+    led_refused,            ///< value: Result
+    request_refused,        ///< value: Kind of the request, other: Result
+    other_host,             ///< value: the other session
+    fault,                  ///< value: FaultCode, other: channel
     unplugged,
     plugged,
   };

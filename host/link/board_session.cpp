@@ -118,8 +118,7 @@ void BoardSession::send_time_request(TimePoint now) noexcept {
   // An even period could beat with the adapter's polling or with the samples.
   dither_ = dither_ * 1664525u + 1013904223u;
   const double factor = 0.9 + 0.2 * static_cast<double>(dither_ >> 8) / (1 << 24);
-  next_time_request_ =
-      now + Duration(std::llround(static_cast<double>(period.count()) * factor));
+  next_time_request_ = now + Duration(std::llround(static_cast<double>(period.count()) * factor));
 }
 
 /// A start that lies far back would turn into one in the future when board time wraps.

@@ -19,14 +19,14 @@ namespace tagwrench::link {
 struct BoardSessionOptions {
   std::uint32_t session = 0;  ///< drawn at random; tells this host from another one
   UniqueId new_id{};          ///< for a board that has none; empty: leave it without
-  Configure configuration{.host_timeout_ms = 5000,
-                          .cells = {CellInput::a128, CellInput::a128, CellInput::a128,
-                                    CellInput::a128},
-                          .cell_count = kMostCells,
-                          .cell_rate_sps = 80,
-                          .adc_mask = 0,
-                          .adc_rate_hz = 100,
-                          .status_period_ms = 1000};
+  Configure configuration{
+      .host_timeout_ms = 5000,
+      .cells = {CellInput::a128, CellInput::a128, CellInput::a128, CellInput::a128},
+      .cell_count = kMostCells,
+      .cell_rate_sps = 80,
+      .adc_mask = 0,
+      .adc_rate_hz = 100,
+      .status_period_ms = 1000};
   Duration time_period = std::chrono::milliseconds(100);  ///< between time requests
   ClockSyncOptions clock;
 };
@@ -72,12 +72,12 @@ struct FaultReading {
 /// Since construction.
 struct SessionCounters {
   std::uint64_t bytes = 0;
-  std::uint64_t frames = 0;          ///< good ones
+  std::uint64_t frames = 0;  ///< good ones
   std::uint64_t damaged_frames = 0;
   std::uint64_t unknown_frames = 0;  ///< of a kind that this version does not know, or malformed
   std::uint64_t lost_frames = 0;     ///< by the board's frame sequence numbers
   std::uint64_t lost_conversions = 0;
-  std::uint32_t restarts = 0;        ///< of the board, seen by its boot id
+  std::uint32_t restarts = 0;  ///< of the board, seen by its boot id
 };
 
 class BoardSession {

@@ -12,8 +12,8 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr Duration kMostTimeError = seconds(2);  ///< between a stamp and its arrival
-constexpr unsigned kMisfitsOfARestart = 4;  ///< in a row: its clock may have started anew
-constexpr unsigned kQuickRequests = 20;  ///< at the start, for the clock to converge soon
+constexpr unsigned kMisfitsOfARestart = 4;       ///< in a row: its clock may have started anew
+constexpr unsigned kQuickRequests = 20;          ///< at the start, for the clock to converge soon
 
 /// The board's words are a stranger's bytes: no control codes to a terminal.
 void make_printable(char* text) {
@@ -22,9 +22,7 @@ void make_printable(char* text) {
   }
 }
 
-HostTime arrival_only(TimePoint arrival) {
-  return {arrival, milliseconds(50), milliseconds(50)};
-}
+HostTime arrival_only(TimePoint arrival) { return {arrival, milliseconds(50), milliseconds(50)}; }
 
 }  // namespace
 
@@ -62,7 +60,11 @@ void BoardSession::take_frame(TimePoint arrival, std::uint16_t wire_bytes) noexc
     else
       ++counters_.unknown_frames;
   };
-  switch (static_cast<Kind>(reader_.kind())) {
+  // Until the board has said who it is, the rest may be of an earlier start, or have waited in a
+  // driver while the line was cut.
+  const Kind kind = static_cast<Kind>(reader_.kind());
+  if (state_ == BoardState::waiting && kind != Kind::hello) return;
+  switch (kind) {
     case Kind::hello:
       return read(Hello{}, [&](const Hello& m) { take_hello(m, arrival); });
     case Kind::capabilities:
@@ -91,8 +93,8 @@ void BoardSession::take_frame(TimePoint arrival, std::uint16_t wire_bytes) noexc
 
 void BoardSession::watch_frame_sequence(std::uint8_t sequence) noexcept {
   if (frame_sequence_.known) {
-    counters_.lost_frames += static_cast<std::uint8_t>(
-        sequence - static_cast<std::uint8_t>(frame_sequence_.last) - 1);
+    counters_.lost_frames +=
+        static_cast<std::uint8_t>(sequence - static_cast<std::uint8_t>(frame_sequence_.last) - 1);
   }
   frame_sequence_ = {true, sequence};
 }
@@ -118,8 +120,7 @@ void BoardSession::take_hello(const Hello& hello, TimePoint arrival) noexcept {
   const Update update = needed_update(kProtocolMajor, hello.protocol_major);
   if (update != Update::none) {
     if (state_ != BoardState::other_version) {
-      tell(update == Update::board ? News::Kind::board_too_old : News::Kind::host_too_old,
-           version);
+      tell(update == Update::board ? News::Kind::board_too_old : News::Kind::host_too_old, version);
     }
     state_ = BoardState::other_version;
     return;

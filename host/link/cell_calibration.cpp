@@ -38,8 +38,8 @@ Newtons CellCalibration::newtons(double counts) const noexcept {
   const double load = counts - zero_counts;
   const double random = std::hypot(noise_counts, zero_sigma_counts) * newtons_per_count;
   const double scale = load * newtons_per_count_sigma;
-  const double variance = random * random + scale * scale -
-                          2 * newtons_per_count * load * zero_scale_covariance_n;
+  const double variance =
+      random * random + scale * scale - 2 * newtons_per_count * load * zero_scale_covariance_n;
   return {load * newtons_per_count, std::sqrt(std::max(variance, 0.0))};
 }
 

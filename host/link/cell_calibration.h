@@ -28,8 +28,8 @@ struct CellCalibration {
   double zero_counts = 0;
   double zero_sigma_counts = 0;
   double zero_scale_covariance_n = 0;  ///< of zero_counts and newtons_per_count: one line's both
-  double noise_counts = 0;  ///< standard deviation of one conversion
-  double residual_n = 0;    ///< rms of the points about the line; 0 of two points
+  double noise_counts = 0;             ///< standard deviation of one conversion
+  double residual_n = 0;               ///< rms of the points about the line; 0 of two points
 
   /// Only when calibrated.
   Newtons newtons(double counts) const noexcept;
@@ -40,8 +40,8 @@ using CellCalibrations = std::array<CellCalibration, kMostChannels>;
 
 /// The line through two points, or nearest to more of them by least squares; zero is where no mass
 /// weighs. Its uncertainty is that of the points, or what they scatter about the line if that is
-/// more. Throws ConfigError if the masses do not span: fewer than two different ones, or counts that
-/// differ by less than 20 of their standard deviations.
+/// more. Throws ConfigError if the masses do not span: fewer than two different ones, or counts
+/// that differ by less than 20 of their standard deviations.
 CellCalibration fit_cell(const std::vector<CellPoint>& points, double gravity = kStandardGravity);
 
 }  // namespace tagwrench::link

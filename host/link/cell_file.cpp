@@ -146,8 +146,8 @@ void save_cells(const std::string& path, const std::string& board_id,
   std::error_code error;
   const fs::path folder = fs::path(path).parent_path();
   if (!folder.empty()) fs::create_directories(folder, error);
-  write_whole(path, json({{"format", kFormat}, {"board", board_id}, {"cells", list}}).dump(2) +
-                        "\n");
+  write_whole(path,
+              json({{"format", kFormat}, {"board", board_id}, {"cells", list}}).dump(2) + "\n");
 }
 
 }  // namespace tagwrench::link

@@ -8,10 +8,10 @@ namespace {
 
 constexpr double kLeastRoundTrip = -2e-3;  ///< below zero only where wire times are not as told
 constexpr double kMostRoundTrip = 1;
-constexpr double kGate = 25;             ///< squared innovation over its variance: 5 sigma
+constexpr double kGate = 25;               ///< squared innovation over its variance: 5 sigma
 constexpr std::size_t kContradicting = 8;  ///< in a row: it was not they that erred
-constexpr double kOneSidedSigma = 0.29;  ///< k is within +-1/2
-constexpr double kScaleWeight = 20;      ///< exchanges that the assumed scale of errors is worth
+constexpr double kOneSidedSigma = 0.29;    ///< k is within +-1/2
+constexpr double kScaleWeight = 20;        ///< exchanges that the assumed scale of errors is worth
 
 std::int64_t to_ns(TimePoint time) {
   return std::chrono::duration_cast<Duration>(time.time_since_epoch()).count();
@@ -53,8 +53,8 @@ bool ClockSync::add(const TimeExchange& exchange) noexcept {
       static_cast<std::int32_t>(exchange.board_sent_us - exchange.board_received_us) * 1e-6;
   // The host's clock bridges silences longer than a wrap.
   const std::int64_t elapsed_us = count_ == 0 ? 0 : (sent_ns - to_ns(host_reference_)) / 1000;
-  const std::int64_t near_us =
-      count_ == 0 ? std::int64_t{exchange.board_received_us} : board_reference_us2_ / 2 + elapsed_us;
+  const std::int64_t near_us = count_ == 0 ? std::int64_t{exchange.board_received_us}
+                                           : board_reference_us2_ / 2 + elapsed_us;
   const std::int64_t board_received = unwrap(exchange.board_received_us, near_us);
   entry.board_us2 = 2 * board_received + std::llround(entry.board_span * 1e6);
 
@@ -70,8 +70,8 @@ bool ClockSync::add(const TimeExchange& exchange) noexcept {
 
   least_ = least_round_trip();
   const Pass assumed = pass(1);
-  const double scale = (assumed.surprise + kScaleWeight) /
-                       (static_cast<double>(assumed.fitting) + kScaleWeight);
+  const double scale =
+      (assumed.surprise + kScaleWeight) / (static_cast<double>(assumed.fitting) + kScaleWeight);
   const Pass fitted = pass(std::clamp(scale, 1.0, 9.0));
   state_ = fitted.state;
   if (fitted.begin > 0) {
@@ -100,9 +100,10 @@ double ClockSync::round_trip(const Entry& entry) const noexcept {
   return entry.host_span - entry.board_span * (1 + state_.mean[1]);
 }
 
-/// The fastest round trip of all that might be. The n-th fastest sum of two delays exceeds the bound
-/// by about sqrt(n) times a constant; so the fourth exceeds the first by as much as the first
-/// exceeds the bound, and the sixteenth by three times that. Of few exchanges nothing is known: zero.
+/// The fastest round trip of all that might be. The n-th fastest sum of two delays exceeds the
+/// bound by about sqrt(n) times a constant; so the fourth exceeds the first by as much as the first
+/// exceeds the bound, and the sixteenth by three times that. Of few exchanges nothing is known:
+/// zero.
 ClockSync::RoundTrip ClockSync::least_round_trip() const noexcept {
   if (count_ < kFewForRoundTrip) return {};
   std::array<double, 16> fastest;
@@ -132,8 +133,8 @@ void ClockSync::start(State& state, const Entry& entry, double excess) const noe
   state.covariance.setZero();
   // The first measurement is the prior of the offset: correlated with k as a measurement is.
   const double k_variance = squared(kOneSidedSigma);
-  state.covariance(0, 0) = squared(options_.stamp_sigma_us * 1e-6) + squared(excess) / 12 +
-                           squared(excess) * k_variance;
+  state.covariance(0, 0) =
+      squared(options_.stamp_sigma_us * 1e-6) + squared(excess) / 12 + squared(excess) * k_variance;
   state.covariance(0, 2) = state.covariance(2, 0) = -excess * k_variance;
   state.covariance(1, 1) = squared(options_.skew_sigma_ppm * 1e-6);
   state.covariance(2, 2) = k_variance;
@@ -164,8 +165,7 @@ ClockSync::Pass ClockSync::pass(double scale) const noexcept {
     }
     predict(out.state, static_cast<double>(now.board_us2 - entry(i - 1).board_us2) * 0.5e-6);
     const Eigen::RowVector3d seen(1, 0, excess);
-    const double noise =
-        squared(options_.stamp_sigma_us * 1e-6) + scale * squared(excess) / 12;
+    const double noise = squared(options_.stamp_sigma_us * 1e-6) + scale * squared(excess) / 12;
     const double variance = seen * out.state.covariance * seen.transpose() + noise;
     const double innovation = offset(now) - seen * out.state.mean;
     const double surprise = squared(innovation) / variance;
@@ -213,9 +213,9 @@ HostTime ClockSync::to_host(std::uint32_t board_us) const noexcept {
 
 std::uint32_t ClockSync::to_board(TimePoint host) const noexcept {
   const double since = std::chrono::duration<double>(host - host_reference_).count();
-  const double board =
-      (since - state_.mean[0] - asymmetry_ / 2) / (1 + state_.mean[1]) * 1e6;
-  const double whole = std::clamp(board, -1e15, 1e15) + 0.5 * static_cast<double>(board_reference_us2_ % 2);
+  const double board = (since - state_.mean[0] - asymmetry_ / 2) / (1 + state_.mean[1]) * 1e6;
+  const double whole =
+      std::clamp(board, -1e15, 1e15) + 0.5 * static_cast<double>(board_reference_us2_ % 2);
   return static_cast<std::uint32_t>(board_reference_us2_ / 2 + std::llround(whole));
 }
 

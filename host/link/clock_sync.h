@@ -12,11 +12,11 @@ namespace tagwrench::link {
 
 /// One request and its reply.
 struct TimeExchange {
-  TimePoint host_sent{};                 ///< the request's first byte began to leave
-  TimePoint host_received{};             ///< the reply's last byte was there
-  std::uint32_t board_received_us = 0;   ///< the request's last byte was there
-  std::uint32_t board_sent_us = 0;       ///< the reply's first byte began to leave
-  std::uint16_t request_bytes = 0;       ///< on the wire, delimiter included
+  TimePoint host_sent{};                ///< the request's first byte began to leave
+  TimePoint host_received{};            ///< the reply's last byte was there
+  std::uint32_t board_received_us = 0;  ///< the request's last byte was there
+  std::uint32_t board_sent_us = 0;      ///< the reply's first byte began to leave
+  std::uint16_t request_bytes = 0;      ///< on the wire, delimiter included
   std::uint16_t reply_bytes = 0;
 };
 
@@ -43,11 +43,11 @@ struct ClockReport {
   std::uint32_t jumps = 0;      ///< times that the exchanges began to contradict all earlier ones
   double skew_ppm = 0;          ///< the board's clock is faster by so much
   double skew_sigma_ppm = 0;
-  double round_trip_us = 0;     ///< the least there can be, without wire and board times
-  double one_sided = 0;         ///< part of the jitter on the way back, 0..1 (1/2: as much either way)
-  Duration random_sigma{};      ///< of a time one second after the last exchange
+  double round_trip_us = 0;  ///< the least there can be, without wire and board times
+  double one_sided = 0;      ///< part of the jitter on the way back, 0..1 (1/2: as much either way)
+  Duration random_sigma{};   ///< of a time one second after the last exchange
   Duration asymmetry_sigma{};
-  bool converged = false;       ///< random_sigma is below kConverged
+  bool converged = false;  ///< random_sigma is below kConverged
 };
 
 /// Offset and skew from two-way exchanges: a Kalman filter over those of the last 30 s, run anew
@@ -114,9 +114,7 @@ class ClockSync {
   static constexpr std::size_t kMostEntries = 600;
   static constexpr std::size_t kFewForRoundTrip = 8;
 
-  const Entry& entry(std::size_t i) const noexcept {
-    return entries_[(first_ + i) % kMostEntries];
-  }
+  const Entry& entry(std::size_t i) const noexcept { return entries_[(first_ + i) % kMostEntries]; }
   void append(const Entry& entry) noexcept;
   void drop_oldest(std::size_t count) noexcept;
   std::int64_t unwrap(std::uint32_t board_us, std::int64_t near_us) const noexcept;
@@ -136,7 +134,7 @@ class ClockSync {
   std::int64_t board_reference_us2_ = 0;
   TimePoint host_reference_{};
   RoundTrip least_;
-  double asymmetry_ = 0;        ///< s
+  double asymmetry_ = 0;         ///< s
   double asymmetry_sigma_ = -1;  ///< s; negative: not told
   std::uint32_t accepted_ = 0;
   std::uint32_t rejected_ = 0;

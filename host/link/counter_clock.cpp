@@ -6,14 +6,14 @@
 namespace tagwrench::link {
 namespace {
 
-constexpr double kFirstJitter = 5e-3;    ///< s, before any is seen
-constexpr double kLeastJitter = 20e-6;   ///< s
-constexpr double kPeriodSigma = 0.02;    ///< of the nominal period
-constexpr double kWander = 1e-6;         ///< of the period, relative, per square root of a second
-constexpr double kForget = 0.02;         ///< of the jitter's estimate, per sample
-constexpr double kGate = 36;             ///< squared innovation over its variance
-constexpr double kMisfitTime = 0.5;      ///< s
-constexpr double kMostSteps = 30'000;    ///< half of the counter's range: a bridge of a long silence
+constexpr double kFirstJitter = 5e-3;   ///< s, before any is seen
+constexpr double kLeastJitter = 20e-6;  ///< s
+constexpr double kPeriodSigma = 0.02;   ///< of the nominal period
+constexpr double kWander = 1e-6;        ///< of the period, relative, per square root of a second
+constexpr double kForget = 0.02;        ///< of the jitter's estimate, per sample
+constexpr double kGate = 36;            ///< squared innovation over its variance
+constexpr double kMisfitTime = 0.5;     ///< s
+constexpr double kMostSteps = 30'000;   ///< half of the counter's range: a bridge of a long silence
 
 Duration to_duration(double seconds) {
   return Duration(std::llround(std::clamp(seconds, -1e9, 1e9) * 1e9));

@@ -9,15 +9,15 @@
 
 namespace tagwrench::link {
 
-/// time = start + period * count, by a Kalman filter over the arrivals; the period is learned around
-/// the nominal one. Arrivals are late by a mean that nobody can see here (the sensor's filter, the
-/// driver): times are those of a frame that is as late as they are on average.
+/// time = start + period * count, by a Kalman filter over the arrivals; the period is learned
+/// around the nominal one. Arrivals are late by a mean that nobody can see here (the sensor's
+/// filter, the driver): times are those of a frame that is as late as they are on average.
 class CounterClock {
  public:
   explicit CounterClock(double period_s) noexcept : nominal_(period_s) {}
 
-  /// Of a sample that was there at `arrival`. A counter that does not go on, or arrivals that do not
-  /// fit for half a second, start it anew.
+  /// Of a sample that was there at `arrival`. A counter that does not go on, or arrivals that do
+  /// not fit for half a second, start it anew.
   HostTime take(std::uint16_t counter, TimePoint arrival) noexcept;
   void restart() noexcept { known_ = false; }
 
@@ -31,8 +31,8 @@ class CounterClock {
   double nominal_;
   bool known_ = false;
   TimePoint reference_{};
-  Eigen::Vector2d state_ = Eigen::Vector2d::Zero();  ///< time of the last sample since the reference
-                                                     ///< (s), period (s)
+  Eigen::Vector2d state_ = Eigen::Vector2d::Zero();  ///< time of the last sample since the
+                                                     ///< reference (s), period (s)
   Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();
   double jitter_variance_ = 0;  ///< of arrivals, s^2
   std::uint16_t last_ = 0;

@@ -78,9 +78,10 @@ bool OptoforceParser::next(OptoforceFrame& frame) noexcept {
 /// Whether what is pending could be the beginning of a frame or a reply.
 bool OptoforceParser::may_begin() const noexcept {
   const auto begins = [this](const auto& header) {
-    return std::equal(pending_.begin(),
-                      pending_.begin() + static_cast<std::ptrdiff_t>(std::min(count_, header.size())),
-                      header.begin());
+    return std::equal(
+        pending_.begin(),
+        pending_.begin() + static_cast<std::ptrdiff_t>(std::min(count_, header.size())),
+        header.begin());
   };
   if (begins(kReplyHeader)) return true;
   return begins(kSampleHeader) && (count_ < kHeaderBytes || is_size(pending_[3]));
@@ -147,7 +148,11 @@ std::array<std::uint8_t, 9> optoforce_command(int rate_hz, double filter_hz, boo
         "OptoForce: it has no filter of {} Hz; use 500, 150, 50, 15, 5, 1.5 or 0 for none",
         filter_hz));
   }
-  std::array<std::uint8_t, 9> out{0xAA, 0x00, 0x32, 0x03, rate->code,
+  std::array<std::uint8_t, 9> out{0xAA,
+                                  0x00,
+                                  0x32,
+                                  0x03,
+                                  rate->code,
                                   static_cast<std::uint8_t>(filter - std::begin(kFilters)),
                                   static_cast<std::uint8_t>(zero ? 255 : 0)};
   unsigned sum = 0;

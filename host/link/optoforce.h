@@ -12,8 +12,8 @@ namespace tagwrench::link {
 
 /// One sample, big-endian on the wire:
 ///   AA 07 08 n | counter u16 | status u16 | counts i16 ... | checksum u16 (sum of all before)
-/// n = 0A: 16 bytes, 3 axes (Fx Fy Fz); 10: 22 bytes, 6 axes (Fx Fy Fz Tx Ty Tz); 1C: 34 bytes, four
-/// 3-axis sensors.
+/// n = 0A: 16 bytes, 3 axes (Fx Fy Fz); 10: 22 bytes, 6 axes (Fx Fy Fz Tx Ty Tz); 1C: 34 bytes,
+/// four 3-axis sensors.
 struct OptoforceFrame {
   static constexpr std::size_t kMostAxes = 12;
 
@@ -47,8 +47,8 @@ class OptoforceParser {
     std::uint64_t frames = 0;
     std::uint64_t interruptions = 0;  ///< places between two frames where bytes belonged to none
     std::uint64_t skipped_bytes = 0;
-    std::uint64_t lost_frames = 0;    ///< by the counter
-    std::uint64_t replies = 0;        ///< to configuration commands
+    std::uint64_t lost_frames = 0;  ///< by the counter
+    std::uint64_t replies = 0;      ///< to configuration commands
   };
 
   /// Calls use(const OptoforceFrame&) for each frame that is whole. After bytes that belong to no

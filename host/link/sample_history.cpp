@@ -7,9 +7,9 @@ namespace tagwrench::link {
 namespace {
 
 constexpr double kGapPeriods = 1.5;
-constexpr double kForget = 1.0 / 64;     ///< of the noise, per sample
-constexpr std::uint64_t kEnough = 8;     ///< third differences
-constexpr double kThirdOfNoise = 20;     ///< 1 + 9 + 9 + 1
+constexpr double kForget = 1.0 / 64;  ///< of the noise, per sample
+constexpr std::uint64_t kEnough = 8;  ///< third differences
+constexpr double kThirdOfNoise = 20;  ///< 1 + 9 + 9 + 1
 
 double seconds(Duration d) { return std::chrono::duration<double>(d).count(); }
 

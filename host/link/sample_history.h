@@ -11,10 +11,10 @@ namespace tagwrench::link {
 
 enum class AlignStatus : std::uint8_t {
   ok,
-  empty,     ///< nothing was sampled yet
-  too_old,   ///< before all that is kept
-  too_new,   ///< after the last sample: ask again later, it is not guessed
-  gap,       ///< samples are missing there
+  empty,    ///< nothing was sampled yet
+  too_old,  ///< before all that is kept
+  too_new,  ///< after the last sample: ask again later, it is not guessed
+  gap,      ///< samples are missing there
 };
 
 struct Aligned {
@@ -25,21 +25,22 @@ struct Aligned {
 
 struct HistoryOptions {
   double period = 0;  ///< s, nominal; neighbours further apart than 1.5 of it are a gap
-  double delay = 0;   ///< s between an event and the time stamp of the sample that shows it (filters)
+  double delay =
+      0;  ///< s between an event and the time stamp of the sample that shows it (filters)
 };
 
 /// Keeps the last samples and interpolates linearly between neighbours. The noise is what the
-/// samples' third differences show: their variance is 20 times that of white noise, and signals that
-/// change slowly have none. The interpolation's error is its bound u (1 - u) / 2 h^2 |f''|, by the
-/// second differences.
+/// samples' third differences show: their variance is 20 times that of white noise, and signals
+/// that change slowly have none. The interpolation's error is its bound u (1 - u) / 2 h^2 |f''|, by
+/// the second differences.
 class SampleHistory {
  public:
   static constexpr std::size_t kRoom = 512;
 
   explicit SampleHistory(const HistoryOptions& options) noexcept : options_(options) {}
 
-  /// `sigma` is what is known of the value's uncertainty besides noise (a scale); `lost_before` tells
-  /// of samples that are missing before this one. Times must grow; others are ignored.
+  /// `sigma` is what is known of the value's uncertainty besides noise (a scale); `lost_before`
+  /// tells of samples that are missing before this one. Times must grow; others are ignored.
   void add(TimePoint time, Duration time_sigma, double value, double sigma = 0,
            bool lost_before = false) noexcept;
   void clear() noexcept;

@@ -18,9 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_number(const std::string& name) {
-  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
-    return c >= '0' && c <= '9';
-  });
+  return !name.empty() &&
+         std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
 bool has_open(const fs::path& process, const struct stat& device) {

@@ -148,8 +148,8 @@ bool TerminalMark::may_reopen(const char* path) const noexcept {
   TerminalMark now;
   if (::stat(path, &about) != 0 || !look(path, now)) return false;
   const unsigned number = major(about.st_rdev);
-  const bool pseudo = number >= UNIX98_PTY_SLAVE_MAJOR &&
-                      number < UNIX98_PTY_SLAVE_MAJOR + UNIX98_PTY_MAJOR_COUNT;
+  const bool pseudo =
+      number >= UNIX98_PTY_SLAVE_MAJOR && number < UNIX98_PTY_SLAVE_MAJOR + UNIX98_PTY_MAJOR_COUNT;
   if (!pseudo) return true;
   return now.link_inode_ != 0 &&
          (now.link_inode_ != link_inode_ || now.link_time_ns_ != link_time_ns_);

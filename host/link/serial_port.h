@@ -11,7 +11,15 @@
 namespace tagwrench::link {
 
 struct SerialFailure {
-  enum class Kind : std::uint8_t { none, absent, denied, busy, no_serial_port, no_such_baud, other };
+  enum class Kind : std::uint8_t {
+    none,
+    absent,
+    denied,
+    busy,
+    no_serial_port,
+    no_such_baud,
+    other
+  };
   Kind kind = Kind::none;
   int error = 0;  ///< errno, where there is one
 

@@ -24,11 +24,16 @@ struct KnownBoard {
 };
 // Vendor and product ids as in the public list of USB ids.
 constexpr KnownBoard kKnown[] = {
-    {0x2341, 0x0043, "Arduino Uno R3"},    {0x2341, 0x0001, "Arduino Uno"},
-    {0x2341, 0x0010, "Arduino Mega 2560"}, {0x2341, 0x8036, "Arduino Leonardo"},
-    {0x2a03, 0x0043, "Arduino Uno R3"},    {0x1a86, 0x7523, "CH340, as on many Nanos"},
-    {0x1a86, 0x55d4, "CH9102"},            {0x0403, 0x6001, "FTDI FT232R, as on early Nanos"},
-    {0x0403, 0x6015, "FTDI FT231X"},       {0x10c4, 0xea60, "CP210x"},
+    {0x2341, 0x0043, "Arduino Uno R3"},
+    {0x2341, 0x0001, "Arduino Uno"},
+    {0x2341, 0x0010, "Arduino Mega 2560"},
+    {0x2341, 0x8036, "Arduino Leonardo"},
+    {0x2a03, 0x0043, "Arduino Uno R3"},
+    {0x1a86, 0x7523, "CH340, as on many Nanos"},
+    {0x1a86, 0x55d4, "CH9102"},
+    {0x0403, 0x6001, "FTDI FT232R, as on early Nanos"},
+    {0x0403, 0x6015, "FTDI FT231X"},
+    {0x10c4, 0xea60, "CP210x"},
     {0x067b, 0x2303, "PL2303"},
 };
 
@@ -72,7 +77,7 @@ std::string described(std::uint16_t vendor, std::uint16_t product) {
 
 struct Bus {
   bool seen = false;
-  bool has_it = false;                 ///< a device with vendor and product
+  bool has_it = false;              ///< a device with vendor and product
   std::vector<std::string> boards;  ///< known ones that are plugged in
 };
 
@@ -104,11 +109,11 @@ std::optional<UsbIdentity> parse_usb_identity(const std::string& text) {
   const std::size_t first = rest.find(':');
   const std::size_t second = first == std::string_view::npos ? first : rest.find(':', first + 1);
   const auto vendor = hex16(rest.substr(0, first));
-  const auto product = first == std::string_view::npos
-                           ? std::optional<std::uint16_t>{}
-                           : hex16(rest.substr(first + 1, second == std::string_view::npos
-                                                              ? second
-                                                              : second - first - 1));
+  const auto product =
+      first == std::string_view::npos
+          ? std::optional<std::uint16_t>{}
+          : hex16(rest.substr(first + 1,
+                              second == std::string_view::npos ? second : second - first - 1));
   if (!vendor || !product) {
     throw ConfigError(fmt::format(
         "--port '{}': not usb:VENDOR:PRODUCT[:SERIAL] in hex; for example usb:2341:0043, see "

@@ -22,8 +22,8 @@ std::optional<UsbIdentity> parse_usb_identity(const std::string& text);
 /// "Arduino Uno", "CH340 (Nano clones)", ...; empty if not known.
 std::string_view usb_board_name(std::uint16_t vendor, std::uint16_t product);
 
-/// Device nodes ("/dev/ttyUSB0") of serial ports with this identity, sorted; from sysfs alone, for a
-/// loop that waits for a board to come back.
+/// Device nodes ("/dev/ttyUSB0") of serial ports with this identity, sorted; from sysfs alone, for
+/// a loop that waits for a board to come back.
 std::vector<std::string> usb_serial_nodes(const UsbIdentity& identity,
                                           const std::string& sysfs = "/sys");
 

@@ -17,6 +17,8 @@ constexpr int kFewestTimed = 8;
 constexpr double kTellsTime = 0.25;      // of a bit
 constexpr double kClear = 9;             // difference of costs: three standard deviations
 constexpr double kGoodShutter = 3;       // standard deviations
+constexpr double kFinestTime = 0.03;     // of the exposure, that a brightness tells at best
+constexpr double kShape = 0.35;          // of the jitter
 constexpr double kGlobalReadout = 0.05;  // of a bit: what a read-out of 0 may be
 
 std::string unusable(const BandwidthInput& input) {
@@ -64,41 +66,49 @@ double usual_interval(const std::vector<TimedFrame>& times, double fallback) {
   return quantile(intervals, 0.5);
 }
 
-/// Numbers the exposures, and fits a straight line through the times of those that are timed.
-void fit_rate(const BandwidthInput& input, BandwidthResult& result) {
+/// Numbers the exposures, and fits a straight line through their times. Pictures that are not timed
+/// count as their sigmas say, if `all`, or not at all.
+void fit_rate(const BandwidthInput& input, bool all, BandwidthResult& result) {
+  constexpr double kFinest = 1e-7;  // s, no time is better known
   double period = usual_interval(result.times, input.period);
   // Neighbours give the period to a few parts in a thousand, and the longer the stretch that is
   // numbered, the better it is known.
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  double n = 0, w = 0, x = 0, y = 0, xx = 0, xy = 0;
   const TimedFrame* last = nullptr;
   const double start = result.times.front().exposed;
+  const auto usable = [all](const TimedFrame& frame) {
+    return frame.timed || (all && frame.freshness == Freshness::fresh);
+  };
+  const auto weight_of = [](const TimedFrame& frame) {
+    return 1 / (frame.sigma * frame.sigma + kFinest * kFinest);
+  };
   for (TimedFrame& frame : result.times) {
     if (last != nullptr)
       frame.number = last->number + std::llround((frame.exposed - last->exposed) / period);
-    if (!frame.timed) continue;
+    if (!usable(frame)) continue;
     last = &frame;
     const auto number = static_cast<double>(frame.number);
-    const double time = frame.exposed - start;
+    const double time = frame.exposed - start, weight = weight_of(frame);
     n += 1;
-    x += number;
-    y += time;
-    xx += number * number;
-    xy += number * time;
-    yy += time * time;
-    const double spread = n * xx - x * x;
-    if (n >= kFewestTimed && spread > 0) period = (n * xy - x * y) / spread;
+    w += weight;
+    x += weight * number;
+    y += weight * time;
+    xx += weight * number * number;
+    xy += weight * number * time;
+    const double spread = w * xx - x * x;
+    if (n >= kFewestTimed && spread > 0) period = (w * xy - x * y) / spread;
   }
-  const double spread = n * xx - x * x;
+  const double spread = w * xx - x * x;
   if (n < kFewestTimed || spread <= 0) return;
-  const double slope = (n * xy - x * y) / spread;
-  const double offset = (y - slope * x) / n;
+  const double slope = (w * xy - x * y) / spread;
+  const double offset = (y - slope * x) / w;
   double squares = 0;
   for (const TimedFrame& frame : result.times) {
-    if (!frame.timed) continue;
+    if (!usable(frame)) continue;
     const double off = frame.exposed - start - offset - slope * static_cast<double>(frame.number);
-    squares += off * off;
+    squares += weight_of(frame) * off * off;
   }
-  const double sigma = std::sqrt(squares / (n - 2) * n / spread) / slope;
+  const double sigma = std::sqrt(squares / (n - 2) * w / spread) / slope;
   result.frame_rate = {1 / slope, std::hypot(sigma, input.clock_rate_sigma) / slope, true};
 }
 
@@ -147,7 +157,9 @@ void measure_global_shutter(const BandwidthInput& input, BandwidthFit& fit,
   start.jitter.value = fit.camera().jitter;
   start.exposure.value = fit.camera().exposure;
   const GlobalShutter found = fit_global_shutter(input, fit.light(), start);
-  fit.set_camera({found.latency.value, found.jitter.value, 0, found.exposure.value});
+  const double finest = kFinestTime * found.exposure.value;
+  fit.set_camera(
+      {found.latency.value, std::max(found.jitter.value, finest), 0, found.exposure.value});
   copy_times(input, fit, result);
   for (std::size_t i = 0; i < result.times.size(); ++i) {
     TimedFrame& frame = result.times[i];
@@ -156,13 +168,18 @@ void measure_global_shutter(const BandwidthInput& input, BandwidthFit& fit,
     frame.sigma = found.sigmas[i];
     frame.timed = frame.freshness != Freshness::strange && frame.sigma < kTellsTime * input.bit;
   }
-  fit_rate(input, result);
+  fit_rate(input, true, result);
   fit_latency(input, fit, result);
   count_frames(input, result);
   result.latency = found.latency;
-  result.latency.sigma = std::hypot(found.latency.sigma, input.edge_sigma);
+  // What the delays' distribution looks like, a normal one or one with a long tail, cannot be seen.
+  const double shape = kShape * found.jitter.value;
+  result.latency.sigma = std::sqrt(std::pow(found.latency.sigma, 2) + std::pow(shape, 2) +
+                                   std::pow(input.edge_sigma, 2));
   result.jitter = found.jitter;
+  result.jitter.sigma = std::hypot(found.jitter.sigma, shape);
   result.exposure = found.exposure;
+  result.exposure.sigma = std::hypot(found.exposure.sigma, shape);
   result.readout = {0, kGlobalReadout * input.bit, true};
 }
 
@@ -210,7 +227,7 @@ BandwidthResult measure_bandwidth(const BandwidthInput& input) {
     return result;
   }
   copy_times(input, fit, result);
-  fit_rate(input, result);
+  fit_rate(input, false, result);
   fit_latency(input, fit, result);
   count_frames(input, result);
   const Eigen::Vector2d sigma = fit.covariance().diagonal().cwiseMax(0).cwiseSqrt();

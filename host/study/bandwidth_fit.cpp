@@ -50,9 +50,16 @@ double BandwidthFit::cost(std::size_t picture, double time) const noexcept {
   return sum;
 }
 
+/// Late pictures come exponentially rarer, not as a Gaussian.
 double BandwidthFit::prior(std::size_t picture, double time) const noexcept {
-  const double off = (time - expected(picture)) / camera_.jitter;
-  return off * off;
+  const double off = std::abs(time - expected(picture)) / camera_.jitter;
+  return off < 1 ? off * off : 2 * off - 1;
+}
+
+/// Half of the prior's slope over the time's distance from what is expected.
+double BandwidthFit::prior_weight(std::size_t picture, double time) const noexcept {
+  const double off = std::abs(time - expected(picture)) / camera_.jitter;
+  return 1 / (camera_.jitter * camera_.jitter * std::max(off, 1.0));
 }
 
 /// Newton's way downhill from the picture's time, by no more than a bit.
@@ -60,12 +67,12 @@ void BandwidthFit::settle(std::size_t picture) noexcept {
   constexpr int kSteps = 8;
   Picture& p = pictures_[picture];
   const RowProfile& rows = input_.frames[picture].rows;
-  const double prior_weight = 1 / (camera_.jitter * camera_.jitter);
   const double start = p.time;
   double value = cost(picture, p.time) + prior(picture, p.time);
   double information = 0;
   for (int i = 0; i < kSteps; ++i) {
-    double slope = prior_weight * (expected(picture) - p.time);
+    const double weight = prior_weight(picture, p.time);
+    double slope = weight * (expected(picture) - p.time);
     information = 0;
     for (std::size_t b = 0; b < bands_; ++b) {
       const SeenLight seen = light_.seen(input_.bands[b], times(p.time));
@@ -73,8 +80,7 @@ void BandwidthFit::settle(std::size_t picture) noexcept {
       slope += weight_[b] * by_time * (rows[b] - dark_[b] - gain_[b] * seen.mean);
       information += weight_[b] * by_time * by_time;
     }
-    double step =
-        std::clamp(slope / (information + prior_weight), -0.5 * input_.bit, 0.5 * input_.bit);
+    double step = std::clamp(slope / (information + weight), -0.5 * input_.bit, 0.5 * input_.bit);
     bool better = false;
     for (int half = 0; half < 4 && !better; ++half, step *= 0.5) {
       const double time = std::clamp(p.time + step, start - input_.bit, start + input_.bit);
@@ -232,14 +238,13 @@ double BandwidthFit::step() noexcept {
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero(), scatter = information;
   Eigen::Vector2d slope = Eigen::Vector2d::Zero(), follow = slope;
   int count = 0;
-  const double prior_weight = 1 / (camera_.jitter * camera_.jitter);
   for (std::size_t i = 0; i < pictures_.size(); ++i) {
     const Picture& p = pictures_[i];
     if (!p.good) continue;
     Eigen::Matrix2d aa = Eigen::Matrix2d::Zero();
     Eigen::Vector2d at = Eigen::Vector2d::Zero(), ar = at;
-    double tt = p.alone ? prior_weight : 0;
-    double tr = p.alone ? prior_weight * (expected(i) - p.time) : 0;
+    double tt = p.alone ? prior_weight(i, p.time) : 0;
+    double tr = tt * (expected(i) - p.time);
     for (std::size_t b = 0; b < bands_; ++b) {
       const SeenLight seen = light_.seen(input_.bands[b], times(p.time));
       const Column& c = columns[b];

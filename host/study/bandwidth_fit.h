@@ -64,6 +64,7 @@ class BandwidthFit {
 
  private:
   double prior(std::size_t picture, double time) const noexcept;
+  double prior_weight(std::size_t picture, double time) const noexcept;
   ExposureTimes times(double middle) const noexcept {
     return {middle, camera_.readout, camera_.exposure};
   }

@@ -54,7 +54,8 @@ TEST_F(BoardCliTest, InfoPrintsTheIdentity) {
                            "4 load cells, 2 analogue (10 bits), 2 buttons", "5.02 V", "ppm"}) {
     EXPECT_NE(got.out.find(part), std::string::npos) << part << " in\n" << got.out;
   }
-  const json about = json::parse(run_bridge({"board", "info", "--json", "--port", board.path()}).out);
+  const json about =
+      json::parse(run_bridge({"board", "info", "--json", "--port", board.path()}).out);
   EXPECT_EQ(about["board"], "model");
   EXPECT_EQ(about["id"], "0102030405060708");
   EXPECT_NEAR(about["skew_ppm"].get<double>(), 300, 3000);
@@ -112,8 +113,8 @@ TEST_F(BoardCliTest, WatchForPeopleShowsNewtonsCountsAndWhatIsNotWired) {
 TEST_F(BoardCliTest, LogWritesWholeLinesOfCsv) {
   ServedBoard board;
   const std::string file = (folder / "log.csv").string();
-  const Outcome got = run_bridge(
-      {"board", "log", "--out", file, "--seconds", "0.5", "--port", board.path()});
+  const Outcome got =
+      run_bridge({"board", "log", "--out", file, "--seconds", "0.5", "--port", board.path()});
   EXPECT_EQ(got.status, 0) << got.err;
   const std::string text = read_file(file);
   const std::vector<std::string> lines = lines_of(text);
@@ -125,8 +126,7 @@ TEST_F(BoardCliTest, LogWritesWholeLinesOfCsv) {
 
 TEST_F(BoardCliTest, AFullDiskIsOneLineAndExit1) {
   ServedBoard board;
-  const Outcome got =
-      run_bridge({"board", "log", "--out", "/dev/full", "--port", board.path()});
+  const Outcome got = run_bridge({"board", "log", "--out", "/dev/full", "--port", board.path()});
   EXPECT_EQ(got.status, 1);
   EXPECT_NE(got.err.find("/dev/full: cannot be written: No space left"), std::string::npos)
       << got.err;
@@ -162,8 +162,7 @@ TEST_F(BoardCliTest, ALightBeyondTheLimitsIsRefusedHereOrByTheBoard) {
   EXPECT_EQ(run_bridge({"board", "led", "nan%", "--port", "/dev/null"}).status, 2);
   EXPECT_EQ(run_bridge({"board", "led", "strobe", "5", "--port", "/dev/null"}).status, 2);
   ServedBoard board(0xF, [](BoardModel& m) { m.led_result = link::Result::out_of_range; });
-  const Outcome got =
-      run_bridge({"board", "led", "strobe", "10", "5", "--port", board.path()});
+  const Outcome got = run_bridge({"board", "led", "strobe", "10", "5", "--port", board.path()});
   EXPECT_EQ(got.status, 2);
   EXPECT_NE(got.err.find("beyond its limits"), std::string::npos) << got.err;
 }
@@ -291,9 +290,8 @@ class FlashTest : public BoardCliTest {
 
   /// What stands for avrdude: keeps its arguments and ends as told.
   void avrdude(const std::string& last_line) const {
-    write_file(folder / "avrdude",
-               "#!/bin/sh\nprintf '%s\\n' \"$@\" > '" + (folder / "arguments").string() + "'\n" +
-                   last_line + "\n");
+    write_file(folder / "avrdude", "#!/bin/sh\nprintf '%s\\n' \"$@\" > '" +
+                                       (folder / "arguments").string() + "'\n" + last_line + "\n");
     std::filesystem::permissions(folder / "avrdude", std::filesystem::perms::owner_all);
   }
   std::string image() const { return (folder / "image.hex").string(); }
@@ -305,16 +303,16 @@ TEST_F(FlashTest, ADryRunPrintsTheArgumentsAndRunsNothing) {
   const Outcome got = run_bridge({"board", "flash", "--board", "nano-old", "--port", "/dev/ttyX",
                                   "--image", image(), "--dry-run"});
   EXPECT_EQ(got.status, 0) << got.err;
-  EXPECT_EQ(got.out, "avrdude -p m328p -c arduino -b 57600 -P /dev/ttyX -D -U flash:w:" + image() +
-                         ":i\n");
+  EXPECT_EQ(got.out,
+            "avrdude -p m328p -c arduino -b 57600 -P /dev/ttyX -D -U flash:w:" + image() + ":i\n");
   EXPECT_FALSE(std::filesystem::exists(folder / "arguments"));
 }
 
 TEST_F(FlashTest, TheBoardIsAskedForItsVersionAfterwards) {
   avrdude("exit 0");
   ServedBoard board;
-  const Outcome got = run_bridge(
-      {"board", "flash", "--board", "uno", "--port", board.path(), "--image", image()});
+  const Outcome got =
+      run_bridge({"board", "flash", "--board", "uno", "--port", board.path(), "--image", image()});
   EXPECT_EQ(got.status, 0) << got.err;
   EXPECT_NE(got.err.find("firmware 0.1.0"), std::string::npos) << got.err;
   EXPECT_EQ(read_file(folder / "arguments"), "-p\nm328p\n-c\narduino\n-b\n115200\n-P\n" +
@@ -325,16 +323,18 @@ TEST_F(FlashTest, TheBoardIsAskedForItsVersionAfterwards) {
 TEST_F(FlashTest, AnotherChipIsRefusedByAvrdudeAndSaid) {
   avrdude("echo 'Expected signature for ATmega328P is 1E 95 0F' >&2; exit 1");
   ServedBoard board;
-  const Outcome got = run_bridge(
-      {"board", "flash", "--board", "uno", "--port", board.path(), "--image", image()});
+  const Outcome got =
+      run_bridge({"board", "flash", "--board", "uno", "--port", board.path(), "--image", image()});
   EXPECT_EQ(got.status, 1);
   EXPECT_NE(got.err.find("is it a uno with an ATmega328P?"), std::string::npos) << got.err;
 }
 
 TEST_F(FlashTest, WhatIsNoImageIsRefused) {
-  write_file(folder / "image.hex", "\x7f" "ELF and so on");
-  const Outcome got = run_bridge(
-      {"board", "flash", "--board", "uno", "--image", image(), "--dry-run"});
+  write_file(folder / "image.hex",
+             "\x7f"
+             "ELF and so on");
+  const Outcome got =
+      run_bridge({"board", "flash", "--board", "uno", "--image", image(), "--dry-run"});
   EXPECT_EQ(got.status, 2);
   EXPECT_NE(got.err.find("not an Intel HEX file"), std::string::npos) << got.err;
 }

@@ -87,6 +87,7 @@ class Bridge {
     }
     return true;
   }
+  const std::string& out() const { return outcome_.out; }
   const std::string& err() const { return outcome_.err; }
   void close_stdout() { out_.reset(); }
   void close_stderr() { err_.reset(); }

@@ -316,11 +316,18 @@ void AvrCore::finish_reset() {
   for (CycleTimer* timer : timers_) {
     if (timer->due_) timer->arm();
   }
-  for (char port = 'B'; port <= 'D'; ++port) {  // the pins are as they were
-    const auto i = static_cast<std::size_t>(port - 'B');
-    data(pin_register(port)) = static_cast<std::uint8_t>(levels_[i] & driven_[i]);
-  }
+  for (char port = 'B'; port <= 'D'; ++port) forget_pins(port);
   for (const auto& callback : after_reset_) callback();
+}
+
+/// simavr forgets the levels of pins, but not what it last told of them: a pull-up that is set
+/// again would change nothing.
+void AvrCore::forget_pins(char port) {
+  const auto i = static_cast<std::size_t>(port - 'B');
+  const auto levels = static_cast<std::uint8_t>(levels_[i] & driven_[i]);
+  data(pin_register(port)) = levels;
+  for (int bit = 0; bit < 8; ++bit)
+    avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(port), bit)->value = levels >> bit & 1U;
 }
 
 void AvrCore::hang(bool interrupts_off) {

@@ -183,6 +183,7 @@ class AvrCore {
   void set_batch();
   void note_call(std::uint32_t pc);
   void set_external(char port);
+  void forget_pins(char port);
   avr_int_vector_t* vector(std::uint8_t number) const;
 
   avr_t* avr_ = nullptr;

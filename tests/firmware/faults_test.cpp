@@ -211,6 +211,26 @@ TEST_F(Inputs, ABouncingButtonIsOneEventAtItsFirstEdge) {
   }
 }
 
+TEST_F(Inputs, AResetIsNoButton) {
+  board.move_button(1, true, board.now());
+  client.run(milliseconds(100));
+  client.forget();
+  board.press_reset();
+  ASSERT_TRUE(client.greet());
+  client.run(milliseconds(200));
+  for (const auto& event : client.all<link::ButtonEvent>()) EXPECT_EQ(event.message.button, 1);
+  board.move_button(1, false, board.now());
+  client.run(milliseconds(200));
+  client.forget();
+  for (const bool pressed : {true, false}) {
+    board.move_button(1, pressed, board.now());
+    client.run(milliseconds(200));
+  }
+  ASSERT_EQ(client.all<link::ButtonEvent>().size(), 2U);
+  EXPECT_TRUE(client.all<link::ButtonEvent>()[0].message.pressed);
+  EXPECT_FALSE(client.all<link::ButtonEvent>()[1].message.pressed);
+}
+
 TEST_F(Inputs, ASpikeOnAButtonIsNone) {
   configure();
   for (int i = 0; i < 5; ++i) {

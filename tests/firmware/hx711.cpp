@@ -10,8 +10,9 @@ namespace {
 constexpr std::int32_t kHighest = 0x7FFFFF;
 constexpr std::int32_t kLowest = -0x800000;
 constexpr VirtualTime kPowerDown = std::chrono::microseconds(60);
-/// No further pulse for so long: the read-out is over. The datasheet's longest pulse is 50 us.
-constexpr VirtualTime kPulsesOver = std::chrono::microseconds(100);
+/// No further pulse for so long: the read-out is over. The datasheet limits the clock's high time
+/// only.
+constexpr VirtualTime kPulsesOver = std::chrono::milliseconds(2);
 /// The data line shows an unread conversion's replacement by a short high level.
 constexpr VirtualTime kReplaced = std::chrono::microseconds(20);
 constexpr int kSettlingPeriods = 4;  // "settling time": 400 ms at 10/s, 50 ms at 80/s
@@ -74,6 +75,7 @@ void Hx711::restart(Cycle when) {
 void Hx711::convert(Cycle when) {
   const VirtualTime period_ns(std::llround(period() * 1e9));
   conversion_.at(when + core_.cycles_of(period_ns));
+  if (pulses_ > 24) end_pulses();
   if (pulses_ != 0) {  // what is shifted out stays what it was; this conversion is lost
     ++collisions_;
     return;
@@ -130,6 +132,7 @@ void Hx711::clock(bool level, Cycle when) {
 void Hx711::end_pulses() {
   const unsigned pulses = pulses_;
   pulses_ = 0;
+  last_pulse_.cancel();
   if (powered_down_ || pulses == 0) return;
   reads_.add(last_pulse_at_ - read_begin_);
   if (pulses < 25) {  // an interrupted read-out leaves the line where it was

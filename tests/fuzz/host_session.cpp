@@ -1,5 +1,5 @@
-// The host's session against any board: raw bytes, frames with a right CRC around any body, and time
-// that goes on in any steps.
+// The host's session against any board: raw bytes, frames with a right CRC around any body, and
+// time that goes on in any steps.
 #include <algorithm>
 #include <cstdint>
 #include <span>

@@ -1,10 +1,11 @@
 // Any bytes through the OptoForce parser, in any pieces, and its counters through the clock.
+#include "host/link/optoforce.h"
+
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "host/link/counter_clock.h"
-#include "host/link/optoforce.h"
 #include "tests/fuzz/expect.h"
 
 namespace {

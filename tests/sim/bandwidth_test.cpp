@@ -6,11 +6,14 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "host/bandwidth_measurement.h"
 #include "host/bandwidth_report.h"
 #include "host/config/scenario_config.h"
+#include "host/screen_measurement.h"
+#include "host/screen_window.h"
 #include "host/simulated_lamp.h"
 #include "host/source/simulator/simulator_source.h"
 
@@ -133,6 +136,45 @@ TEST(BandwidthMeasurement, SaysWhyASceneTellsNothing) {
   sunny.light.glare_counts = 0;
   sunny.light.room = 7;
   EXPECT_NE(measure(sunny).measurement.refusal.find("not the LED's"), std::string::npos);
+}
+
+TEST(ScreenMeasurement, RecoversFrameRateAndLatency) {
+  sim::Scenario scenario = bandwidth_scenario();
+  scenario.delivery.stale_share = 0;
+  SimulatedLamp screen(/*live=*/false);
+  WatchedCamera camera(scenario, screen);
+  ScreenOptions options;
+  options.seconds = 20;
+  const ScreenMeasurement m = measure_screen(camera, screen, options);
+  ASSERT_EQ(m.refusal, "");
+  std::printf("rate %.4f +- %.4f Hz, latency %.2f +- %.2f ms, %d flips\n", m.frame_rate.value,
+              m.frame_rate.sigma, 1e3 * m.latency.value, 1e3 * m.latency.sigma, m.flips);
+  EXPECT_NEAR(m.frame_rate.value, scenario.delivery.true_frame_rate, 0.01);
+  EXPECT_LT(std::abs(m.latency.value - scenario.delivery.latency), 3 * m.latency.sigma);
+  EXPECT_LT(m.latency.sigma, 2e-3);
+  EXPECT_GT(m.flips, 100);
+  EXPECT_EQ(m.missed, 0);
+}
+
+TEST(ScreenWindow, FlipsNoEarlierThanItIsTold) {
+  ::setenv("SDL_VIDEODRIVER", "dummy", 1);
+  ScreenWindow window;
+  EXPECT_NE(window.description().find("dummy"), std::string::npos);
+  const TimePoint soon = std::chrono::steady_clock::now() + std::chrono::milliseconds(30);
+  EXPECT_GE(window.show(true, soon), soon);
+  EXPECT_FALSE(window.closed());
+  const TimePoint past = window.show(false, soon - std::chrono::seconds(1));
+  EXPECT_GT(past, soon) << "now, where the time is past";
+}
+
+TEST(ScreenMeasurement, SaysThatTheScreenIsNotInView) {
+  sim::Scenario scenario = bandwidth_scenario();
+  scenario.light.level_counts = 1;
+  scenario.light.glare_counts = 0;
+  SimulatedLamp screen(/*live=*/false);
+  WatchedCamera camera(scenario, screen);
+  EXPECT_NE(measure_screen(camera, screen, {}).refusal.find("does not see the screen"),
+            std::string::npos);
 }
 
 TEST(BandwidthMeasurement, TheReportsSayTheSame) {

@@ -9,24 +9,33 @@ namespace tagwrench {
 namespace board {
 namespace {
 
-constexpr uint8_t kBits = 24;
+constexpr uint8_t kEntryUs = 3;  ///< from the line's fall to reading the clock
 
-uint8_t pulses[kCells];  ///< for one reading: 24 bits, and 1 to 3 that choose the next input
-volatile uint8_t ready;  ///< bit per channel
+uint8_t input_pulses[kCells];  ///< 1 to 3 after the 24 bits choose the next input
+volatile uint8_t ready;        ///< bit per channel
 volatile uint8_t lines_before;
 uint32_t ready_us[kCells];
 volatile uint8_t lost[kCells];
 
-/// The amplifier sleeps after 60 us of high clock, so no interrupt may come in between. Bits are
-/// valid 0.1 us after the clock's rise.
-bool clock_bit(uint8_t channel) {
-  const uint8_t clock = clock_line(channel);
+/// One pulse, and the data line at its end. The amplifier sleeps after 60 us of high clock, so no
+/// interrupt may come in between; between two pulses any may. Data are valid 0.1 us after the
+/// clock's rise.
+inline __attribute__((always_inline)) bool pulse(uint8_t clock, uint8_t line) {
   const Atomic atomic;
   PORTD |= clock;
   _delay_loop_1(1);
-  const bool bit = (PINC & data_line(channel)) != 0;
+  const bool high = (PINC & line) != 0;
   PORTD &= static_cast<uint8_t>(~clock);
-  return bit;
+  return high;
+}
+
+uint8_t read_byte(uint8_t clock, uint8_t line) {
+  uint8_t byte = 0;
+  for (uint8_t i = 0; i < 8; ++i) {
+    byte = static_cast<uint8_t>(byte << 1);
+    if (pulse(clock, line)) byte |= 1;
+  }
+  return byte;
 }
 
 /// Interrupts are off. Forgets what the line did.
@@ -70,7 +79,7 @@ void cell_input(uint8_t channel, link::CellInput input) {
     return;
   }
   PORTD &= static_cast<uint8_t>(~clock_line(channel));
-  pulses[channel] = static_cast<uint8_t>(kBits + static_cast<uint8_t>(input));
+  input_pulses[channel] = static_cast<uint8_t>(input);
   watch(channel);
   // It may have been ready for long, and then its line does not fall.
   if (PINC & line) return;
@@ -93,17 +102,15 @@ bool cell_take(Conversion& conversion) {
     conversion.lost = lost[channel];
     lost[channel] = 0;
   }
-  uint8_t bytes[3] = {};
-  for (uint8_t i = 0; i < kBits; ++i) {
-    uint8_t& byte = bytes[i / 8];
-    byte = static_cast<uint8_t>(byte << 1);
-    if (clock_bit(channel)) byte |= 1;
-  }
-  for (uint8_t i = kBits; i < pulses[channel]; ++i) clock_bit(channel);
-  const uint8_t sign = bytes[0] & 0x80 ? 0xFF : 0;
-  conversion.counts = static_cast<int32_t>(static_cast<uint32_t>(sign) << 24 |
-                                           static_cast<uint32_t>(bytes[0]) << 16 |
-                                           static_cast<uint32_t>(bytes[1]) << 8 | bytes[2]);
+  const uint8_t clock = clock_line(channel);
+  const uint8_t high = read_byte(clock, line);
+  const uint8_t middle = read_byte(clock, line);
+  const uint8_t low = read_byte(clock, line);
+  for (uint8_t i = input_pulses[channel]; i > 0; --i) pulse(clock, line);
+  const uint8_t sign = high & 0x80 ? 0xFF : 0;
+  conversion.counts =
+      static_cast<int32_t>(static_cast<uint32_t>(sign) << 24 | static_cast<uint32_t>(high) << 16 |
+                           static_cast<uint16_t>(middle << 8) | low);
   const Atomic atomic;
   conversion.stuck = (PINC & line) == 0;
   watch(channel);
@@ -119,7 +126,7 @@ ISR(PCINT1_vect) {
   const uint8_t fell = lines_before & static_cast<uint8_t>(~lines) & PCMSK1;
   lines_before = lines;
   if (fell == 0) return;
-  const uint32_t now = now_us_atomic();
+  const uint32_t now = now_us_atomic() - kEntryUs;
   for (uint8_t i = 0; i < kCells; ++i) {
     if (!(fell & data_line(i))) continue;
     if (ready & data_line(i)) ++lost[i];

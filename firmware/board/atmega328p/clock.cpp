@@ -6,9 +6,9 @@ namespace board {
 namespace {
 
 constexpr uint32_t kUsPerOverflow = 32768;
-volatile uint32_t overflows_us;
-
 }  // namespace
+
+volatile uint32_t overflows_us;
 
 void start_clock() {
   TCCR1A = 0;
@@ -16,12 +16,17 @@ void start_clock() {
   TIMSK1 = 1 << TOIE1;
 }
 
+uint32_t to_us(const ClockReading& reading) {
+  uint32_t us = reading.overflows_us;
+  // It may have overflowed just before, and its interrupt not have been served yet.
+  if ((reading.flags & (1 << TOV1)) && reading.ticks < 0x8000) us += kUsPerOverflow;
+  return us + (reading.ticks >> 1);
+}
+
 uint32_t now_us_atomic() {
-  const uint16_t ticks = TCNT1;
-  uint32_t us = overflows_us;
-  // It may have overflowed just now, and its interrupt not been served yet.
-  if ((TIFR1 & (1 << TOV1)) && ticks < 0x8000) us += kUsPerOverflow;
-  return us + (ticks >> 1);
+  ClockReading reading;
+  read_clock(reading);
+  return to_us(reading);
 }
 
 uint32_t now_us() {

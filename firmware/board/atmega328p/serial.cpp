@@ -7,9 +7,15 @@ namespace {
 
 /// Zero bytes, which end frames, are followed by their time in the ring.
 constexpr uint8_t kStampBytes = 4;
-constexpr uint8_t kReceiveBytes = 64;
+constexpr uint8_t kReceiveBytes = 88;
 constexpr uint8_t kSendBytes = 96;
-constexpr uint32_t kByteUs = 10000000ul / link::kBaud;
+
+/// Ticks of timer 1, half a microsecond each: a byte on the wire; from reading the timer to the
+/// beginning of the start bit, which waits for the next tick of the baud rate; and from the end of
+/// a byte to reading the timer in the interrupt.
+constexpr uint16_t kByteTicks = 2 * 10000000ul / link::kBaud;
+constexpr uint16_t kStartTicks = 2 * 2;
+constexpr uint8_t kArrivalUs = 3;
 
 volatile uint8_t received[kReceiveBytes];
 volatile uint8_t received_head;
@@ -26,7 +32,9 @@ volatile uint8_t sending_used;
 enum class Stamp : uint8_t { none, waiting, taken };
 volatile Stamp departure;
 volatile uint8_t departure_at;  ///< index in `sending`
-volatile uint32_t departure_us;
+uint16_t departure_ticks;
+ClockReading departure_clock;  ///< about then
+uint16_t line_free_ticks;      ///< when the last byte so far will have left
 
 constexpr uint8_t next(uint8_t index, uint8_t size) {
   return index + 1 == size ? 0 : static_cast<uint8_t>(index + 1);
@@ -61,7 +69,7 @@ inline void receive(uint8_t byte) {
     return;
   }
   last_was_zero = true;
-  const uint32_t now = now_us_atomic();
+  const uint32_t now = now_us_atomic() - kArrivalUs;
   put_received(0);
   put_received(static_cast<uint8_t>(now));
   put_received(static_cast<uint8_t>(now >> 8));
@@ -72,14 +80,18 @@ inline void receive(uint8_t byte) {
 
 inline void transmit() {
   const uint8_t tail = sending_tail;
-  if (departure == Stamp::waiting && tail == departure_at) {
-    // The shift register has begun with the byte before, unless all was sent long ago.
-    const bool idle = (UCSR0A & (1 << TXC0)) != 0;
-    departure_us = now_us_atomic() + (idle ? 0 : kByteUs);
-    departure = Stamp::taken;
-  }
+  // Unless all was sent long ago, the shift register has begun with the byte before.
+  const bool idle = (UCSR0A & (1 << TXC0)) != 0;
+  const uint16_t now_ticks = TCNT1;
   UCSR0A = 1 << TXC0;
   UDR0 = sending[tail];
+  if (idle) line_free_ticks = now_ticks + kStartTicks;
+  if (departure == Stamp::waiting && tail == departure_at) {
+    departure_ticks = line_free_ticks;
+    read_clock(departure_clock);
+    departure = Stamp::taken;
+  }
+  line_free_ticks += kByteTicks;
   sending_tail = next(tail, kSendBytes);
   if (--sending_used == 0) UCSR0B &= static_cast<uint8_t>(~(1 << UDRIE0));
 }
@@ -135,7 +147,8 @@ void serial_send(const uint8_t* bytes, uint8_t count, bool stamped) {
 
 bool serial_departure(uint32_t& time_us) {
   const Atomic atomic;
-  time_us = departure_us;
+  const int16_t ahead_ticks = static_cast<int16_t>(departure_ticks - departure_clock.ticks);
+  time_us = to_us(departure_clock) + static_cast<uint32_t>(ahead_ticks / 2);
   return departure == Stamp::taken;
 }
 

@@ -44,7 +44,7 @@ def body(setup):
     second, _, err = rig.run(setup.tagwrench, "board", "info", "--port", port, patience=60)
     rig.check("a second host is told that the port is taken", second == 2 and err.count("\n") == 1, err)
     touch("/run/rig/usb-unplug")
-    rig.check("an unplugged board is said to be gone", watch.wait_error("unplugged"), watch.state())
+    rig.check("an unplugged board is said to be gone", watch.wait_error("the port is gone"), watch.state())
     rig.check("and its device node goes", rig.wait_until(lambda: not os.path.exists(port)), port)
     seen = len(watch.out)
     touch("/run/rig/usb-plug")
@@ -54,7 +54,8 @@ def body(setup):
     channels = sorted({sample["channel"] for sample in cells(watch.out[seen:])})
     rig.check("with all four load cells", channels == [0, 1, 2, 3], channels)
     times = [sample["t_ns"] for sample in cells(watch.out) if sample["channel"] == 0]
-    rig.check("time stamps go on growing", all(a < b for a, b in zip(times, times[1:])), times[:5])
+    backwards = [(a, b) for a, b in zip(times, times[1:]) if a >= b]
+    rig.check("time stamps go on growing", len(times) > 100 and not backwards, backwards[:3])
     rig.check("Ctrl-C ends it with status 0", watch.stop(rig.signal.SIGINT) == 0, watch.state())
 
 

@@ -49,4 +49,7 @@ def main(folder):
         time.sleep(0.05)
 
 
-main(sys.argv[1])
+try:
+    main(sys.argv[1])
+except (BrokenPipeError, ConnectionResetError):
+    pass  # QEMU has ended

@@ -204,6 +204,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "sensor.yaml:1: camera.readout_ms:", "from 0 "},
         BadCase{"ReadoutLongerThanAnyFrame", "cx: 319.5", "cx: 319.5, readout_ms: 200.5",
                 "sensor.yaml:1: camera.readout_ms:", "to 200, is 200.5"},
+        BadCase{"LatencyLongerThanAnyCamera", "cx: 319.5", "cx: 319.5, latency_ms: 501",
+                "sensor.yaml:1: camera.latency_ms:", "to 500, is 501"},
         BadCase{"NoSpringsNoCalibration", "  springs:\n", "  strings:\n",
                 "sensor.yaml:10: wrench.calibration:", "either"},
         BadCase{"NoSuchCalibration", "  springs:\n",

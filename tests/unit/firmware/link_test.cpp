@@ -90,6 +90,19 @@ TEST_P(FirmwareLink, ADepartureThatHasNotBeenYetIsNotTold) {
   EXPECT_FALSE(all<link::TimeReply>()[1].previous_valid);
 }
 
+TEST_P(FirmwareLink, TheRoomThatIsAskedForIsThatOfTheLongestReports) {
+  const auto frame_bytes = [](const auto& message) {
+    std::uint8_t frame[link::kMostFrameBytes];
+    return link::write_frame(frame + 1, link::encode(message, 255, frame + 1), frame);
+  };
+  const std::uint32_t most = 0xFFFFFFFF;
+  EXPECT_EQ(frame_bytes(link::CellSample{3, -0x800000, most, 0xFFFF, 0xFFFF, true}),
+            Link::kMostSampleBytes);
+  EXPECT_LE(frame_bytes(link::AdcSample{1, 0xFFFF, most, 0xFFFF}), Link::kMostSampleBytes);
+  EXPECT_EQ(frame_bytes(link::TimeReply{255, most, 255, most, true}), Link::kMostAnswerBytes);
+  EXPECT_LE(frame_bytes(link::Answer{255, 255, link::Result::already_set}), Link::kMostAnswerBytes);
+}
+
 TEST_P(FirmwareLink, ARequestWaitsUntilThereIsRoomForItsAnswer) {
   greet();
   board.room = 23;
@@ -101,6 +114,23 @@ TEST_P(FirmwareLink, ARequestWaitsUntilThereIsRoomForItsAnswer) {
   run(2 * kPollUs);
   ASSERT_EQ(all<link::Answer>().size(), 1u);
   EXPECT_EQ(board.steady_permille, 50);
+}
+
+TEST_P(FirmwareLink, FaultsThatWaitedTooLongForRoomAreCounted) {
+  greet();
+  ASSERT_EQ(ask(configuration()), link::Result::ok);
+  // Four cells fall silent, the LED gets hot, and then the host falls silent: one more than can
+  // wait.
+  ASSERT_EQ(ask(steady(1000)), link::Result::ok);
+  board.room = 24;
+  run_alive(11000000);
+  EXPECT_TRUE(all<link::Fault>().empty());
+  run(5200000);
+  board.room = 255;
+  run(1100000);
+  EXPECT_EQ(all<link::Fault>().size(), 5u);
+  ASSERT_FALSE(all<link::Status>().empty());
+  EXPECT_EQ(all<link::Status>().back().dropped_reports, 1);
 }
 
 TEST_P(FirmwareLink, TheLightGoesOffWhenNothingCanBeSentAnyMore) {

@@ -100,8 +100,12 @@ TEST_F(BoardLinkTest, ATerminalThatGotTheSameNumberIsLeftAlone) {
   ASSERT_TRUE(serve(link, [&] { return link.session().state() == BoardState::ready; }));
   const std::string number = device.path();
   device.unplug();  // the link stays, as after a crash
-  device.open();
-  ASSERT_EQ(device.path(), number);
+  ASSERT_TRUE(serve(link, [&] { return !link.plugged(); }));
+  std::vector<Pty> lower(8);  // the lowest free number is given first
+  for (Pty& other : lower) {
+    if (other.path() == number) std::swap(device, other);
+  }
+  if (device.path() != number) GTEST_SKIP() << number << " was taken by another program";
   const double end = now() + 1.2;
   serve(link, [&] { return now() > end; });
   EXPECT_FALSE(link.plugged()) << "it belongs to somebody else now";
@@ -141,8 +145,8 @@ TEST(NewSessionTest, SessionsAndIdsDiffer) {
   EXPECT_NE(a.session, b.session);
   EXPECT_NE(a.session, 0u);
   EXPECT_EQ(a.new_id.count, kIdBytes);
-  EXPECT_FALSE(std::equal(std::begin(a.new_id.bytes), std::end(a.new_id.bytes),
-                          std::begin(b.new_id.bytes)));
+  EXPECT_FALSE(
+      std::equal(std::begin(a.new_id.bytes), std::end(a.new_id.bytes), std::begin(b.new_id.bytes)));
 }
 
 }  // namespace

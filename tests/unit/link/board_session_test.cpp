@@ -37,9 +37,11 @@ class BoardSessionTest : public ::testing::Test {
       sent += count;
       const double arrived = now + static_cast<double>(count) * 20e-6;
       board.take({bytes, count}, arrived);
+      for (int i = 0; i < chatter && !board.out.empty(); ++i) board.send_cell(1, i, arrived, 0);
       const std::vector<std::uint8_t> reply = board.take_out();
       if (!reply.empty() && connected) {
-        session.take(reply, SyntheticLink::host(arrived + static_cast<double>(reply.size()) * 20e-6));
+        session.take(reply,
+                     SyntheticLink::host(arrived + static_cast<double>(reply.size()) * 20e-6));
       }
       for (News item; session.next(item);) news.push_back(item);
       now += 1e-3;
@@ -64,6 +66,7 @@ class BoardSessionTest : public ::testing::Test {
   double next_status = 0;
   double status_period = 1;
   bool connected = true;
+  int chatter = 0;  ///< samples that come right behind every answer
   std::size_t sent = 0;
 };
 
@@ -213,14 +216,13 @@ TEST_F(BoardSessionTest, ARestartedBoardIsConfiguredAndLitAgainAndSaid) {
   EXPECT_TRUE(board.configured);
   ASSERT_FALSE(board.leds.empty());
   EXPECT_EQ(board.leds.back().level_permille, 200);
-  const auto restarted = std::find_if(news.begin(), news.end(), [](const News& n) {
-    return n.kind == News::Kind::restarted;
-  });
+  const auto restarted = std::find_if(
+      news.begin(), news.end(), [](const News& n) { return n.kind == News::Kind::restarted; });
   EXPECT_NE(text(*restarted).find("watchdog"), std::string::npos);
-  const double error =
-      SyntheticLink::seconds(session.clock().to_host(clock.board_us(now)).time -
-                             SyntheticLink::host(now));
+  const double error = SyntheticLink::seconds(session.clock().to_host(clock.board_us(now)).time -
+                                              SyntheticLink::host(now));
   EXPECT_NEAR(error, 0, 1e-3) << "the clock started anew";
+  EXPECT_EQ(session.clock().report().jumps, 0u) << "because it was told so";
 }
 
 TEST_F(BoardSessionTest, ASilentBoardIsGreetedAgain) {
@@ -251,8 +253,11 @@ TEST_F(BoardSessionTest, LightIsRepeatedEverySecondAndOnceAtOnce) {
   session.set_led(steady(300));
   run(0.005);
   EXPECT_EQ(board.leds.size(), 1u);
+  session.set_led(steady(310));
+  run(0.005);
+  EXPECT_EQ(board.leds.size(), 2u);
   run(10);
-  EXPECT_NEAR(static_cast<double>(board.leds.size()), 11, 1);
+  EXPECT_NEAR(static_cast<double>(board.leds.size()), 12, 1);
 }
 
 TEST_F(BoardSessionTest, ARefusedLightIsSaidOnce) {
@@ -300,6 +305,36 @@ TEST_F(BoardSessionTest, TimeRequestsAreQuickAtFirstThenTenASecond) {
   EXPECT_GE(quick, 20u);
   run(10);
   EXPECT_NEAR(board.time_requests - quick, 100, 6);
+}
+
+TEST_F(BoardSessionTest, BytesBehindAReplyDoNotMakeItLate) {
+  chatter = 8;  // 160 bytes, 3 ms on the wire
+  run(5);
+  const double error = SyntheticLink::seconds(session.clock().to_host(clock.board_us(now)).time -
+                                              SyntheticLink::host(now));
+  EXPECT_NEAR(error * 1e6, 0, 60);
+}
+
+TEST_F(BoardSessionTest, AnOrderOnTheWireDoesNotMakeARequestLate) {
+  run(2);
+  double line_free = now;
+  for (int i = 0; i < 500; ++i) {  // longer than the window
+    const TimePoint due = session.next_poll();
+    for (const double ahead : {0.1e-3, 0.0}) {  // an order right before each time request
+      if (ahead > 0) session.set_led(steady(static_cast<std::uint16_t>(i)));
+      now = SyntheticLink::seconds(due.time_since_epoch()) - ahead;
+      std::uint8_t bytes[BoardSession::kMostBytesOut];
+      const std::size_t count = session.poll(SyntheticLink::host(now), bytes);
+      line_free = std::max(line_free, now) + static_cast<double>(count) * 20e-6;
+      board.take({bytes, count}, line_free);
+      const std::vector<std::uint8_t> reply = board.take_out();
+      const double back = line_free + static_cast<double>(reply.size()) * 20e-6;
+      session.take(reply, SyntheticLink::host(back));
+    }
+  }
+  const double error = SyntheticLink::seconds(session.clock().to_host(clock.board_us(now)).time -
+                                              SyntheticLink::host(now));
+  EXPECT_NEAR(error * 1e6, 0, 30);
 }
 
 TEST_F(BoardSessionTest, WhatCameBeforeTheFirstFrameIsKeptForTheMessage) {

@@ -20,7 +20,8 @@ TEST(CounterClockTest, TimesAreSmootherThanArrivals) {
   int n = 0;
   for (int i = 0; i < 6000; ++i) {
     const double truth = 50 + 0.01003 * i;  // 0.3 % off nominal
-    const HostTime told = clock.take(static_cast<std::uint16_t>(65000 + i), at(truth + late(random)));
+    const HostTime told =
+        clock.take(static_cast<std::uint16_t>(65000 + i), at(truth + late(random)));
     if (i < 500) continue;
     const double error = seconds(told.time - at(truth + 2e-3));
     squares += error * error;
@@ -47,6 +48,19 @@ TEST(CounterClockTest, ABatchThatArrivesLateIsDatedByItsCounter) {
     const HostTime told = clock.take(static_cast<std::uint16_t>(i), at(10 + 4.2));
     EXPECT_NEAR(seconds(told.time - at(10 + 0.01 * i)), 0, 2e-3);
   }
+}
+
+TEST(CounterClockTest, StragglersNowAndThenAreLeftOut) {
+  CounterClock clock(0.01);
+  for (int i = 0; i < 6000; ++i) {
+    const double truth = 10 + 0.01 * i;
+    const HostTime told =
+        clock.take(static_cast<std::uint16_t>(i), at(truth + (i % 40 == 39 ? 0.2 : 0)));
+    if (i > 200) {
+      ASSERT_NEAR(seconds(told.time - at(truth)), 0, 1e-3) << i;
+    }
+  }
+  EXPECT_EQ(clock.restarts(), 0u);
 }
 
 TEST(CounterClockTest, ASensorThatStartsAnewIsFollowed) {

@@ -39,7 +39,8 @@ class OptoforceSensorTest : public ::testing::Test {
   bool wait_for_reading(OptoforceSensor& sensor, OptoforceReading& reading) {
     for (int i = 0; i < 10'000; ++i) {
       ::poll(nullptr, 0, 2);  // the sensor's own pace
-      if (device.fd() >= 0) device.write(optoforce_frame(counter++, 0, {100, -200, 10, 5000, 0, 8}));
+      if (device.fd() >= 0)
+        device.write(optoforce_frame(counter++, 0, {100, -200, 10, 5000, 0, 8}));
       readable(sensor.poll_fd(), 10);
       sensor.service();
       if (sensor.next(reading)) return true;
@@ -98,8 +99,10 @@ TEST_F(OptoforceSensorTest, UnpluggedItComesBack) {
 }
 
 TEST_F(OptoforceSensorTest, ScalesThatCannotBeAreRefused) {
-  for (const std::vector<double>& wrong :
-       {std::vector<double>{}, {1, 2}, {1, 2, 0}, {1, 2, std::numeric_limits<double>::quiet_NaN()}}) {
+  for (const std::vector<double>& wrong : {std::vector<double>{},
+                                           {1, 2},
+                                           {1, 2, 0},
+                                           {1, 2, std::numeric_limits<double>::quiet_NaN()}}) {
     OptoforceOptions given = options();
     given.counts_per_unit = wrong;
     EXPECT_THROW(OptoforceSensor{given}, ConfigError);

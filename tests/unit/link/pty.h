@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <cstdint>
@@ -31,11 +30,6 @@ class Pty {
         ::ptsname_r(fd(), name, sizeof name) != 0)
       throw std::runtime_error("no pseudo-terminal");
     path_ = name;
-    // A device does not echo.
-    termios raw{};
-    ::tcgetattr(fd(), &raw);
-    ::cfmakeraw(&raw);
-    ::tcsetattr(fd(), TCSANOW, &raw);
   }
 
   std::vector<std::uint8_t> read() {

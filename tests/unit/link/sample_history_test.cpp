@@ -8,7 +8,9 @@
 namespace tagwrench::link {
 namespace {
 
-TimePoint at(double t) { return TimePoint(Duration(static_cast<std::int64_t>(std::llround(t * 1e9)))); }
+TimePoint at(double t) {
+  return TimePoint(Duration(static_cast<std::int64_t>(std::llround(t * 1e9))));
+}
 
 constexpr HistoryOptions kAt80{.period = 1.0 / 80, .delay = 0};
 
@@ -72,10 +74,10 @@ TEST(SampleHistoryTest, StatedSigmaCoversTheErrorOfAMovingNoisySignalWithUncerta
   for (int run = 0; run < 50; ++run) {
     SampleHistory history(kAt80);
     const auto truth = [&](double t) { return 2 * std::sin(2 * 3.14159 * 2 * t + run); };
-    const double clock_error = 200e-6 * normal(random);  // one for all, as a clock's is
+    const double clock_error = 500e-6 * normal(random);  // one for all, as a clock's is
     for (int i = 0; i < 200; ++i) {
-      history.add(at(i / 80.0 + clock_error), std::chrono::microseconds(200),
-                  truth(i / 80.0) + 0.01 * normal(random));
+      history.add(at(i / 80.0 + clock_error), std::chrono::microseconds(500),
+                  truth(i / 80.0) + 0.002 * normal(random));
     }
     for (double t = 1; t < 2.4; t += 0.0371) {
       const Aligned got = history.at(at(t));

@@ -90,14 +90,17 @@ TEST(SerialPortTest, ASecondHostIsToldWhoHasThePort) {
     SerialPort port;
     const bool open = !port.open(device.path().c_str(), 500'000);
     int done = 0;
-    if (::write(to_parent[1], &open, 1) == 1) done = static_cast<int>(::read(to_child[0], &done, 1));
+    if (::write(to_parent[1], &open, 1) == 1)
+      done = static_cast<int>(::read(to_child[0], &done, 1));
     ::_exit(open ? 0 : 1);
   }
   bool open = false;
   ASSERT_EQ(::read(to_parent[0], &open, 1), 1);
   EXPECT_TRUE(open);
   const std::string message = refusal(device.path());
-  EXPECT_NE(message.find("in use by link_test (process " + std::to_string(child) + ")"),
+  std::string self;
+  std::ifstream("/proc/self/comm") >> self;
+  EXPECT_NE(message.find("in use by " + self + " (process " + std::to_string(child) + ")"),
             std::string::npos)
       << message;
   ASSERT_EQ(::write(to_child[1], &ready, 1), 1);

@@ -72,8 +72,8 @@ class SessionFirmwareTest : public ::testing::Test {
     next_conversion = std::max(next_conversion + 1 / 80.0, now);
     for (std::uint8_t i = 0; i < kMostCells; ++i) {
       if (hardware.inputs[i] == CellInput::off || i == unwired) continue;
-      hardware.conversions.push_back({i, static_cast<std::int32_t>((now - kStart) * 1000),
-                                      hardware.now_us, 0, false});
+      hardware.conversions.push_back(
+          {i, static_cast<std::int32_t>((now - kStart) * 1000), hardware.now_us, 0, false});
     }
   }
   bool told(News::Kind kind) const {

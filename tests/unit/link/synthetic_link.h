@@ -11,11 +11,11 @@
 namespace tagwrench::link {
 
 struct PathDelays {
-  double there = 60e-6;   ///< s, least
-  double back = 60e-6;    ///< s, least
-  double jitter = 1e-3;   ///< s, uniform from zero
+  double there = 60e-6;  ///< s, least
+  double back = 60e-6;   ///< s, least
+  double jitter = 1e-3;  ///< s, uniform from zero
   double tail_share = 0.05;
-  double tail = 1e-3;     ///< s, mean of an exponential
+  double tail = 1e-3;  ///< s, mean of an exponential
   bool jitter_there = true;
 };
 

@@ -106,6 +106,37 @@ TEST(Bandwidth, ReadoutsExposuresAndLatenciesOfManyCameras) {
   }
 }
 
+// One brightness a picture: what can be told is told, with a sigma that says how well.
+TEST(Bandwidth, AGlobalShutterTellsWhatItCan) {
+  for (const double jitter : {0.1e-3, 1e-3}) {
+    for (const unsigned seed : {1U, 2U, 3U}) {
+      FlashedCamera camera;
+      camera.readout = 0;
+      camera.jitter = jitter;
+      camera.stale = 0.02;
+      camera.lost = 0.02;
+      camera.seed = seed;
+      const Played played = play(camera);
+      const BandwidthResult& r = played.result;
+      SCOPED_TRACE("jitter " + std::to_string(jitter) + " seed " + std::to_string(seed));
+      ASSERT_EQ(r.refusal, "");
+      expect_within("frame rate, Hz", r.frame_rate, 24.87, 24.87e-3);
+      expect_within("latency, s", r.latency, 0.023, 0.5e-3);
+      EXPECT_LT(std::abs(r.latency.value - 0.023), 3 * r.latency.sigma);
+      expect_within("exposure, s", r.exposure, 0.004, 3 * r.exposure.sigma);
+      EXPECT_LT(r.exposure.sigma, 0.5e-3);
+      EXPECT_LT(std::abs(r.readout.value), 3 * r.readout.sigma);
+      if (r.jitter.known) {
+        EXPECT_LT(std::abs(r.jitter.value - jitter), 3 * r.jitter.sigma);
+      }
+      int hidden = 0;  // stale, and neither found nor said to be undecided
+      for (std::size_t i = 0; i < r.times.size(); ++i)
+        hidden += played.truth.stale[i] && r.times[i].freshness == Freshness::fresh ? 1 : 0;
+      EXPECT_LE(hidden, 1);
+    }
+  }
+}
+
 // A camera's response may bend; edges still lie where they lie, but slopes look shorter.
 TEST(Bandwidth, ABentResponseHardlyMovesLatencyAndReadout) {
   FlashedCamera camera;
