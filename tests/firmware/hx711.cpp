@@ -75,7 +75,11 @@ void Hx711::restart(Cycle when) {
 void Hx711::convert(Cycle when) {
   const VirtualTime period_ns(std::llround(period() * 1e9));
   conversion_.at(when + core_.cycles_of(period_ns));
-  if (pulses_ > 24) end_pulses();
+  if (pulses_ > 24) {
+    const unsigned gain = gain_;
+    end_pulses();
+    if (gain_ != gain) return;  // it settles anew
+  }
   if (pulses_ != 0) {  // what is shifted out stays what it was; this conversion is lost
     ++collisions_;
     return;
@@ -143,7 +147,7 @@ void Hx711::end_pulses() {
   const unsigned gain = pulses == 25 ? 128 : pulses == 26 ? 32 : 64;
   if (gain != gain_) {
     gain_ = gain;
-    restart(core_.cycle());
+    restart(last_pulse_at_);
   }
 }
 
