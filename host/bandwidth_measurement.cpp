@@ -17,8 +17,8 @@ constexpr double kDarkSeconds = 0.6;
 constexpr double kPatience = 3;  // s without a frame
 constexpr int kWhite_counts = 235;
 constexpr double kMostWhite = 0.02;  // of a picture that is not too bright
-constexpr double kShorten = 0.6;
-constexpr int kMostShortenings = 8;
+constexpr double kShorten = 0.4;
+constexpr int kMostShortenings = 6;
 constexpr std::uint16_t kSeed = 0x2A5C;
 
 double seconds(TimePoint time) {
@@ -56,6 +56,11 @@ class Run {
   bool take_pattern();
   bool fail(std::string why);
   void evaluate();
+  /// s; what most cameras have, where a driver announces none.
+  double announced_period() const {
+    const double period = std::chrono::duration<double>(source_.format().period).count();
+    return period > 0 ? period : 1.0 / 30;
+  }
 
   FrameSource& source_;
   PatternLamp& lamp_;
@@ -150,8 +155,7 @@ bool Run::take_dark() {
 bool Run::take_pattern() {
   const Duration bit = std::max<Duration>(
       lamp_.shortest_bit(),
-      std::chrono::microseconds(std::llround(
-          1e6 * bit_period_for(std::chrono::duration<double>(source_.format().period).count()))));
+      std::chrono::microseconds(std::llround(1e6 * bit_period_for(announced_period()))));
   lamp_.pattern(bit, kSeed);
   return settle() && watch(options_.seconds, [&](Frame& frame) {
            input_.frames.push_back(
@@ -173,7 +177,7 @@ void Run::evaluate() {
   input_.bit = timing->period;
   input_.edge_sigma = timing->start_sigma;
   input_.clock_rate_sigma = timing->rate_sigma;
-  input_.period = std::chrono::duration<double>(source_.format().period).count();
+  input_.period = announced_period();
   const double start = seconds(timing->start);
   const double end = input_.frames.empty() ? start : input_.frames.back().stamp + 1;
   std::uint16_t state = timing->seed;

@@ -100,7 +100,9 @@ std::string report_text(const BandwidthMeasurement& m, const BandwidthSetting& s
   lines.add("frame rate",
             r.frame_rate.known ? with_sigma(r.frame_rate.value, r.frame_rate.sigma, "Hz")
                                : std::string("cannot tell"),
-            fmt::format("exposures; announced {:.5g} Hz", 1 / setting.announced_period));
+            setting.announced_period > 0
+                ? fmt::format("exposures; announced {:.5g} Hz", 1 / setting.announced_period)
+                : "exposures; none announced");
   lines.add("new pictures", fmt::format("{:.2f} a second", r.new_pictures_rate()));
   add_latency(m, lines);
   add_processing(m, setting, lines);
@@ -136,7 +138,7 @@ std::string report_json(const BandwidthMeasurement& m, const BandwidthSetting& s
   json["format"] = "tagwrench-bandwidth-1";
   json["camera"] = setting.camera;
   json["lamp"] = setting.lamp;
-  json["announced_hz"] = 1 / setting.announced_period;
+  if (setting.announced_period > 0) json["announced_hz"] = 1 / setting.announced_period;
   json["frame_rate_hz"] = figure(r.frame_rate);
   json["new_pictures_hz"] = r.new_pictures_rate();
   json["latency_s"] = figure(r.latency);

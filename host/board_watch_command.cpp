@@ -35,7 +35,7 @@ class Watch {
     next_line_ = begin + period();
     bool good = style_ != Style::csv || write(kBoardCsvHeader);
     while (good && clock_now() < end) {
-      if (!loop_.turn(std::min(end, next_line_))) break;
+      if (!loop_.turn(style_ == Style::people ? std::min(end, next_line_) : end)) break;
       good = take_samples();
       if (good && style_ == Style::people && clock_now() >= next_line_) good = write_view();
     }
@@ -71,7 +71,7 @@ class Watch {
     for (link::FaultReading r; good && session.next(r);) {
       good = write_sample([&] { return json_line(r); }, [&] { return csv_line(r); });
     }
-    return good;
+    return good && flush();
   }
 
   template <class Reading>
@@ -89,10 +89,21 @@ class Watch {
   bool write_view() {
     next_line_ = clock_now() + period();
     if (!loop_.link().plugged()) return true;
-    return write(view_.line(cells_, loop_, clock_now() - std::chrono::seconds(1)));
+    return write(view_.line(cells_, loop_, clock_now() - std::chrono::seconds(1))) && flush();
   }
 
-  bool write(const std::string& text) { return out_.write(text) != SendStatus::failed; }
+  /// Lines that came together go out together.
+  bool write(const std::string& text) {
+    if (lines_.size() + text.size() > TextSink::kMaxBlock && !flush()) return false;
+    lines_ += text;
+    return true;
+  }
+
+  bool flush() {
+    const bool good = lines_.empty() || out_.write(lines_) != SendStatus::failed;
+    lines_.clear();
+    return good;
+  }
 
   void say_losses() {
     const link::SessionCounters counters = loop_.session().counters();
@@ -105,6 +116,7 @@ class Watch {
   const BoardOptions& options_;
   Style style_;
   TextSink out_;
+  std::string lines_;
   BoardLoop loop_;
   link::CellCalibrations cells_{};
   BoardView view_;

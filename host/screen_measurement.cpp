@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -122,7 +123,7 @@ class ScreenRun {
 
   bool flip_for(double length) {
     const TimePoint end = last_ + duration(length);
-    const double period = seconds(source_.format().period);
+    const double period = std::max(seconds(source_.format().period), 1e-3);
     std::mt19937 random(1);
     std::uniform_real_distribution<double> phase(0.0, period);
     bool white = true;
@@ -196,7 +197,9 @@ std::string report_text(const ScreenMeasurement& m, const std::string& camera,
   line("camera", camera, "");
   line("screen", screen, "");
   line("frame rate", fmt::format("{:.3f} +/- {:.3f} Hz", m.frame_rate.value, m.frame_rate.sigma),
-       fmt::format("by the time stamps; announced {:.5g} Hz", 1 / announced_period));
+       announced_period > 0
+           ? fmt::format("by the time stamps; announced {:.5g} Hz", 1 / announced_period)
+           : "by the time stamps; none announced");
   line("latency", fmt::format("{:.1f} +/- {:.1f} ms", 1e3 * m.latency.value, 1e3 * m.latency.sigma),
        "screen and camera together, to the kernel's time stamp");
   line("round trip", fmt::format("{:.1f} ms", 1e3 * m.round_trip),
@@ -215,7 +218,7 @@ std::string report_json(const ScreenMeasurement& m, const std::string& camera,
   json["format"] = "tagwrench-screen-1";
   json["camera"] = camera;
   json["screen"] = screen;
-  json["announced_hz"] = 1 / announced_period;
+  if (announced_period > 0) json["announced_hz"] = 1 / announced_period;
   json["frame_rate_hz"] = figure(m.frame_rate);
   json["latency_s"] = figure(m.latency);
   json["round_trip_s"] = m.round_trip;

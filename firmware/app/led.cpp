@@ -48,10 +48,17 @@ uint16_t mean_permille(const link::Led& command) {
   }
 }
 
+bool same(const link::Led& a, const link::Led& b) {
+  return a.mode == b.mode && a.period_us == b.period_us && a.width_us == b.width_us &&
+         a.start_us == b.start_us && a.pattern_seed == b.pattern_seed;
+}
+
 }  // namespace
 
 link::Result LedDriver::command(const link::Led& command, uint32_t now_us) {
   if (!in_range(command)) return link::Result::out_of_range;
+  // A host repeats its order as a sign of life; pulses under way are not to stumble over that.
+  if (command.mode >= link::LedMode::strobe && same(command, command_)) return link::Result::ok;
   command_ = command;
   wanted_permille_ = mean_permille(command);
   if (wanted_permille_ <= kSustainedPermille) limited_ = false;

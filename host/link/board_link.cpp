@@ -67,8 +67,11 @@ void BoardLink::watch_serial() noexcept {
 }
 
 void BoardLink::service() noexcept {
-  std::uint64_t expirations = 0;
-  [[maybe_unused]] const ssize_t taken = ::read(timer_.get(), &expirations, sizeof expirations);
+  if (clock_now() >= armed_) {
+    std::uint64_t expirations = 0;
+    [[maybe_unused]] const ssize_t taken = ::read(timer_.get(), &expirations, sizeof expirations);
+    armed_ = TimePoint::max();
+  }
   if (serial_) receive();
   if (!serial_) try_again(clock_now());
   send();
@@ -119,6 +122,8 @@ void BoardLink::try_again(TimePoint now) noexcept {
 }
 
 void BoardLink::arm(TimePoint when) noexcept {
+  if (when == armed_) return;
+  armed_ = when;
   const auto ns = std::chrono::duration_cast<Duration>(when.time_since_epoch()).count();
   const std::int64_t at = std::max<std::int64_t>(ns, 1);  // zero would disarm it
   const itimerspec timer{{0, 0}, {at / 1'000'000'000, at % 1'000'000'000}};

@@ -60,6 +60,7 @@ class BoardLink {
   UniqueFd epoll_;
   UniqueFd timer_;
   TimePoint next_try_{};
+  TimePoint armed_ = TimePoint::max();  ///< of the timer
   Ring<News, 8> news_;
 };
 

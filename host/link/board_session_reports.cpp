@@ -11,9 +11,10 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Duration kMostTimeError = seconds(2);  ///< between a stamp and its arrival
-constexpr unsigned kMisfitsOfARestart = 4;       ///< in a row: its clock may have started anew
-constexpr unsigned kQuickRequests = 20;          ///< at the start, for the clock to converge soon
+constexpr Duration kMostAhead = seconds(2);  ///< of its arrival: a stamp that cannot be
+constexpr Duration kMostAge = seconds(60);   ///< this program was held up for so long
+constexpr unsigned kMisfitsOfARestart = 4;   ///< in a row: its clock may have started anew
+constexpr unsigned kQuickRequests = 20;      ///< at the start, for the clock to converge soon
 
 /// The board's words are a stranger's bytes: no control codes to a terminal.
 void make_printable(char* text) {
@@ -281,7 +282,7 @@ HostTime BoardSession::host_time(std::uint32_t board_us, TimePoint arrival) cons
   if (!clock_.known()) return arrival_only(arrival);
   const HostTime time = clock_.to_host(board_us);
   const Duration age = arrival - time.time;
-  const bool sane = age < kMostTimeError && age > -kMostTimeError;
+  const bool sane = age < kMostAge && age > -kMostAhead;
   return sane ? time : arrival_only(arrival);
 }
 

@@ -1,5 +1,6 @@
 // `tagwrench board` as its users run it, against a model of a board.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <csignal>
 #include <nlohmann/json.hpp>
@@ -108,6 +109,24 @@ TEST_F(BoardCliTest, WatchForPeopleShowsNewtonsCountsAndWhatIsNotWired) {
   EXPECT_NE(line.find("cell 3     -12"), std::string::npos) << line;
   EXPECT_NE(line.find("counts"), std::string::npos) << line;
   EXPECT_NE(got.err.find("load cell 2 does not answer"), std::string::npos) << got.err;
+}
+
+double processor_seconds_of_children() {
+  rusage used{};
+  ::getrusage(RUSAGE_CHILDREN, &used);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(used.ru_utime) + seconds(used.ru_stime);
+}
+
+TEST_F(BoardCliTest, WatchingWaitsAndDoesNotSpin) {
+  for (const char* style : {"--json", "--every=0.1"}) {
+    ServedBoard board;
+    const double before = processor_seconds_of_children();
+    run_bridge({"board", "watch", style, "--seconds", "3", "--port", board.path()});
+    EXPECT_LT(processor_seconds_of_children() - before, 0.8) << style << ", of 3 s";
+  }
 }
 
 TEST_F(BoardCliTest, LogWritesWholeLinesOfCsv) {

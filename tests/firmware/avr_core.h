@@ -189,7 +189,7 @@ class AvrCore {
   avr_t* avr_ = nullptr;
   double hz_;
   std::vector<CycleTimer*> timers_;
-  std::map<std::uint16_t, std::unique_ptr<Hook>> hooks_;
+  std::map<std::uint16_t, std::shared_ptr<Hook>> hooks_;
   std::unique_ptr<Spy> spy_;
   std::deque<VectorWatch> watches_;
   std::array<avr_int_vector_t*, 26> vectors_{};

@@ -216,6 +216,12 @@ FullLoadFigures run_full_load(const std::filesystem::path& elf, const FullLoadOp
   if (!client.greet()) throw std::runtime_error("the emulated board does not answer");
   if (client.ask(full_configuration()) != link::Result::ok)
     throw std::runtime_error("the emulated board refuses its configuration");
+  link::Led strobe{};
+  strobe.mode = link::LedMode::strobe;
+  strobe.period_us = options.strobe_period_us;
+  strobe.width_us = 100;
+  if (options.strobe_period_us != 0 && client.ask(strobe) != link::Result::ok)
+    throw std::runtime_error("the emulated board refuses the strobe");
   // Settled amplifiers, and nothing of the start counted.
   client.run(milliseconds(500));
   client.forget();
@@ -234,6 +240,10 @@ FullLoadFigures run_full_load(const std::filesystem::path& elf, const FullLoadOp
   const auto exchanges = static_cast<unsigned>(options.seconds * kExchangesPerSecond);
   for (unsigned i = 0; i < exchanges; ++i) {
     requests.push_back(client.send(link::TimeRequest{}));
+    if (i % (kExchangesPerSecond / 10) == 0) {
+      for (unsigned k = 0; k < options.burst; ++k) client.send(link::Tare{});
+      figures.burst_requests += options.burst;
+    }
     // A little off the even grid, so that requests meet every phase of the board's other work.
     client.run_until(start + (i + 1) * kExchangePeriod + VirtualTime(i % 97 * 13000));
   }
@@ -244,6 +254,7 @@ FullLoadFigures run_full_load(const std::filesystem::path& elf, const FullLoadOp
   figures.bytes_per_second = static_cast<double>(client.bytes() - bytes_before) / figures.seconds;
   figures.damaged_frames = client.damaged() + client.undecodable();
   figures.sequence_gaps = client.sequence_gaps();
+  figures.burst_answers = client.all<link::Answer>().size();
   figures.receiver_overruns = board.usart().overruns();
   judge_cells(client, figures);
   judge_adc(client, board.adc().take_conversions(), figures);

@@ -39,6 +39,8 @@ struct FullLoadFigures {
   std::uint64_t adc_wrong = 0;
   std::uint64_t time_requests = 0;
   std::uint64_t time_replies = 0;
+  std::uint64_t burst_requests = 0;
+  std::uint64_t burst_answers = 0;
   std::uint64_t receiver_overruns = 0;
   std::uint16_t reported_dropped = 0;  ///< Status.dropped_reports
   std::uint16_t reported_overruns = 0;
@@ -68,6 +70,9 @@ struct FullLoadOptions {
   /// Parts of the (mangled) names of functions whose cycles are counted, where the image still has
   /// them.
   std::vector<std::string> functions;
+  /// Besides: a strobe of this period (0: none), and every 100 ms so many requests at once.
+  std::uint32_t strobe_period_us = 0;
+  unsigned burst = 0;
 };
 
 /// Throws std::runtime_error if the board does not answer or the image cannot be read.

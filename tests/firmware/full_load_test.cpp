@@ -87,5 +87,25 @@ TEST(FullLoad, AnswersInterruptsInTime) {
       << "what the board reports of itself";
 }
 
+TEST(FullLoad, BearsAFastStrobeAndBurstsOfRequestsToo) {
+  FullLoadOptions options;
+  options.strobe_period_us = 2000;
+  options.burst = 3;
+  const FullLoadFigures f = run_full_load(TAGWRENCH_FIRMWARE_ELF, options);
+  fmt::print(
+      "  interrupts: latency {:.1f} us, of the receiver {:.1f} us, {:.1f} % of the time; longest "
+      "loop {:.0f} us; lost: {} conversions, {} ADC samples\n",
+      f.worst_latency_us, f.worst_receive_latency_us, 100 * f.interrupt_load, f.longest_loop_us,
+      f.cell_lost, f.adc_lost);
+  EXPECT_EQ(f.receiver_overruns, 0U);
+  EXPECT_EQ(f.reported_overruns, 0U);
+  EXPECT_EQ(f.time_replies, f.time_requests);
+  EXPECT_EQ(f.burst_requests, 300U);
+  EXPECT_EQ(f.burst_answers, f.burst_requests);
+  EXPECT_EQ(f.cell_lost + f.cell_wrong + f.adc_lost + f.adc_wrong, 0U);
+  EXPECT_EQ(f.sequence_gaps + f.damaged_frames, 0U);
+  EXPECT_LT(f.worst_receive_latency_us, 40);
+}
+
 }  // namespace
 }  // namespace tagwrench::emulator

@@ -100,6 +100,35 @@ TEST_F(LedTest, GoesOffAfterTheConfiguredSilence) {
   EXPECT_LT(us_of(board.led().all().back().time - silent_from), 420e3);
 }
 
+TEST_F(LedTest, PulsesEndWithTheHostToo) {
+  link::Configure configuration = full_configuration();
+  configuration.host_timeout_ms = 300;
+  ASSERT_EQ(client.ask(configuration), link::Result::ok);
+  for (const link::LedMode mode : {link::LedMode::strobe, link::LedMode::pattern}) {
+    link::Led pulses{};
+    pulses.mode = mode;
+    pulses.period_us = 4000;
+    pulses.width_us = 1000;
+    pulses.pattern_seed = 77;
+    pulses.start_us = board_us(milliseconds(10));
+    ASSERT_EQ(client.ask(pulses), link::Result::ok);
+    const VirtualTime heard = client.all<link::Answer>().back().end;
+    client.run(milliseconds(290));
+    EXPECT_GT(board.led().mean(board.now() - milliseconds(50), board.now()), 0.1);
+    client.run(milliseconds(200));
+    EXPECT_EQ(board.led().mean(heard + milliseconds(310), board.now()), 0);
+    EXPECT_EQ(board.led().level(), 0);
+  }
+}
+
+TEST_F(LedTest, ASilenceBeyondTheLimitsIsRefused) {
+  link::Configure configuration = full_configuration();
+  for (const std::uint16_t timeout_ms : {0, 199, 60001}) {
+    configuration.host_timeout_ms = timeout_ms;
+    EXPECT_EQ(client.ask(configuration), link::Result::out_of_range) << timeout_ms << " ms";
+  }
+}
+
 TEST_F(LedTest, DamagedFramesAreNoSignOfLife) {
   link::Configure configuration = full_configuration();
   configuration.host_timeout_ms = 400;
@@ -130,18 +159,23 @@ TEST_F(LedTest, AHangPutsItOutWithin300MsAndIsReported) {
   }
 }
 
-TEST_F(LedTest, AHangWhilePulsingPutsItOutToo) {
+TEST_F(LedTest, AHangBetweenPulsesLightsForTheWatchdogsTimeAtMost) {
   link::Led strobe{};
   strobe.mode = link::LedMode::strobe;
-  strobe.period_us = 40000;
+  strobe.period_us = 20000;
   strobe.width_us = 8000;
   strobe.start_us = board_us(milliseconds(20));
   ASSERT_EQ(client.ask(strobe), link::Result::ok);
   run_heard(milliseconds(500));
+  // Dark, with the next pulse's begin already in the hands of the hardware.
   while (board.led().level() == 0) board.advance_by(microseconds(100));
+  while (board.led().level() > 0) board.advance_by(microseconds(100));
+  board.advance_by(milliseconds(5));
   board.hang(true);
   const VirtualTime hung = board.now();
-  client.run(milliseconds(400));
+  client.run(milliseconds(100));
+  EXPECT_GT(board.led().level(), 0) << "nobody ends the pulse";
+  client.run(milliseconds(300));
   EXPECT_EQ(board.led().level(), 0);
   EXPECT_LT(us_of(board.led().all().back().time - hung), 300e3);
 }

@@ -213,6 +213,27 @@ TEST_P(FirmwareLed, PatternIsTheOneThatBothSidesKnow) {
   EXPECT_EQ(board.late_edges, 0u);
 }
 
+TEST_P(FirmwareLed, RepeatingAnOrderAsASignOfLifeDisturbsNoPulse) {
+  greet();
+  const std::uint32_t start_us = board.now_us + 50000;
+  ASSERT_EQ(ask(pattern(4000, 77, start_us)), link::Result::ok);
+  for (int i = 0; i < 20; ++i) {
+    run(97300);
+    ASSERT_EQ(ask(pattern(4000, 77, start_us)), link::Result::ok);
+  }
+  expect_bits(4000, 77, start_us, start_us, board.now_us - 4000);
+
+  board.light.clear();
+  const std::uint32_t again_us = board.now_us + 50000;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(ask(strobe(25000, 5000, again_us)), link::Result::ok);
+    run(97300);
+  }
+  while (!board.light.front().on || board.light.front().at_us - again_us >= 0x80000000u)
+    board.light.erase(board.light.begin());
+  expect_pulses(25000, 5000, again_us);
+}
+
 TEST_P(FirmwareLed, PatternThatBeganLongAgoIsJoinedAtItsPresentBit) {
   greet();
   // More than one repetition of 32767 bits.

@@ -167,6 +167,36 @@ TEST_F(BoardSessionTest, ReadingsCarryHostTimeAndItsSigma) {
   EXPECT_FALSE(session.next(reading));
 }
 
+TEST_F(BoardSessionTest, SamplesThatWaitedWhileTheHostWasHeldUpKeepTheirTime) {
+  run(5);
+  board.send_cell(0, 1, now, 100);
+  const std::vector<std::uint8_t> bytes = board.take_out();
+  session.take(bytes, SyntheticLink::host(now + 10));
+  CellReading reading;
+  ASSERT_TRUE(session.next(reading));
+  EXPECT_NEAR(SyntheticLink::seconds(reading.time.time - SyntheticLink::host(now)) * 1e6, 0, 60);
+}
+
+TEST_F(BoardSessionTest, SamplesThatWaitedWhileTheLineWasCutAreLostAndCounted) {
+  run(2);
+  board.send_cell(0, 1, now, 100);
+  run(0.01);
+  CellReading reading;
+  ASSERT_TRUE(session.next(reading));
+  board.send_cell(0, 2, now, 101);  // waits in the driver
+  const std::vector<std::uint8_t> stale = board.take_out();
+  session.reconnect();
+  session.take(stale, SyntheticLink::host(now + 3));
+  EXPECT_FALSE(session.next(reading)) << "nobody knows yet whether it is of this start";
+  run(1);
+  ASSERT_EQ(session.state(), BoardState::ready);
+  board.send_cell(0, 3, now, 102);
+  run(0.01);
+  ASSERT_TRUE(session.next(reading));
+  EXPECT_EQ(reading.counts, 3);
+  EXPECT_EQ(reading.lost_before, 1);
+}
+
 TEST_F(BoardSessionTest, LostConversionsAndFramesAreCountedAcrossTheWrapOfTheirNumbers) {
   run(1);
   board.send_cell(0, 1, now, 65534);
