@@ -9,8 +9,8 @@
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 
-#include "host/bandwidth_command.h"
-#include "host/board_command.h"
+#include "host/bandwidth/command.h"
+#include "host/board/command.h"
 #include "host/calibrate_command.h"
 #include "host/config/scenario_config.h"
 #include "host/config_error.h"

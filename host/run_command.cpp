@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "host/board/run_board.h"
 #include "host/config/sensor_config.h"
 #include "host/config_error.h"
 #include "host/input.h"
@@ -21,7 +22,6 @@
 #include "host/output/terminal.h"
 #include "host/output/wrench_hid.h"
 #include "host/pipeline.h"
-#include "host/run_board.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/tell.h"
 

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <vector>
 
-#include "host/bandwidth_measurement.h"
-#include "host/board_pattern_lamp.h"
+#include "host/bandwidth/board_pattern_lamp.h"
+#include "host/bandwidth/measurement.h"
 #include "host/config/scenario_config.h"
 #include "host/link/cell_calibration.h"
 #include "host/link/sample_history.h"

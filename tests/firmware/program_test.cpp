@@ -69,7 +69,6 @@ TEST_F(Program, InfoPrintsTheIdentity) {
   EXPECT_EQ(about["cells"], 4);
   EXPECT_EQ(about["reset_cause"], "reset pin") << "opening an Arduino's port resets it";
   EXPECT_EQ(about["id"].get<std::string>().size(), 16U) << "it was given one";
-  EXPECT_EQ(about["bad_frames"], 0);
   EXPECT_EQ(about["overruns"], 0);
 }
 

@@ -9,12 +9,12 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "host/bandwidth_measurement.h"
-#include "host/bandwidth_report.h"
+#include "host/bandwidth/measurement.h"
+#include "host/bandwidth/report.h"
+#include "host/bandwidth/screen_measurement.h"
+#include "host/bandwidth/screen_window.h"
+#include "host/bandwidth/simulated_lamp.h"
 #include "host/config/scenario_config.h"
-#include "host/screen_measurement.h"
-#include "host/screen_window.h"
-#include "host/simulated_lamp.h"
 #include "host/source/simulator/simulator_source.h"
 
 namespace tagwrench::test {

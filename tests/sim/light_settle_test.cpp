@@ -1,10 +1,9 @@
 // Brightness, closed: camera settings and LED level change the simulated picture, which changes
 // them.
-#include "host/light_settle.h"
-
 #include <gtest/gtest.h>
 
 #include "host/config/sensor_config.h"
+#include "host/light/settle.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"

@@ -1,9 +1,9 @@
 // The brightness loop against a camera of its own: light adds up, a sensor clips at 255.
-#include "host/light_control.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
+
+#include "host/light/control.h"
 
 namespace tagwrench {
 namespace {

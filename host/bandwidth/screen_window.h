@@ -1,0 +1,30 @@
+// A window that is black or white all over.
+#pragma once
+
+#include "host/bandwidth/screen_measurement.h"
+
+struct SDL_Window;
+struct SDL_Renderer;
+
+namespace tagwrench {
+
+class ScreenWindow final : public FlipPatch {
+ public:
+  /// Throws ConfigError if there is no screen.
+  ScreenWindow();
+  ~ScreenWindow() override;
+
+  TimePoint show(bool white, TimePoint when) override;
+  bool closed() override;
+  std::string description() const;
+
+ private:
+  void paint();
+
+  SDL_Window* window_ = nullptr;
+  SDL_Renderer* renderer_ = nullptr;
+  bool white_ = false;
+  bool closed_ = false;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,132 @@
+#include "host/board/board_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+
+namespace tagwrench {
+namespace {
+
+constexpr Duration kPatience = std::chrono::milliseconds(500);
+
+std::string header() {
+  std::string line(kCsvHeader.substr(0, kCsvHeader.size() - 1));
+  for (std::size_t i = 0; i < link::kMostChannels; ++i)
+    line += fmt::format(",cell{0}_counts,cell{0}_n,cell{0}_sigma_n", i);
+  return line + "\n";
+}
+
+/// Newtons of interpolated counts: their own noise in place of a single conversion's.
+link::Newtons newtons(const link::CellCalibration& cell, const link::Aligned& counts) {
+  link::Newtons force = cell.newtons(counts.value);
+  const double conversion = cell.noise_counts * cell.newtons_per_count;
+  const double line = std::max(0.0, force.sigma * force.sigma - conversion * conversion);
+  force.sigma = std::hypot(std::sqrt(line), counts.sigma * cell.newtons_per_count);
+  return force;
+}
+
+}  // namespace
+
+BoardOutput::BoardOutput(link::BoardLink& link, const link::CellCalibrations& cells,
+                         double cell_rate, double camera_latency, const std::string& path)
+    : link_(link),
+      cells_(cells),
+      latency_(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(camera_latency))),
+      counts_{link::SampleHistory({.period = 1 / cell_rate}),
+              link::SampleHistory({.period = 1 / cell_rate}),
+              link::SampleHistory({.period = 1 / cell_rate}),
+              link::SampleHistory({.period = 1 / cell_rate})} {
+  said_.reserve(256);
+  if (!path.empty()) sink_.emplace(path, /*lossless=*/false);
+}
+
+BoardOutput::~BoardOutput() { write_ripe(/*all=*/true); }
+
+SendStatus BoardOutput::send(const Sample& sample) noexcept {
+  if (!sink_) return SendStatus::ok;
+  const TimePoint now = std::chrono::steady_clock::now();
+  const bool room = rows_.size() < kMostRows;
+  if (room) rows_.push({sample, latency_us(sample, now), now});
+  write_ripe(/*all=*/false);
+  const SendStatus status = std::exchange(status_, SendStatus::ok);
+  if (status == SendStatus::failed) status_ = status;  // for good
+  return room || status == SendStatus::failed ? status : SendStatus::skipped;
+}
+
+std::string BoardOutput::failure() const { return sink_ ? sink_->failure() : std::string(); }
+
+std::string_view BoardOutput::service() noexcept {
+  link_.service();
+  take_readings();
+  write_ripe(/*all=*/false);
+  said_.clear();
+  try {
+    for (link::News news; link_.next(news);) {
+      if (!said_.empty()) said_ += "; ";
+      said_ += link::text(news);
+    }
+  } catch (const std::exception&) {
+    said_.clear();  // out of memory: unsaid
+  }
+  return said_;
+}
+
+void BoardOutput::take_readings() noexcept {
+  link::BoardSession& session = link_.session();
+  for (link::CellReading r; session.next(r);) {
+    if (r.channel < counts_.size() && !r.saturated)
+      counts_[r.channel].add(r.time.time, r.time.sigma, r.counts, 0, r.lost_before > 0);
+  }
+}
+
+/// Whether nothing more will be known about the row's time.
+bool BoardOutput::ripe(const Row& row, TimePoint now) const noexcept {
+  if (now - row.sent >= kPatience) return true;
+  return std::none_of(counts_.begin(), counts_.end(), [&](const link::SampleHistory& counts) {
+    return counts.at(row.sample.capture_time - latency_).status == link::AlignStatus::too_new;
+  });
+}
+
+void BoardOutput::write_ripe(bool all) noexcept {
+  if (!sink_) return;
+  const TimePoint now = std::chrono::steady_clock::now();
+  while (!rows_.empty() && (all || ripe(rows_[0], now))) {
+    Row row;
+    rows_.pop(row);
+    try {
+      if (!header_written_) {
+        status_ = std::max(status_, sink_->write(header()));
+        header_written_ = status_ == SendStatus::ok;
+      }
+      if (header_written_) status_ = std::max(status_, sink_->write(text(row)));
+    } catch (const std::exception&) {
+      status_ = std::max(status_, SendStatus::skipped);  // out of memory
+    }
+  }
+}
+
+std::string_view BoardOutput::text(const Row& row) noexcept {
+  const std::string_view sample = csv_line(sample_line_, row.sample, row.latency_us);
+  char* out = std::copy(sample.begin(), sample.end() - 1, line_.data());
+  const char* end = line_.data() + line_.size() - 1;
+  for (std::size_t i = 0; i < counts_.size(); ++i) {
+    const link::Aligned counts = counts_[i].at(row.sample.capture_time - latency_);
+    const auto room = static_cast<std::size_t>(end - out);
+    if (counts.status != link::AlignStatus::ok) {
+      out = fmt::format_to_n(out, room, ",,,").out;
+    } else if (!cells_[i].calibrated) {
+      out = fmt::format_to_n(out, room, ",{:.1f},,", counts.value).out;
+    } else {
+      const link::Newtons force = newtons(cells_[i], counts);
+      out = fmt::format_to_n(out, room, ",{:.1f},{:.6g},{:.3g}", counts.value, force.value,
+                             force.sigma)
+                .out;
+    }
+  }
+  *out++ = '\n';
+  return {line_.data(), static_cast<std::size_t>(out - line_.data())};
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,140 @@
+// `tagwrench board flash`: avrdude writes the image and checks the chip's signature; the board's
+// greeting then tells its version.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "host/board/loop.h"
+#include "host/config_error.h"
+#include "host/link/serial_places.h"
+#include "host/link/usb_identity.h"
+#include "host/output/text_sink.h"
+#include "host/tell.h"
+
+extern char** environ;
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kImageName = "tagwrench-atmega328p.hex";
+constexpr std::uintmax_t kMostImageBytes = 128 * 1024;  ///< 32 KB of flash as Intel HEX
+
+/// Beside this program as it was built, or as it was installed.
+std::string find_image() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  const fs::path above = program.parent_path().parent_path();
+  for (const fs::path& folder : {above / "firmware", above / "share" / "tagwrench"}) {
+    if (fs::exists(folder / kImageName, error)) return (folder / kImageName).string();
+  }
+  throw ConfigError(
+      fmt::format("board flash: {} was not built here; run `./run firmware`, or give --image FILE",
+                  kImageName));
+}
+
+void check_image(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error))
+    throw ConfigError(fmt::format("{}: there is no such file; give --image FILE.hex", path));
+  std::ifstream in(path);
+  std::string line;
+  if (fs::file_size(path, error) > kMostImageBytes || !std::getline(in, line) || line.size() < 11 ||
+      line[0] != ':')
+    throw ConfigError(
+        fmt::format("{}: not an Intel HEX file of an ATmega328P; give --image "
+                    "FILE.hex",
+                    path));
+}
+
+std::string flash_port(const BoardOptions& options) {
+  if (const auto identity = link::parse_usb_identity(options.port))
+    return options.dry_run ? "PORT" : link::find_usb_port(*identity);
+  if (!options.port.empty()) return options.port;
+  if (!options.dry_run) return link::only_port();
+  const std::vector<std::string> ports = link::stable_ports();
+  return ports.size() == 1 ? ports.front() : "PORT";
+}
+
+/// The boot loader's speeds, as the Arduino core's boards.txt has them.
+std::vector<std::string> avrdude_arguments(const BoardOptions& options, const std::string& port,
+                                           const std::string& image) {
+  return {"avrdude",
+          "-p",
+          "m328p",
+          "-c",
+          "arduino",
+          "-b",
+          options.model == "nano-old" ? "57600" : "115200",
+          "-P",
+          port,
+          "-D",
+          "-U",
+          fmt::format("flash:w:{}:i", image)};
+}
+
+/// Exit status of the program, its messages on standard error.
+int run_program(std::vector<std::string> arguments) {
+  std::vector<char*> argv;
+  for (std::string& a : arguments) argv.push_back(a.data());
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, 2, 1);  // standard output is for data
+  pid_t child = -1;
+  const int failed = ::posix_spawnp(&child, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failed == ENOENT)
+    throw ConfigError("board flash: avrdude is not installed; `sudo apt install avrdude`");
+  if (failed != 0)
+    throw ConfigError(fmt::format("board flash: avrdude cannot be started: {}; try again",
+                                  std::strerror(failed)));
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
+}
+
+}  // namespace
+
+int board_flash(const BoardOptions& options) {
+  const std::string image = options.image.empty() ? find_image() : options.image;
+  check_image(image);
+  const std::string port = flash_port(options);
+  const std::vector<std::string> arguments = avrdude_arguments(options, port, image);
+  if (options.dry_run) {
+    TextSink out("-", /*lossless=*/true);
+    return out.write(fmt::format("{}\n", fmt::join(arguments, " "))) == SendStatus::failed ? 1 : 0;
+  }
+  { const link::SerialPort free(port, link::kBaud); }  // or it says what is the matter
+  tell(fmt::format("running {}", fmt::join(arguments, " ")));
+  if (const int status = run_program(arguments); status != 0) {
+    tell(fmt::format(
+        "board flash: avrdude failed ({}); is it a {} with an ATmega328P? A Nano with the old boot "
+        "loader is --board nano-old",
+        status, options.model));
+    return 1;
+  }
+  BoardLoop loop(port, session_options(options));
+  if (!loop.connect()) return 0;
+  const link::Hello& hello = loop.session().hello();
+  if (options.image.empty() && std::string(hello.firmware) != TAGWRENCH_VERSION) {
+    tell(fmt::format(
+        "board flash: the board says firmware {} after {} was written; check the image and try "
+        "again",
+        hello.firmware, TAGWRENCH_VERSION));
+    return 1;
+  }
+  tell(fmt::format("the board answers: {}, firmware {}, protocol {}.{}", hello.board,
+                   hello.firmware, hello.protocol_major, hello.protocol_minor));
+  return 0;
+}
+
+}  // namespace tagwrench

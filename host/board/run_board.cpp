@@ -1,0 +1,67 @@
+#include "host/board/run_board.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/board/board_output.h"
+#include "host/light/settle.h"
+#include "host/link/cell_file.h"
+#include "host/tell.h"
+
+namespace tagwrench {
+namespace {
+
+class SteadyLamp final : public Lamp {
+ public:
+  explicit SteadyLamp(link::BoardLink& link) : link_(link) {}
+
+  void set_level(double permille) noexcept override {
+    link::Led led{};
+    led.level_permille = static_cast<std::uint16_t>(std::lround(std::clamp(permille, 0.0, 1000.0)));
+    led.mode = led.level_permille > 0 ? link::LedMode::steady : link::LedMode::off;
+    link_.session().set_led(led);
+    link_.send();
+  }
+
+  /// From two of its steps, so that a small change is one, up to what it may have for ever.
+  LightRange range_permille() const noexcept override {
+    const link::Capabilities& can = link_.session().capabilities();
+    const double most = std::clamp<double>(can.led_sustained_permille, 1, 1000);
+    const double steps = std::max<double>(can.led_levels, 2);
+    return {std::min(most, 2000.0 / steps), most};
+  }
+
+  int poll_fd() const noexcept override { return link_.poll_fd(); }
+  void service() noexcept override { link_.service(); }
+
+ private:
+  link::BoardLink& link_;
+};
+
+}  // namespace
+
+RunBoard::RunBoard(const BoardOptions& options)
+    : rate_(options.cell_rate), loop_(options.port, session_options(options)) {
+  connected_ = loop_.settle();
+  if (!connected_) return;
+  const std::string path = cells_path(options, loop_.session());
+  if (!path.empty())
+    cells_ = link::load_cells(path, link::id_text(loop_.session().hello().unique_id));
+}
+
+RunBoard::~RunBoard() { SteadyLamp(loop_.link()).set_level(0); }
+
+bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
+  SteadyLamp lamp(loop_.link());
+  Acquirer finder(input.sensor.camera, input.sensor.target);
+  const LightReport report =
+      tagwrench::settle_light(*input.source, finder, input.sensor.camera.mirrored, lamp, stop);
+  if (!report.stopped) tell(light_text(report));
+  return !report.stopped;
+}
+
+std::unique_ptr<Output> RunBoard::output(const SensorConfig& sensor, const std::string& path) {
+  return std::make_unique<BoardOutput>(loop_.link(), cells_, rate_, sensor.camera_latency, path);
+}
+
+}  // namespace tagwrench

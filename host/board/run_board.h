@@ -1,0 +1,40 @@
+// The board of a run: found, its light settled, its load cells' calibration known.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "host/board/loop.h"
+#include "host/input.h"
+#include "host/output/output.h"
+
+namespace tagwrench {
+
+class RunBoard {
+ public:
+  /// Waits for the board, some seconds at most. Throws ConfigError if there is no board of ours, or
+  /// its load cells' file cannot be used.
+  explicit RunBoard(const BoardOptions& options);
+  RunBoard(const RunBoard&) = delete;
+  RunBoard& operator=(const RunBoard&) = delete;
+  /// Turns the light off.
+  ~RunBoard();
+
+  /// False if a signal ended the waiting.
+  bool connected() const { return connected_; }
+
+  /// Lights the tags and sets exposure and gain, and says how. False if a signal came, or the
+  /// source ended.
+  bool settle_light(Input& input, const UniqueFd& stop);
+
+  /// Serves the link from the run's loop; see BoardOutput. Must not outlive this.
+  std::unique_ptr<Output> output(const SensorConfig& sensor, const std::string& path);
+
+ private:
+  double rate_;  ///< conversions/s
+  BoardLoop loop_;
+  link::CellCalibrations cells_{};
+  bool connected_ = false;
+};
+
+}  // namespace tagwrench
