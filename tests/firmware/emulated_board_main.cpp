@@ -17,6 +17,7 @@
 #include <fstream>
 
 #include "tests/firmware/board_orders.h"
+#include "tests/firmware/other_version.h"
 
 namespace tagwrench::emulator {
 namespace {
@@ -42,13 +43,17 @@ struct Options {
   double clock_ppm = 0;
   bool stays_at_opening = false;
   bool any_baud = false;
+  std::optional<std::uint8_t> protocol_major;
   bool quiet = false;
 };
 
 class RealTimeBoard {
  public:
   explicit RealTimeBoard(const Options& options)
-      : options_(options), board_(options.elf, board_options(options)), port_(options.port) {
+      : options_(options),
+        board_(options.elf, board_options(options)),
+        port_(options.port),
+        version_(options.protocol_major) {
     for (unsigned i = 0; i < kCells; ++i) board_.cell(i).bridge().noise_counts = 20;
     for (unsigned i = 0; i < 2; ++i) board_.set_adc(i, 1.0 + i);
     load_eeprom();
@@ -154,6 +159,7 @@ class RealTimeBoard {
     std::vector<std::uint8_t> bytes;
     for (const SentByte& byte : board_.read())
       bytes.push_back(same_baud_ ? byte.value : static_cast<std::uint8_t>(byte.value * 37 + 11));
+    bytes = version_.pass(bytes);
     if (was_open_) port_.write(bytes);
   }
 
@@ -193,6 +199,7 @@ class RealTimeBoard {
   Options options_;
   EmulatedBoard board_;
   PtyLine port_;
+  OtherVersion version_;
   std::ofstream log_;
   SteadyTime start_;  ///< wall time of virtual time zero
   std::string typed_;
@@ -216,6 +223,8 @@ int run(int argc, char** argv) {
                "unlike an Arduino, whose DTR resets it");
   app.add_flag("--any-baud", options.any_baud,
                "whatever rate the terminal is set to: the host's is not passed on");
+  app.add_option("--protocol-major", options.protocol_major,
+                 "the version of the protocol that it says it speaks");
   app.add_flag("--quiet", options.quiet, "no lines for the light");
   CLI11_PARSE(app, argc, argv);
   RealTimeBoard board(options);

@@ -27,7 +27,8 @@ void OtherVersion::forge() {
   std::array<std::uint8_t, link::kMostBodyBytes> body{};
   std::array<std::uint8_t, link::kMostFrameBytes> frame{};
   const std::uint8_t count = link::encode(hello, reader_.sequence(), body.data());
-  frame_.assign(frame.begin(), frame.begin() + link::write_frame(body.data(), count, frame.data()));
+  const std::uint8_t bytes = link::write_frame(body.data(), count, frame.data());
+  frame_.assign(frame.begin(), frame.begin() + bytes);
 }
 
 }  // namespace tagwrench::emulator

@@ -1,6 +1,7 @@
 // Makes the board's greeting that of a firmware of another protocol version; all else passes.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 

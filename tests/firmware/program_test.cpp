@@ -239,6 +239,17 @@ TEST_F(Program, ASecondHostIsRefusedAndTheFirstGoesOn) {
   EXPECT_TRUE(watch.wait_for_lines(lines + 40)) << watch.err();
 }
 
+TEST_F(Program, AnotherVersionOfTheFirmwareIsRefusedAndSaid) {
+  for (const auto& [major, remedy] :
+       {std::pair{"0", "update the board"}, std::pair{"9", "update tagwrench"}}) {
+    const TemporaryFolder own;
+    BoardProcess board(own, {"--protocol-major", major});
+    const Outcome got = run_bridge({"board", "info", "--port", board.port()});
+    EXPECT_EQ(got.status, 2);
+    EXPECT_NE(got.err.find(remedy), std::string::npos) << got.err;
+  }
+}
+
 TEST_F(Program, AFullDiskEndsTheLogWithOneLine) {
   BoardProcess board(folder);
   const Outcome got = run_bridge({"board", "log", "--out", "/dev/full", "--port", board.port()});

@@ -157,8 +157,13 @@ bool serial_departure(uint32_t& time_us) {
 
 ISR(USART_RX_vect) {
   using namespace tagwrench::board;
-  if (UCSR0A & (1 << DOR0)) ++overruns;
-  receive(UDR0);
+  // A second byte that waits already must not wait for the interrupts that come before this one.
+  uint8_t state = UCSR0A;
+  do {
+    if (state & (1 << DOR0)) ++overruns;
+    receive(UDR0);
+    state = UCSR0A;
+  } while (state & (1 << RXC0));
 }
 
 ISR(USART_UDRE_vect) { tagwrench::board::transmit(); }
