@@ -79,6 +79,9 @@ class ScreenRun {
     return fail("no picture comes from the camera");
   }
 
+  /// On a virtual clock the last stamp is all there is.
+  TimePoint now() const { return source_.poll_fd() < 0 ? last_ : std::chrono::steady_clock::now(); }
+
   bool fail(std::string why) {
     out_.refusal = std::move(why);
     return false;
@@ -129,7 +132,9 @@ class ScreenRun {
     bool white = true;
     while (last_ < end) {
       white = !white;
-      const TimePoint flipped = patch_.show(white, last_ + duration(phase(random)));
+      // From now, not from the stamp: what would have to happen in the past happens now, and the
+      // flips would no longer fall evenly between the pictures.
+      const TimePoint flipped = patch_.show(white, now() + duration(phase(random)));
       Frame frame;
       bool seen = false;
       while (!seen && seconds(last_ - flipped) < kLongest) {
@@ -144,9 +149,7 @@ class ScreenRun {
       const double delay = seconds(last_ - flipped);
       sum_ += delay;
       squares_ += delay * delay;
-      // On a virtual clock the stamp is all there is.
-      const TimePoint now = source_.poll_fd() < 0 ? last_ : std::chrono::steady_clock::now();
-      arrivals_ += seconds(now - flipped);
+      arrivals_ += seconds(now() - flipped);
       ++out_.flips;
       if (!next(frame)) return false;  // the picture that saw only a part of the flip
     }
