@@ -64,6 +64,7 @@ Input open_camera(const InputOptions& options, const std::string& argument) {
   camera.preferred_height = input.sensor.camera.height_px;
   block_signals();  // from here on the camera's settings must be put back
   input.source = std::make_unique<V4l2Source>(camera);
+  input.camera = true;
   return input;
 }
 

@@ -30,6 +30,7 @@ struct InputOptions {
 struct Input {
   SensorConfig sensor;
   std::unique_ptr<FrameSource> source;
+  bool camera = false;  ///< a real one, that sees what an LED lights
 };
 
 /// Throws ConfigError if the source is none, cannot be opened, or the sensor cannot be used.

@@ -171,7 +171,25 @@ void check_outputs(const std::vector<Spec>& specs, bool with_board) {
   }
 }
 
+/// A board lives in real time.
+void check_board(const RunOptions& options) {
+  if (options.board.empty()) {
+    if (!options.cells.empty())
+      throw ConfigError("--cells: the load cells are a board's; name its port with --board");
+    return;
+  }
+  if (options.fast)
+    throw ConfigError("--fast: a board has its own time; leave it out, or leave out --board");
+  if (split_spec(options.source).kind == "images") {
+    throw ConfigError(fmt::format(
+        "--source {}: these pictures are of another time than what the board says now; leave out "
+        "--board",
+        options.source));
+  }
+}
+
 std::vector<Spec> output_specs(const RunOptions& options) {
+  check_board(options);
   std::vector<Spec> specs;
   for (const std::string& text : options.outputs) specs.push_back(split_spec(text));
   check_outputs(specs, !options.board.empty());
@@ -239,20 +257,22 @@ std::string summary(const RunReport& report, const SensorConfig& sensor) {
 
 int run(const RunOptions& options) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
-  Input input = options.source.empty() ? find_input(options)
-                                       : open_input({options.sensor, options.source, options.fast});
-  const UniqueFd stop = signals_as_fd();
-  check_size(input);
-  check_appearance(input);
-  output_specs(options);  // before anything is lit
+  output_specs(options);          // refused before anything is opened or lit
   std::unique_ptr<RunBoard> board;
   if (!options.board.empty()) {
     BoardOptions board_options;
     board_options.port = options.board == "auto" ? "" : options.board;
     board_options.cells_file = options.cells;
     board = std::make_unique<RunBoard>(board_options);
-    if (!board->connected() || !board->settle_light(input, stop)) return 0;
+    if (!board->connected()) return 0;
   }
+  // Last of all what does not wait: a camera's frames, the simulated sensor's second at rest.
+  Input input = options.source.empty() ? find_input(options)
+                                       : open_input({options.sensor, options.source, options.fast});
+  const UniqueFd stop = signals_as_fd();
+  check_size(input);
+  check_appearance(input);
+  if (board && !board->settle_light(input, stop)) return 0;
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
   const WrenchEstimator wrench(input.sensor.wrench);
   const Shaping shaping(input.sensor.shaping);

@@ -74,12 +74,15 @@ void App::watch_host(uint32_t now_us) {
 }
 
 void App::handle_request(uint32_t now_us) {
-  host_there_ = true;
-  heard_us_ = now_us;
   const uint8_t kind = link_.kind();
+  // An echo of the board's own reports is no host.
   if (kind & kReportBit) {
     ++unknown_kinds_;
-  } else if (kind == static_cast<uint8_t>(link::Kind::hello_request)) {
+    return;
+  }
+  host_there_ = true;
+  heard_us_ = now_us;
+  if (kind == static_cast<uint8_t>(link::Kind::hello_request)) {
     handle_hello(now_us);
   } else if (refused_) {
     link_.answer(link::Result::wrong_version);

@@ -7,7 +7,18 @@ namespace tagwrench {
 namespace firmware {
 namespace {
 
-constexpr int32_t kMostHeat = static_cast<int32_t>(1000 - kSustainedPermille) * kFullTimeMs;
+/// Light is looked at in steps of 64 us, or longer ones if a loop takes longer; no schedule of
+/// pulses keeps step with that. Heat is in permille steps above the sustained level.
+constexpr uint8_t kStepShift = 6;
+constexpr uint32_t kStepsPerSecond = 1000000ul >> kStepShift;
+constexpr uint32_t kMostSteps = 8 * kStepsPerSecond;  ///< at once: no overflow
+constexpr int32_t kMostHeat =
+    static_cast<int32_t>(kStepsPerSecond / 1000.0 * (1000 - kSustainedPermille) * kFullTimeMs);
+/// Cool enough for full light again.
+constexpr int32_t kCool = kMostHeat / 2;
+/// Of light that is limited and yet too much (orders that begin their pulses anew all the time),
+/// this much is borne, then it is dark.
+constexpr int32_t kGrace = kMostHeat / 20;
 /// Half of the pattern's bits shine.
 constexpr uint16_t kPatternPermille = 500;
 /// Of a bit that shines, when limited.
@@ -55,13 +66,16 @@ bool same(const link::Led& a, const link::Led& b) {
 
 }  // namespace
 
+LedDriver::LedDriver(uint32_t now_us)
+    : limited_(board::kept_heat() >= kCool), accounted_us_(now_us) {}
+
 link::Result LedDriver::command(const link::Led& command, uint32_t now_us) {
   if (!in_range(command)) return link::Result::out_of_range;
   // A host repeats its order as a sign of life; pulses under way are not to stumble over that.
   if (command.mode >= link::LedMode::strobe && same(command, command_)) return link::Result::ok;
+  account(now_us);
   command_ = command;
   wanted_permille_ = mean_permille(command);
-  if (wanted_permille_ <= kSustainedPermille) limited_ = false;
   drive();
   if (command_.mode >= link::LedMode::strobe) begin_pulses(now_us);
   return link::Result::ok;
@@ -70,7 +84,6 @@ link::Result LedDriver::command(const link::Led& command, uint32_t now_us) {
 void LedDriver::off() {
   command_.mode = link::LedMode::off;
   wanted_permille_ = 0;
-  limited_ = false;
   drive();
 }
 
@@ -78,7 +91,8 @@ void LedDriver::drive() {
   if (command_.mode < link::LedMode::strobe) {
     board::led_steady(level_permille());
   } else if (command_.mode == link::LedMode::strobe) {
-    pulse_us_ = limited_ ? command_.period_us * kSustainedPermille / 1000 : command_.width_us;
+    const uint32_t most_us = command_.period_us * kSustainedPermille / 1000;
+    pulse_us_ = limited_ && command_.width_us > most_us ? most_us : command_.width_us;
   } else {
     pulse_us_ = command_.period_us * kLimitedBitPermille / 1000;
   }
@@ -98,33 +112,51 @@ void LedDriver::begin_pulses(uint32_t now_us) {
 }
 
 void LedDriver::poll(uint32_t now_us, Faults& faults) {
-  account(now_us);
-  if (!limited_ && heat_ >= kMostHeat && wanted_permille_ > kSustainedPermille) {
-    limited_ = true;
+  const int32_t heat = account(now_us);
+  if (limited_ ? heat < kCool : heat >= kMostHeat) {
+    limited_ = !limited_;
     drive();
-    faults.raise(link::FaultCode::led_limited, 0, now_us);
+    if (limited_) faults.raise(link::FaultCode::led_limited, 0, now_us);
   }
-  if (command_.mode >= link::LedMode::strobe && !catching_up()) schedule(now_us);
+  if (heat >= kMostHeat + kGrace) off();
+  if (command_.mode < link::LedMode::strobe) return;
+  // Catching up takes time: what is due, the next call sees.
+  if (skip_ != 0) {
+    catch_up();
+  } else {
+    schedule(now_us);
+  }
 }
 
-void LedDriver::account(uint32_t now_us) {
-  const int16_t above =
-      static_cast<int16_t>(static_cast<int16_t>(level_permille()) - kSustainedPermille);
-  while (now_us - accounted_us_ >= 1000) {
-    accounted_us_ += 1000;
-    heat_ += above;
-    if (heat_ < 0) heat_ = 0;
-    if (heat_ > kMostHeat) heat_ = kMostHeat;
-    if (command_.mode == link::LedMode::off || ++on_time_ms_ < 1000) continue;
-    on_time_ms_ = 0;
+/// Of this moment.
+uint16_t LedDriver::light_permille() const {
+  if (command_.mode >= link::LedMode::strobe) return board::led_shining() ? 1000 : 0;
+  return level_permille();
+}
+
+int32_t LedDriver::account(uint32_t now_us) {
+  uint32_t steps = (now_us - accounted_us_) >> kStepShift;
+  accounted_us_ += steps << kStepShift;
+  if (steps > kMostSteps) steps = kMostSteps;
+  int32_t heat = board::kept_heat();
+  if (steps == 0) return heat;
+  heat += static_cast<int32_t>(steps) *
+          (static_cast<int16_t>(light_permille()) - static_cast<int16_t>(kSustainedPermille));
+  if (heat < 0) heat = 0;
+  if (heat > kMostHeat + kGrace) heat = kMostHeat + kGrace;
+  board::keep_heat(heat);
+  if (command_.mode == link::LedMode::off) return heat;
+  on_time_steps_ = static_cast<uint16_t>(on_time_steps_ + steps);
+  if (on_time_steps_ >= kStepsPerSecond) {
+    on_time_steps_ = static_cast<uint16_t>(on_time_steps_ - kStepsPerSecond);
     ++on_time_s_;
   }
+  return heat;
 }
 
-bool LedDriver::catching_up() {
+void LedDriver::catch_up() {
   for (uint16_t i = 0; skip_ != 0 && i < kStepsAtOnce; ++i, --skip_)
     state_ = link::next_pattern_state(state_);
-  return skip_ != 0;
 }
 
 void LedDriver::schedule(uint32_t now_us) {

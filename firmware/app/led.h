@@ -7,13 +7,14 @@ namespace tagwrench {
 namespace firmware {
 
 /// A level that the LED may have for ever, and how long it may have 1000 permille from cold. In
-/// between, heat counts: it rises with the level above the sustained one and falls below it.
+/// between, heat counts: it rises with the light above the sustained level and falls below it. What
+/// counts is the light that is there, not what was ordered, and it outlives a reset.
 constexpr uint16_t kSustainedPermille = 300;
 constexpr uint16_t kFullTimeMs = 10000;
 
 class LedDriver {
  public:
-  explicit LedDriver(uint32_t now_us) : accounted_us_(now_us) {}
+  explicit LedDriver(uint32_t now_us);
 
   /// out_of_range, with nothing changed, if this board or LED cannot do it. Strobe and pattern
   /// begin at start_us + n * period_us, n >= 0; a start more than a minute ahead is a time past.
@@ -23,18 +24,22 @@ class LedDriver {
   void poll(uint32_t now_us, Faults& faults);
 
   /// Mean, as driven.
-  uint16_t level_permille() const { return limited_ ? kSustainedPermille : wanted_permille_; }
+  uint16_t level_permille() const {
+    return limited_ && wanted_permille_ > kSustainedPermille ? kSustainedPermille
+                                                             : wanted_permille_;
+  }
   bool limited() const { return limited_; }
   uint32_t on_time_s() const { return on_time_s_; }
 
  private:
   void drive();
   void begin_pulses(uint32_t now_us);
-  void account(uint32_t now_us);
+  int32_t account(uint32_t now_us);
+  uint16_t light_permille() const;
   void schedule(uint32_t now_us);
   void add_edges();
   void step();
-  bool catching_up();
+  void catch_up();
 
   link::Led command_ = {};
   uint16_t wanted_permille_ = 0;  ///< mean of command_
@@ -43,10 +48,9 @@ class LedDriver {
   uint16_t state_ = 0;            ///< of the pattern at next_us_, less skip_ steps
   uint16_t skip_ = 0;             ///< steps of the pattern that are still to be made up
   bool shining_ = false;          ///< after the last queued edge
-  bool limited_ = false;
-  int32_t heat_ = 0;       ///< permille ms above sustained
+  bool limited_;
   uint32_t accounted_us_;  ///< heat and on-time are counted up to here
-  uint16_t on_time_ms_ = 0;
+  uint16_t on_time_steps_ = 0;
   uint32_t on_time_s_ = 0;
 };
 

@@ -61,6 +61,12 @@ uint8_t led_edge_room();
 /// An edge that comes too late happens at once.
 void led_edge(uint32_t at_us, bool on);
 
+/// Whether light that is led by edges is on now.
+bool led_shining();
+/// A number that outlives a reset but not a loss of power; 0 then, and before it was first kept.
+int32_t kept_heat();
+void keep_heat(int32_t heat);
+
 // ---- Load-cell amplifiers (HX711) ----
 
 struct Conversion {

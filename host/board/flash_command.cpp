@@ -27,17 +27,21 @@ namespace fs = std::filesystem;
 constexpr const char* kImageName = "tagwrench-atmega328p.hex";
 constexpr std::uintmax_t kMostImageBytes = 128 * 1024;  ///< 32 KB of flash as Intel HEX
 
-/// Beside this program as it was built, or as it was installed.
+/// Beside this program as it was built, or as it was installed; or in the clone where we are.
 std::string find_image() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   const fs::path above = program.parent_path().parent_path();
-  for (const fs::path& folder : {above / "firmware", above / "share" / "tagwrench"}) {
+  const fs::path folders[] = {above / "firmware", above / "share" / "tagwrench",
+                              fs::current_path(error) / "build" / "firmware"};
+  std::string looked;
+  for (const fs::path& folder : folders) {
     if (fs::exists(folder / kImageName, error)) return (folder / kImageName).string();
+    looked += (looked.empty() ? "" : ", ") + folder.string();
   }
-  throw ConfigError(
-      fmt::format("board flash: {} was not built here; run `./run firmware`, or give --image FILE",
-                  kImageName));
+  throw ConfigError(fmt::format(
+      "board flash: no {} in {}; run `./run firmware` in the clone, or give --image FILE",
+      kImageName, looked));
 }
 
 void check_image(const std::string& path) {

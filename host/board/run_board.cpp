@@ -1,5 +1,7 @@
 #include "host/board/run_board.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +12,8 @@
 
 namespace tagwrench {
 namespace {
+
+constexpr double kUnseenLevel_permille = 100;
 
 class SteadyLamp final : public Lamp {
  public:
@@ -41,18 +45,23 @@ class SteadyLamp final : public Lamp {
 }  // namespace
 
 RunBoard::RunBoard(const BoardOptions& options)
-    : rate_(options.cell_rate), loop_(options.port, session_options(options)) {
+    : rate_(options.cell_rate), loop_(options.port, session_options(options), "--board") {
+  check_cells_file(options);
   connected_ = loop_.settle();
   if (!connected_) return;
-  const std::string path = cells_path(options, loop_.session());
-  if (!path.empty())
-    cells_ = link::load_cells(path, link::id_text(loop_.session().hello().unique_id));
+  cells_ = load_cells(options, loop_.session());
 }
 
 RunBoard::~RunBoard() { SteadyLamp(loop_.link()).set_level(0); }
 
 bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
   SteadyLamp lamp(loop_.link());
+  if (!input.camera) {
+    lamp.set_level(kUnseenLevel_permille);
+    tell(fmt::format("the board's LED is on at {:.0f} %, but does not light this source",
+                     kUnseenLevel_permille / 10));
+    return true;
+  }
   Acquirer finder(input.sensor.camera, input.sensor.target);
   const LightReport report =
       tagwrench::settle_light(*input.source, finder, input.sensor.camera.mirrored, lamp, stop);
@@ -61,6 +70,13 @@ bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
 }
 
 std::unique_ptr<Output> RunBoard::output(const SensorConfig& sensor, const std::string& path) {
+  const bool newtons = std::any_of(cells_.begin(), cells_.end(),
+                                   [](const link::CellCalibration& c) { return c.calibrated; });
+  if (!path.empty() && !newtons) {
+    tell(
+        "the load cells are not calibrated: the reference has counts alone; `tagwrench board "
+        "calibrate-cell` makes newtons of them");
+  }
   return std::make_unique<BoardOutput>(loop_.link(), cells_, rate_, sensor.camera_latency, path);
 }
 

@@ -85,16 +85,38 @@ class RunBoard : public ::testing::Test {
   Bridge board;
 };
 
-TEST_F(RunBoard, LightsTheTagsSettlesTheLightAndIsDarkAfterwards) {
+TEST_F(RunBoard, IsLitWhileItRunsAndDarkAfterwards) {
   const Outcome run = run_bridge(
       {"run", "--source", source(), "--board", port(), "--output", "csv:-", "--frames", "30"});
   EXPECT_EQ(run.status, 0) << run.err;
-  EXPECT_NE(run.err.find("light: LED "), std::string::npos) << run.err;
-  EXPECT_NE(run.err.find("white of the tags"), std::string::npos) << run.err;
-  ASSERT_TRUE(board.wait_for_message(" 300\n")) << board.err();  // the search for more light
+  EXPECT_NE(run.err.find("does not light this source"), std::string::npos) << run.err;
+  ASSERT_TRUE(board.wait_for_message(" 100\n")) << board.err();
   board.signal(SIGTERM);
   const std::string said = board.finish().err;
   EXPECT_EQ(last_level(said), "0") << said;
+}
+
+TEST_F(RunBoard, TheDefaultSimulationIsHeldAlthoughTheBoardTakesItsTime) {
+  const Outcome run = run_bridge(
+      {"run", "--source", "sim", "--board", port(), "--output", "csv:-", "--frames", "40"});
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.out.find(",ok,"), std::string::npos) << run.err;
+}
+
+TEST_F(RunBoard, WhatHasAnotherTimeThanTheBoardIsRefused) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"--source", source(), "--fast"},
+        std::vector<std::string>{"--source", "images:" + folder.path()}}) {
+    std::vector<std::string> all{"run", "--board", port(), "--output", "csv:-"};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    const Outcome run = run_bridge(all);
+    EXPECT_EQ(run.status, 2);
+    EXPECT_EQ(lines_in(run.err), 1U) << run.err;
+    EXPECT_NE(run.err.find("--board"), std::string::npos) << run.err;
+  }
+  const Outcome cells = run_bridge({"run", "--source", source(), "--cells", "x.json"});
+  EXPECT_EQ(cells.status, 2);
+  EXPECT_EQ(lines_in(cells.err), 1U) << cells.err;
 }
 
 TEST_F(RunBoard, WritesEveryFrameBesideTheLoadCellsOfThatTime) {

@@ -18,8 +18,8 @@ uint8_t edge_on;  ///< bit per edge
 volatile uint8_t edges_head;
 volatile uint8_t edges_tail;
 volatile uint8_t edges_used;
-bool shining;  ///< the pin's level
-bool armed;    ///< the next compare match is the oldest edge, not just a point on the way to it
+volatile bool shining;  ///< the pin's level
+bool armed;  ///< the next compare match is the oldest edge, not just a point on the way to it
 
 constexpr uint8_t kCompareClears = 1 << COM1A1;
 constexpr uint8_t kCompareSets = (1 << COM1A1) | (1 << COM1A0);
@@ -41,10 +41,17 @@ void retire() {
   --edges_used;
 }
 
+/// A flag that is set already only makes the interrupt look once more.
 void wait(uint16_t ticks) {
   armed = false;
   OCR1A = TCNT1 + ticks;
 }
+
+/// The bootloaders of Uno and Nano use other parts of the memory.
+uint32_t heat_kept __attribute__((section(".noinit")));
+uint16_t heat_check __attribute__((section(".noinit")));
+
+uint16_t check_of(uint32_t heat) { return static_cast<uint16_t>(0xA55A ^ heat ^ (heat >> 16)); }
 
 /// Interrupts are off. The pin keeps its level at matches that are not armed.
 void arm() {
@@ -59,6 +66,9 @@ void arm() {
   } else {
     armed = true;
     OCR1A = static_cast<uint16_t>(at_us << 1);
+    // From here on a match is this edge's and must not be lost. One that came before the compare
+    // unit knew what to do is late by the clock.
+    TIFR1 = 1 << OCF1A;
     set_compare((edge_on >> edges_tail) & 1);
     if (static_cast<int32_t>(now_us_atomic() - at_us) >= 0) {
       TCCR1C = 1 << FOC1A;
@@ -67,7 +77,6 @@ void arm() {
       wait(kSoonTicks);
     }
   }
-  TIFR1 = 1 << OCF1A;
   TIMSK1 |= 1 << OCIE1A;
 }
 
@@ -111,6 +120,17 @@ void led_pulses() {
   set_compare(false);
   TCCR1C = 1 << FOC1A;
   DDRB |= kLedPulses;
+}
+
+bool led_shining() { return shining; }
+
+int32_t kept_heat() {
+  return heat_check == check_of(heat_kept) ? static_cast<int32_t>(heat_kept) : 0;
+}
+
+void keep_heat(int32_t heat) {
+  heat_kept = static_cast<uint32_t>(heat);
+  heat_check = check_of(heat_kept);
 }
 
 uint8_t led_edge_room() { return static_cast<uint8_t>(kEdges - edges_used); }

@@ -8,14 +8,17 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <deque>
 #include <numbers>
 #include <random>
 #include <utility>
 
 #include "firmware/board/board.h"
+#include "firmware/board/pc/port_name.h"
 
 namespace tagwrench {
 namespace board {
@@ -23,7 +26,6 @@ namespace {
 
 constexpr double kCountsPerNewton = 100000;
 constexpr double kNoiseCounts = 40;
-constexpr double kSineNewton = 2;
 constexpr uint32_t kPressUs = 200000;
 
 uint64_t clock_us() {
@@ -37,11 +39,15 @@ std::mt19937 random_numbers{std::random_device{}()};
 const uint32_t kBootId = random_numbers();
 
 int port = -1;
+std::string port_name;
+std::string terminal_name;
 std::deque<SerialByte> received;
 bool sent_stamped = false;
 uint32_t sent_us = 0;
 
 uint16_t led_permille = 0;
+bool shining = false;  ///< after the last edge
+int32_t heat = 0;
 struct Edge {
   uint32_t at_us;
   bool on;
@@ -51,7 +57,7 @@ std::deque<Edge> edges;
 
 uint32_t cell_period_us = 100000;
 struct Channel {
-  Cell cell{CellModel::sine, 0};
+  Cell cell;
   bool on = false;
   bool ready = false;
   uint8_t lost = 0;
@@ -86,7 +92,7 @@ void change(Button& button, bool pressed, uint32_t now) { button = Button{presse
 double force_n(unsigned channel, uint32_t at_us) {
   const Cell& cell = channels[channel].cell;
   if (cell.model == CellModel::constant) return cell.force_n;
-  return kSineNewton * std::sin(2 * std::numbers::pi * 0.1 * (1 + channel) * seconds(at_us));
+  return cell.force_n * std::sin(2 * std::numbers::pi * cell.hz * seconds(at_us));
 }
 
 void advance_cells(uint32_t now) {
@@ -120,7 +126,10 @@ void advance_buttons(uint32_t now) {
 }
 
 void advance_led(uint32_t now) {
-  while (!edges.empty() && due(edges.front().at_us, now)) edges.pop_front();
+  while (!edges.empty() && due(edges.front().at_us, now)) {
+    shining = edges.front().on;
+    edges.pop_front();
+  }
 }
 
 void read_port() {
@@ -167,21 +176,27 @@ const Traits kTraits = {
     .measures_supply = false,
 };
 
-bool open_port(const std::string& link) {
+std::string open_port(const std::string& link) {
+  const auto no_terminal = [] {
+    return std::string("cannot make a pseudo-terminal: ") + std::strerror(errno) +
+           "; is /dev/pts mounted?";
+  };
   port = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (port < 0 || grantpt(port) != 0 || unlockpt(port) != 0) return false;
+  if (port < 0 || grantpt(port) != 0 || unlockpt(port) != 0) return no_terminal();
   char name[64];
-  if (ptsname_r(port, name, sizeof name) != 0) return false;
+  if (ptsname_r(port, name, sizeof name) != 0) return no_terminal();
   // Held open, so that the port outlives a host that closes it; raw, so that it echoes nothing.
   const int host_end = open(name, O_RDWR | O_NOCTTY | O_CLOEXEC);
   termios settings{};
-  if (host_end < 0 || tcgetattr(host_end, &settings) != 0) return false;
+  if (host_end < 0 || tcgetattr(host_end, &settings) != 0) return no_terminal();
   cfmakeraw(&settings);
-  if (tcsetattr(host_end, TCSANOW, &settings) != 0) return false;
-  const std::string fresh = link + ".new";
-  unlink(fresh.c_str());
-  return symlink(name, fresh.c_str()) == 0 && rename(fresh.c_str(), link.c_str()) == 0;
+  if (tcsetattr(host_end, TCSANOW, &settings) != 0) return no_terminal();
+  port_name = link;
+  terminal_name = name;
+  return take_name(link, name);
 }
+
+void close_port() { leave_name(port_name, terminal_name); }
 
 void wire_cell(unsigned channel, const Cell& cell) { channels[channel].cell = cell; }
 
@@ -231,6 +246,7 @@ bool serial_departure(uint32_t& time_us) {
 
 void led_steady(uint16_t permille) {
   edges.clear();
+  shining = false;
   if (permille != led_permille) show_led(std::to_string(permille).c_str());
   led_permille = permille;
 }
@@ -243,6 +259,12 @@ void led_pulses() {
 uint8_t led_edge_room() { return static_cast<uint8_t>(kEdges - edges.size()); }
 
 void led_edge(uint32_t at_us, bool on) { edges.push_back({at_us, on}); }
+
+bool led_shining() { return shining; }
+
+int32_t kept_heat() { return heat; }
+
+void keep_heat(int32_t now) { heat = now; }
 
 void cell_rate(uint8_t rate_sps) { cell_period_us = 1000000u / rate_sps; }
 

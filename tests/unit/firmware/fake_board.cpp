@@ -93,6 +93,10 @@ void led_edge(std::uint32_t at_us, bool on) {
   board.waiting.push_back({at_us, on});
 }
 
+bool led_shining() { return fake_board().shining; }
+std::int32_t kept_heat() { return fake_board().heat; }
+void keep_heat(std::int32_t heat) { fake_board().heat = heat; }
+
 void cell_rate(std::uint8_t rate_sps) { fake_board().cell_rate_sps = rate_sps; }
 void cell_input(std::uint8_t channel, link::CellInput input) {
   fake_board().inputs[channel] = input;

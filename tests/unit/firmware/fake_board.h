@@ -36,6 +36,7 @@ struct FakeBoard {
   std::vector<Edge> waiting;  ///< that are still ahead
   std::vector<Edge> light;    ///< changes that have happened, of pulses
   bool shining = false;
+  std::int32_t heat = 0;    ///< that was kept; outlives a new App
   unsigned late_edges = 0;  ///< that were in the past when they were queued
 
   link::CellInput inputs[link::kMostCells] = {};

@@ -44,6 +44,13 @@ class Rig : public testing::Test {
     }
   }
 
+  /// The board is reset: the application begins anew, with what outlives a reset.
+  void restart() {
+    board::led_steady(0);
+    board.incoming.clear();
+    app_ = App(board.now_us);
+  }
+
   template <class Message>
   std::vector<Message>& all() {
     return std::get<std::vector<Message>>(reports_);
