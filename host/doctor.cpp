@@ -124,9 +124,7 @@ void say_serial_ports(Report& report) {
                                         port, holder.empty() ? "" : ", in use by " + holder));
     } else {
       report.line(Mark::missing,
-                  fmt::format("serial port {}: no permission; sudo usermod -aG {} $USER, then log "
-                              "in again",
-                              port, link::group_of(port)));
+                  fmt::format("serial port {}: {}", port, link::permission_advice(port)));
     }
   }
   if (ports.empty())

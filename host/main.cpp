@@ -42,6 +42,26 @@ constexpr const char* kOutputs =
     "  reference:FILE                as csv, beside the load cells of --board at the same time\n"
     "Without it: terminal, and every device that this machine allows";
 
+/// What is wrong, and whose help tells more: that of the verb which was reached.
+std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App* reached = &app;
+  std::string words = "tagwrench";
+  while (!reached->get_subcommands().empty()) {
+    reached = reached->get_subcommands().front();
+    words += " " + reached->get_name();
+  }
+  std::string verbs;
+  for (const CLI::App* verb : reached->get_subcommands([](const CLI::App*) { return true; }))
+    verbs += (verbs.empty() ? "" : ", ") + verb->get_name();
+  const std::vector<std::string> rest = reached->remaining();
+  if (verbs.empty() || (!rest.empty() && rest[0][0] == '-'))
+    return fmt::format("{}; `{} --help` lists what there is", error.what(), words);
+  if (rest.empty())
+    return fmt::format("`{0}` needs a subcommand: {1}; see `{0} --help`", words, verbs);
+  return fmt::format("`{0}` has no subcommand '{1}' but {2}; see `{0} --help`", words, rest[0],
+                     verbs);
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App app{
       "tagwrench: a camera under a spring platform as a 6-axis force-torque sensor and 6-DOF input "
@@ -99,7 +119,7 @@ int dispatch(int argc, char** argv) {
   } catch (const CLI::Success& e) {
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
-    tagwrench::tell(fmt::format("{}; `tagwrench --help` lists what there is", e.what()));
+    tagwrench::tell(usage_error(app, e));
     return kUnusable;
   }
   if (run->parsed()) return tagwrench::run(run_options);

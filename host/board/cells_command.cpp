@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <optional>
 
@@ -16,6 +17,12 @@
 
 namespace tagwrench {
 namespace {
+
+constexpr Duration kFirstConversion = std::chrono::milliseconds(1500);
+/// Of a resting cell's noise, from end to end of a thousand conversions; the faster rate is noisier
+/// than the one that the noise may be of.
+constexpr double kMostSpread = 15;
+constexpr double kLeastNoise_counts = 0.5;
 
 TimePoint clock_now() { return std::chrono::steady_clock::now(); }
 
@@ -39,14 +46,36 @@ Duration patience_for(int conversions, int rate) {
   return std::chrono::milliseconds(1500 * conversions / rate + 3000);
 }
 
-[[noreturn]] void no_conversions(int channel) {
-  throw ConfigError(fmt::format(
-      "board: load cell {} does not answer; check the wires of its amplifier (DOUT, SCK, power)",
-      channel));
+[[noreturn]] void no_conversions(const BoardLoop& loop, int channel) {
+  const bool stuck =
+      loop.cell_fault(static_cast<std::size_t>(channel)) == link::FaultCode::cell_stuck;
+  throw ConfigError(link::text({link::News::Kind::fault,
+                                static_cast<std::uint32_t>(stuck ? link::FaultCode::cell_stuck
+                                                                 : link::FaultCode::cell_silent),
+                                static_cast<std::uint32_t>(channel)}));
 }
 
 void drop_samples(link::BoardSession& session) {
   for (link::CellReading old; session.next(old);) {
+  }
+}
+
+/// Until all cells of the mask have converted (true), or a signal came (false). Throws ConfigError
+/// for one that does not.
+bool wait_for_cells(BoardLoop& loop, unsigned mask) {
+  const TimePoint end = clock_now() + kFirstConversion;
+  for (;;) {
+    for (link::CellReading r; loop.session().next(r);) {
+      mask &= ~(1u << r.channel);
+      loop.cell_spoke(r.channel);
+    }
+    if (mask == 0) return true;
+    const bool late = clock_now() >= end;
+    for (int i = 0; i < static_cast<int>(link::kMostChannels); ++i) {
+      const bool faulty = loop.cell_fault(static_cast<std::size_t>(i)) != link::FaultCode::none;
+      if ((mask >> i & 1) != 0 && (late || faulty)) no_conversions(loop, i);
+    }
+    if (!loop.turn(end)) return false;
   }
 }
 
@@ -62,7 +91,26 @@ std::optional<Mean> measure(BoardLoop& loop, const BoardOptions& options) {
       out.add(r.counts);
       out.saturated |= r.saturated;
     }
-    if (clock_now() >= end) no_conversions(options.channel);
+    if (clock_now() >= end) no_conversions(loop, options.channel);
+  }
+  return out;
+}
+
+/// One result for each cell of the mask; nothing if a signal came.
+std::optional<std::vector<link::TareResult>> tare(BoardLoop& loop, const BoardOptions& options,
+                                                  std::uint8_t mask) {
+  loop.session().tare(mask, static_cast<std::uint16_t>(options.conversions));
+  loop.link().send();
+  std::vector<link::TareResult> out;
+  const TimePoint end = clock_now() + patience_for(options.conversions, options.cell_rate);
+  while (mask != 0) {
+    if (clock_now() >= end) no_conversions(loop, std::countr_zero(mask));
+    if (!loop.turn(end)) return {};
+    for (link::TareResult result{}; loop.session().next(result);) {
+      if (result.channel >= link::kMostChannels || (mask >> result.channel & 1) == 0) continue;
+      mask &= static_cast<std::uint8_t>(~(1u << result.channel));
+      out.push_back(result);
+    }
   }
   return out;
 }
@@ -86,11 +134,8 @@ Key wait_for_key(BoardLoop& loop) {
 void check_masses(const BoardOptions& options) {
   const auto [least, most] =
       std::minmax_element(options.masses_kg.begin(), options.masses_kg.end());
-  if (options.masses_kg.size() < 2 || *most - *least < 1e-6) {
-    throw ConfigError(
-        "--mass: the masses do not span: at least two different ones are needed; for example "
-        "--mass 0,0.5");
-  }
+  if (*most - *least < 1e-6)
+    throw ConfigError("--mass: all masses are the same: give at least two different ones");
 }
 
 std::string file_to_write(const BoardOptions& options, const link::BoardSession& session) {
@@ -112,10 +157,11 @@ int say(const std::string& text) {
 int board_calibrate_cell(const BoardOptions& options) {
   check_masses(options);
   BoardLoop loop(options.port, session_options(options));
-  if (!loop.settle()) return 0;
+  loop.keep_cell_faults_quiet();
+  if (!loop.settle() || !wait_for_cells(loop, 1u << options.channel)) return 0;
   const std::string path = file_to_write(options, loop.session());
   const std::string id = link::id_text(loop.session().hello().unique_id);
-  link::CellCalibrations cells = link::load_cells(path, id);
+  link::CellCalibrations cells = load_cells(options, loop.session());
 
   std::vector<link::CellPoint> points;
   double variance = 0;
@@ -165,48 +211,52 @@ int board_calibrate_cell(const BoardOptions& options) {
 }
 
 int board_tare(const BoardOptions& options) {
+  check_cells_file(options);
   BoardLoop loop(options.port, session_options(options));
+  loop.keep_cell_faults_quiet();
   if (!loop.settle()) return 0;
   const std::string path = file_to_write(options, loop.session());
-  const std::string id = link::id_text(loop.session().hello().unique_id);
-  link::CellCalibrations cells = link::load_cells(path, id);
+  link::CellCalibrations cells = load_cells(options, loop.session());
   std::uint8_t mask = 0;
-  for (std::size_t i = 0; i < cells.size(); ++i)
-    mask |= static_cast<std::uint8_t>(cells[i].calibrated ? 1u << i : 0u);
+  std::string left_out;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (cells[i].calibrated)
+      mask |= static_cast<std::uint8_t>(1u << i);
+    else if (i < loop.session().capabilities().cells)
+      left_out += fmt::format("{}{}", left_out.empty() ? "" : ", ", i);
+  }
   if (mask == 0) {
     throw ConfigError(
         "board tare: no load cell of this board is calibrated; run `tagwrench board "
         "calibrate-cell`");
   }
-  loop.session().tare(mask, static_cast<std::uint16_t>(options.conversions));
-  loop.link().send();
-
+  if (!wait_for_cells(loop, mask)) return 0;
+  const auto tared = tare(loop, options, mask);
+  if (!tared) {
+    tell("stopped; nothing was changed");
+    return 0;
+  }
   std::string report;
-  const TimePoint end = clock_now() + patience_for(options.conversions, options.cell_rate);
-  while (mask != 0 && clock_now() < end) {
-    if (!loop.turn(end)) {
-      tell("stopped; nothing was changed");
-      return 0;
+  for (const link::TareResult& result : *tared) {
+    link::CellCalibration& cell = cells[result.channel];
+    const double scale = std::abs(cell.newtons_per_count);
+    if (result.spread_counts > kMostSpread * std::max(cell.noise_counts, kLeastNoise_counts)) {
+      tell(
+          fmt::format("load cell {} moved while it was tared ({:.2g} N from end to end); let it "
+                      "rest, then try again",
+                      result.channel, result.spread_counts * scale));
+      return 1;
     }
-    for (link::TareResult result{}; loop.session().next(result);) {
-      if (result.channel >= cells.size() || (mask >> result.channel & 1) == 0) continue;
-      link::CellCalibration& cell = cells[result.channel];
-      const double moved = (result.mean_counts - cell.zero_counts) * cell.newtons_per_count;
-      cell.zero_counts = result.mean_counts;
-      cell.zero_sigma_counts =
-          std::hypot(cell.noise_counts / std::sqrt(std::max<double>(result.conversions, 1)), 0.3);
-      cell.zero_scale_covariance_n = 0;  // measured apart from the scale
-      mask &= static_cast<std::uint8_t>(~(1u << result.channel));
-      report += fmt::format("cell {}: zero moved by {:+.4f} N\n", result.channel, moved);
-    }
+    report += fmt::format("cell {}: zero moved by {:+.4f} N\n", result.channel,
+                          (result.mean_counts - cell.zero_counts) * cell.newtons_per_count);
+    cell.zero_counts = result.mean_counts;
+    cell.zero_sigma_counts =
+        std::hypot(cell.noise_counts / std::sqrt(std::max<double>(result.conversions, 1)), 0.3);
+    cell.zero_scale_covariance_n = 0;  // measured apart from the scale
   }
-  if (mask != 0) {
-    int silent = 0;
-    while ((mask >> silent & 1) == 0) ++silent;
-    no_conversions(silent);
-  }
-  link::save_cells(path, id, cells);
-  return say(report);
+  link::save_cells(path, link::id_text(loop.session().hello().unique_id), cells);
+  if (!left_out.empty()) tell(fmt::format("left out, not calibrated: load cell {}", left_out));
+  return say(fmt::format("{}kept in {}\n", report, path));
 }
 
 }  // namespace tagwrench

@@ -1,6 +1,7 @@
 // `tagwrench board led`.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <initializer_list>
@@ -65,6 +66,26 @@ Light light_of(const BoardOptions& options) {
   return out;
 }
 
+/// Throws ConfigError for pulses that this board cannot do.
+void check_limits(const link::Led& led, const link::Capabilities& can) {
+  if (led.period_us == 0 || can.strobe_period_max_us == 0) return;
+  const auto check = [](const char* what, std::uint32_t value, std::uint32_t least,
+                        std::uint32_t most, const std::string& condition = {}) {
+    if (value < least || value > most)
+      throw ConfigError(fmt::format("{} {} us: this board does {} to {} us{}", what, value, least,
+                                    most, condition));
+  };
+  const bool strobe = led.mode == link::LedMode::strobe;
+  check(strobe ? "period" : "bit", led.period_us, can.strobe_period_min_us,
+        can.strobe_period_max_us);
+  if (!strobe) return;
+  check("width", led.width_us, can.strobe_width_min_us, can.strobe_width_max_us);
+  // Dark between two pulses for as long as a pulse lasts at least.
+  const std::uint32_t dark = std::min<std::uint32_t>(can.strobe_width_min_us, led.period_us);
+  check("width", led.width_us, can.strobe_width_min_us, led.period_us - dark,
+        fmt::format(" with a period of {} us", led.period_us));
+}
+
 /// The next host time at which a pulse is due, as board time.
 std::uint32_t start_of(const Light& light, const link::ClockSync& clock) {
   const TimePoint soon = std::chrono::steady_clock::now() + milliseconds(100);
@@ -81,16 +102,21 @@ int board_led(const BoardOptions& options) {
   Light light = light_of(options);
   BoardLoop loop(options.port, session_options(options));
   if (!loop.settle()) return 0;
+  if (loop.session().has_capabilities()) check_limits(light.led, loop.session().capabilities());
   if (light.led.period_us > 0) light.led.start_us = start_of(light, loop.session().clock());
   loop.session().set_led(light.led);
   loop.link().send();
 
   const bool stays = light.led.mode != link::LedMode::off;
-  if (stays) tell("the light stays until Ctrl-C");
+  bool told = false;
   const TimePoint begin = std::chrono::steady_clock::now();
   while (loop.turn(begin + (stays ? std::chrono::hours(24 * 365) : milliseconds(300)))) {
     if (loop.led_refused()) return 2;
     if (!stays && std::chrono::steady_clock::now() - begin > milliseconds(300)) return 0;
+    if (stays && !told && loop.session().led_accepted()) {
+      told = true;
+      tell("the light stays until Ctrl-C");
+    }
   }
   loop.session().set_led(link::Led{});
   loop.link().send();

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
 
 #include "host/config_error.h"
 #include "host/input.h"
@@ -41,8 +42,9 @@ link::BoardSessionOptions session_options(const BoardOptions& options) {
   return out;
 }
 
-BoardLoop::BoardLoop(const std::string& port, const link::BoardSessionOptions& options)
-    : link_(port, options), stop_(signals_as_fd()) {
+BoardLoop::BoardLoop(const std::string& port, const link::BoardSessionOptions& options,
+                     const std::string& option)
+    : link_(port, options, link::kBaud, option), stop_(signals_as_fd()) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
 }
 
@@ -65,11 +67,10 @@ void BoardLoop::tell_news() {
     if (news.kind == Kind::board_too_old || news.kind == Kind::host_too_old) refusal_ = line;
     if (news.kind == Kind::led_refused) led_refused_ = true;
     const auto fault = static_cast<link::FaultCode>(news.value);
-    const bool of_cell =
-        fault == link::FaultCode::cell_silent || fault == link::FaultCode::cell_stuck;
-    if (news.kind == Kind::fault && of_cell && news.other < cell_faults_.size())
-      cell_faults_[news.other] = fault;
-    if (news.kind != Kind::connected) tell(line);
+    const bool of_cell = news.kind == Kind::fault && (fault == link::FaultCode::cell_silent ||
+                                                      fault == link::FaultCode::cell_stuck);
+    if (of_cell && news.other < cell_faults_.size()) cell_faults_[news.other] = fault;
+    if (news.kind != Kind::connected && !(of_cell && cell_faults_quiet_)) tell(line);
   }
 }
 
@@ -105,6 +106,19 @@ std::string cells_path(const BoardOptions& options, const link::BoardSession& se
   if (!options.cells_file.empty()) return options.cells_file;
   const std::string id = link::id_text(session.hello().unique_id);
   return id.empty() ? std::string() : link::cell_file_path(id);
+}
+
+void check_cells_file(const BoardOptions& options) {
+  std::error_code error;
+  if (!options.cells_file.empty() && !std::filesystem::exists(options.cells_file, error))
+    throw ConfigError(fmt::format("--cells {}: there is no such file", options.cells_file));
+}
+
+link::CellCalibrations load_cells(const BoardOptions& options, const link::BoardSession& session) {
+  const std::string path = cells_path(options, session);
+  if (path.empty()) return {};
+  return link::load_cells(path, link::id_text(session.hello().unique_id),
+                          options.cells_file.empty() ? link::kMakeAnew : "give another file");
 }
 
 }  // namespace tagwrench

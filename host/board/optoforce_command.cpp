@@ -76,8 +76,10 @@ class ForceWatch {
     while (good && clock_now() < end && wait(std::min(end, clock_now() + milliseconds(200)))) {
       sensor_.service();
       for (OptoforceReading reading; good && sensor_.next(reading);) good = show(reading);
-      watch_port(begin);
+      watch_port();
+      if (nothing() && clock_now() - begin > kPatience) break;
     }
+    if (nothing() && !stopped_) return say_nothing();
     const auto& counters = sensor_.counters();
     if (counters.lost_frames > 0 || counters.interruptions > 0)
       tell(fmt::format("{} samples were lost, {} times bytes came that belong to none",
@@ -92,7 +94,8 @@ class ForceWatch {
     const auto left = std::chrono::ceil<milliseconds>(until - clock_now());
     std::array<pollfd, 2> fds{{{sensor_.poll_fd(), POLLIN, 0}, {stop_.get(), POLLIN, 0}}};
     ::poll(fds.data(), fds.size(), static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
-    return fds[1].revents == 0;
+    stopped_ = fds[1].revents != 0;
+    return !stopped_;
   }
 
   bool show(const OptoforceReading& reading) {
@@ -102,22 +105,25 @@ class ForceWatch {
     return out_.write(line_for_people(reading)) != SendStatus::failed;
   }
 
-  void watch_port(TimePoint begin) {
+  bool nothing() const { return sensor_.counters().frames == 0; }
+
+  void watch_port() {
     if (sensor_.plugged() != plugged_) {
       plugged_ = sensor_.plugged();
       tell(options_.port + (plugged_ ? ": the port is back"
                                      : ": the port is gone; plug it in "
                                        "again, this program waits"));
     }
-    if (!silence_told_ && sensor_.counters().frames == 0 && clock_now() - begin > kPatience) {
-      silence_told_ = true;
-      const std::uint64_t bytes = sensor_.counters().skipped_bytes;
-      tell(bytes == 0
-               ? fmt::format("{}: nothing comes; is this the sensor's port?", options_.port)
-               : fmt::format("{}: {} bytes came, but no frame of an OptoForce sensor; is this its "
-                             "port?",
-                             options_.port, bytes));
-    }
+  }
+
+  int say_nothing() const {
+    const std::uint64_t bytes = sensor_.counters().skipped_bytes;
+    tell(bytes == 0
+             ? fmt::format("{}: nothing comes; is this the sensor's port?", options_.port)
+             : fmt::format("{}: {} bytes came, but no frame of an OptoForce sensor; is this its "
+                           "port?",
+                           options_.port, bytes));
+    return 1;
   }
 
   const BoardOptions& options_;
@@ -126,7 +132,7 @@ class ForceWatch {
   link::OptoforceSensor sensor_;
   TimePoint next_line_{};
   bool plugged_ = true;
-  bool silence_told_ = false;
+  bool stopped_ = false;  ///< by a signal
 };
 
 }  // namespace

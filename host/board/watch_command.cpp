@@ -23,12 +23,15 @@ class Watch {
   Watch(const BoardOptions& options, Style style, const std::string& path)
       : options_(options),
         style_(style),
+        path_(path),
         out_(path, /*lossless=*/true),
         loop_(options.port, session_options(options)) {}
 
   int run() {
     if (!loop_.settle()) return 0;
     load_calibrations();
+    if (style_ == Style::csv && !options_.seconds)
+      tell(fmt::format("writing to {}; Ctrl-C ends it", place()));
     const TimePoint begin = clock_now();
     const TimePoint end =
         options_.seconds ? begin + in_seconds(*options_.seconds) : TimePoint::max();
@@ -39,18 +42,20 @@ class Watch {
       good = take_samples();
       if (good && style_ == Style::people && clock_now() >= next_line_) good = write_view();
     }
+    if (good && style_ == Style::csv)
+      tell(fmt::format("{} samples and events written to {}", samples_, place()));
     say_losses();
     if (!good) tell(out_.failure());
     return good ? 0 : 1;
   }
 
  private:
+  std::string place() const { return path_ == "-" ? "standard output" : path_; }
+
   Duration period() const { return in_seconds(options_.line_period); }
 
   void load_calibrations() {
-    const std::string path = cells_path(options_, loop_.session());
-    if (!path.empty())
-      cells_ = link::load_cells(path, link::id_text(loop_.session().hello().unique_id));
+    cells_ = load_cells(options_, loop_.session());
     if (std::none_of(cells_.begin(), cells_.end(), [](const auto& c) { return c.calibrated; }))
       tell(
           "the load cells are not calibrated: showing counts; `tagwrench board calibrate-cell` "
@@ -83,6 +88,7 @@ class Watch {
   template <class Json, class Csv>
   bool write_sample(const Json& json, const Csv& csv) {
     if (style_ == Style::people) return true;
+    ++samples_;
     return write(style_ == Style::json ? json() : csv());
   }
 
@@ -115,7 +121,9 @@ class Watch {
 
   const BoardOptions& options_;
   Style style_;
+  std::string path_;
   TextSink out_;
+  std::uint64_t samples_ = 0;  ///< written, events among them
   std::string lines_;
   BoardLoop loop_;
   link::CellCalibrations cells_{};
@@ -126,10 +134,12 @@ class Watch {
 }  // namespace
 
 int board_watch(const BoardOptions& options) {
+  check_cells_file(options);
   return Watch(options, options.json ? Watch::Style::json : Watch::Style::people, "-").run();
 }
 
 int board_log(const BoardOptions& options) {
+  check_cells_file(options);
   return Watch(options, Watch::Style::csv, options.out).run();
 }
 

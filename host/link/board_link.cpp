@@ -10,8 +10,6 @@
 #include <cerrno>
 #include <system_error>
 
-#include "host/link/serial_places.h"
-
 namespace tagwrench::link {
 namespace {
 
@@ -19,9 +17,10 @@ constexpr int kMostReads = 4;  ///< in one service(): the frame loop goes first
 
 TimePoint clock_now() { return std::chrono::steady_clock::now(); }
 
-std::string path_of(const std::string& port, const std::optional<UsbIdentity>& identity) {
-  if (identity) return find_usb_port(*identity);
-  return port.empty() ? only_port() : port;
+std::string path_of(const std::string& port, const std::optional<UsbIdentity>& identity,
+                    const std::string& option) {
+  if (identity) return find_usb_port(*identity, option);
+  return port.empty() ? only_port(option) : port;
 }
 
 UniqueFd checked(int fd, const char* what) {
@@ -48,14 +47,15 @@ BoardSessionOptions new_session() {
   return out;
 }
 
-BoardLink::BoardLink(const std::string& port, const BoardSessionOptions& options, unsigned baud)
-    : identity_(parse_usb_identity(port)),
+BoardLink::BoardLink(const std::string& port, const BoardSessionOptions& options, unsigned baud,
+                     const std::string& option)
+    : identity_(parse_usb_identity(port, option)),
       baud_(baud),
       session_(options),
       epoll_(checked(::epoll_create1(EPOLL_CLOEXEC), "epoll")),
       timer_(checked(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd")) {
-  path_ = path_of(port, identity_);
-  serial_ = SerialPort(path_, baud_);
+  path_ = path_of(port, identity_, option);
+  serial_ = SerialPort(path_, baud_, option);
   watch(epoll_.get(), timer_.get());
   watch_serial();
   arm(clock_now());

@@ -20,8 +20,10 @@ class BoardLink {
   static constexpr Duration kRetryPeriod = std::chrono::milliseconds(500);
 
   /// `port` is a path (best one of /dev/serial/by-id, which stays the same), usb:VID:PID[:SERIAL],
-  /// or empty for the only USB serial port. Throws ConfigError if it cannot be opened.
-  BoardLink(const std::string& port, const BoardSessionOptions& options, unsigned baud = kBaud);
+  /// or empty for the only USB serial port. Throws ConfigError, naming the `option` that chooses
+  /// the port, if it cannot be opened.
+  BoardLink(const std::string& port, const BoardSessionOptions& options, unsigned baud = kBaud,
+            const std::string& option = kPortOption);
 
   /// Readable when service() has something to do.
   int poll_fd() const noexcept { return epoll_.get(); }

@@ -14,9 +14,30 @@ using std::chrono::seconds;
 constexpr Duration kOtherVersionHelloPeriod = seconds(1);
 constexpr Duration kRepeat = milliseconds(500);  ///< of a request that must be answered
 constexpr Duration kLedPeriod = seconds(1);
+constexpr Duration kLedPatience = seconds(4);      ///< with a clock that does not settle
 constexpr Duration kSilence = milliseconds(1500);  ///< the status alone comes more often
 constexpr Duration kQuickPeriod = milliseconds(20);
 constexpr std::uint32_t kStartIsOld_us = 1u << 29;  ///< far from the wrap of its sign
+
+bool is_periodic(const Led& led) {
+  return (led.mode == LedMode::strobe || led.mode == LedMode::pattern) && led.period_us > 0;
+}
+
+/// The same light with a later start.
+Led moved_on(Led led, std::int64_t periods) {
+  led.start_us += static_cast<std::uint32_t>(periods * led.period_us);
+  if (led.mode != LedMode::pattern) return led;
+  for (periods %= kPatternBits; periods > 0; --periods) {
+    led.pattern_seed = next_pattern_state(led.pattern_seed);
+  }
+  return led;
+}
+
+/// Whole ones from its start to `board_us`; none if it is in the future.
+std::uint32_t periods_until(const Led& led, std::uint32_t board_us) {
+  const std::uint32_t age = board_us - led.start_us;
+  return age < 1u << 31 ? age / led.period_us : 0;
+}
 
 }  // namespace
 
@@ -29,6 +50,7 @@ void BoardSession::reconnect() noexcept {
   frame_bytes_ = 0;
   first_byte_count_ = 0;
   frame_sequence_ = {};
+  configured_ = false;  // another program may have had it
   half_ = {};
   requests_.fill({});
   next_hello_ = line_free_ = {};
@@ -40,8 +62,11 @@ void BoardSession::reconnect() noexcept {
 void BoardSession::set_led(const Led& led) noexcept {
   led_ = led;
   led_set_ = true;
-  led_refused_told_ = false;
+  led_refused_told_ = led_accepted_ = false;
   next_led_ = {};
+  led_start_ = {};
+  led_start_lost_ = false;
+  remember_led_start();
 }
 
 void BoardSession::tare(std::uint8_t cell_mask, std::uint16_t conversions) noexcept {
@@ -53,6 +78,7 @@ void BoardSession::tare(std::uint8_t cell_mask, std::uint16_t conversions) noexc
 void BoardSession::configure(const Configure& configuration) noexcept {
   options_.configuration = configuration;
   if (state_ == BoardState::ready) state_ = BoardState::configuring;
+  configured_ = false;
   next_configure_ = {};
 }
 
@@ -93,8 +119,15 @@ void BoardSession::send_requests(TimePoint now) noexcept {
     put(options_.configuration);
     next_configure_ = now + kRepeat;
   }
-  if (led_set_ && now >= next_led_) {
+  if (ask_hello_ && now >= next_hello_) {
+    put(HelloRequest{kProtocolMajor, kProtocolMinor, options_.session});
+    next_hello_ = now + kHelloPeriod;
+  }
+  if (led_start_lost_) find_led_start(now);
+  if (led_set_ && !led_start_lost_ && now >= next_led_) {
     move_led_start_on(now);
+    remember_led_start();
+    led_sequence_ = sequence_;
     put(led_);
     next_led_ = now + kLedPeriod;
   }
@@ -123,16 +156,34 @@ void BoardSession::send_time_request(TimePoint now) noexcept {
 
 /// A start that lies far back would turn into one in the future when board time wraps.
 void BoardSession::move_led_start_on(TimePoint now) noexcept {
-  const bool periodic = led_.mode == LedMode::strobe || led_.mode == LedMode::pattern;
-  if (!periodic || led_.period_us == 0 || !clock_.known()) return;
-  const std::uint32_t age = clock_.to_board(now) - led_.start_us;
-  if (age < kStartIsOld_us || age >= 1u << 31) return;
-  std::uint32_t periods = age / led_.period_us;
-  led_.start_us += periods * led_.period_us;
-  if (led_.mode != LedMode::pattern) return;
-  for (periods %= kPatternBits; periods > 0; --periods) {
-    led_.pattern_seed = next_pattern_state(led_.pattern_seed);
-  }
+  if (!is_periodic(led_) || !clock_.known()) return;
+  const std::uint32_t board_us = clock_.to_board(now);
+  const std::uint32_t periods = periods_until(led_, board_us);
+  if (board_us - led_.start_us >= kStartIsOld_us) led_ = moved_on(led_, periods);
+}
+
+/// Board times end with a restart of the board; host times go on. The latest period's start is the
+/// one to remember: those of the board's clock and of the host's drift apart.
+void BoardSession::remember_led_start() noexcept {
+  if (!is_periodic(led_) || !clock_.known()) return;
+  const Led& from = led_start_.known ? led_start_.led : led_;
+  led_start_.led = moved_on(from, periods_until(from, clock_.to_board(clock_.latest())));
+  led_start_.time = clock_.to_host(led_start_.led.start_us).time;
+  led_start_.known = true;
+}
+
+/// Of a board that has started anew: where the light would be by now, as its new clock says. Until
+/// that clock is good (kLedPatience at most), the light stays off.
+void BoardSession::find_led_start(TimePoint now) noexcept {
+  if (!clock_.known()) return;
+  if (!clock_.report().converged && now - restarted_ < kLedPatience) return;
+  led_ = led_start_.led;
+  const double since_us = std::chrono::duration<double, std::micro>(now - led_start_.time).count();
+  const std::int64_t board_us = std::llround(since_us * (1 + 1e-6 * clock_.report().skew_ppm));
+  led_.start_us = clock_.to_board(now) - static_cast<std::uint32_t>(board_us);
+  if (board_us > 0) led_ = moved_on(led_, board_us / led_.period_us);
+  led_start_.known = led_start_lost_ = false;
+  next_led_ = {};
 }
 
 TimePoint BoardSession::next_poll() const noexcept {
@@ -140,7 +191,8 @@ TimePoint BoardSession::next_poll() const noexcept {
   TimePoint next = std::min(next_time_request_, last_frame_ + kSilence + milliseconds(1));
   if (set_id_due_) next = std::min(next, next_set_id_);
   if (state_ == BoardState::configuring) next = std::min(next, next_configure_);
-  if (led_set_) next = std::min(next, next_led_);
+  if (ask_hello_) next = std::min(next, next_hello_);
+  if (led_set_ && !led_start_lost_) next = std::min(next, next_led_);
   if (tare_due_ && state_ == BoardState::ready) next = std::min(next, next_tare_);
   return next;
 }

@@ -103,8 +103,11 @@ class BoardSession {
   // ---- What the board is told ----
 
   /// Lights the LED so, now and after every reconnection; also the keep-alive. `start_us` may stay
-  /// the same: it is moved on by whole periods as time goes by.
+  /// the same: it is moved on by whole periods as time goes by. A board that starts anew stays dark
+  /// until its clock is known again, and goes on as if it had not.
   void set_led(const Led& led) noexcept;
+  /// Whether the board has confirmed it.
+  bool led_accepted() const noexcept { return led_accepted_; }
   void tare(std::uint8_t cell_mask, std::uint16_t conversions) noexcept;
   void configure(const Configure& configuration) noexcept;
 
@@ -151,6 +154,12 @@ class BoardSession {
     bool known = false;
     std::uint16_t last = 0;
   };
+  /// A start of a period of the LED's in both clocks.
+  struct LedStart {
+    Led led{};  ///< what shines from then on
+    TimePoint time{};
+    bool known = false;
+  };
 
   void take_frame(TimePoint arrival, std::uint16_t wire_bytes) noexcept;
   void take_hello(const Hello& hello, TimePoint arrival) noexcept;
@@ -176,6 +185,8 @@ class BoardSession {
   void send_requests(TimePoint now) noexcept;
   void send_time_request(TimePoint now) noexcept;
   void move_led_start_on(TimePoint now) noexcept;
+  void remember_led_start() noexcept;
+  void find_led_start(TimePoint now) noexcept;
 
   BoardSessionOptions options_;
   ClockSync clock_;
@@ -192,6 +203,9 @@ class BoardSession {
   Status status_{};
   bool has_status_ = false;
   bool other_host_told_ = false;
+  bool configured_ = false;  ///< by this session, in the board's present life
+  bool ask_hello_ = false;   ///< while all else goes on: whether it has started anew
+  TimePoint restarted_{};
   std::uint32_t boot_id_ = 0;
   TimePoint last_frame_{};
   SessionCounters counters_;
@@ -214,6 +228,10 @@ class BoardSession {
   Led led_{};
   bool led_set_ = false;
   bool led_refused_told_ = false;
+  bool led_accepted_ = false;
+  std::uint8_t led_sequence_ = 0;  ///< of the latest order
+  LedStart led_start_;
+  bool led_start_lost_ = false;  ///< its board time is of an earlier life of the board
   bool set_id_due_ = false;
   Tare tare_{};
   bool tare_due_ = false;

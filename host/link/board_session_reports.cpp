@@ -103,6 +103,7 @@ void BoardSession::watch_frame_sequence(std::uint8_t sequence) noexcept {
 void BoardSession::take_hello(const Hello& hello, TimePoint arrival) noexcept {
   if (hello.session != options_.session) {
     // It started anew, or answers another host: ask whom it listens to.
+    if (hello.session != 0) configured_ = false;
     if (state_ >= BoardState::configuring) greet_again(arrival);
     return;
   }
@@ -113,8 +114,12 @@ void BoardSession::take_hello(const Hello& hello, TimePoint arrival) noexcept {
   make_printable(hello_.firmware);
   boot_id_ = hello.boot_id;
   has_hello_ = true;
+  ask_hello_ = false;
   if (restarted) {
     ++counters_.restarts;
+    configured_ = false;
+    restarted_ = arrival;
+    led_start_lost_ = led_start_.known;
     tell(News::Kind::restarted, static_cast<std::uint32_t>(hello.reset_cause));
   }
   const std::uint32_t version = hello.protocol_major * 256u + hello.protocol_minor;
@@ -129,7 +134,7 @@ void BoardSession::take_hello(const Hello& hello, TimePoint arrival) noexcept {
   if (!known) restart_streams();
   if (known && state_ >= BoardState::configuring) return;  // a repeated answer
   tell(News::Kind::connected, version);
-  state_ = BoardState::configuring;
+  state_ = configured_ ? BoardState::ready : BoardState::configuring;
   set_id_due_ = hello.unique_id.count == 0 && options_.new_id.count > 0;
   next_set_id_ = next_configure_ = next_led_ = next_time_request_ = next_tare_ = {};
   quick_requests_ = kQuickRequests;
@@ -157,6 +162,7 @@ void BoardSession::take_answer(const Answer& answer) noexcept {
     case Kind::configure:
       if (state_ != BoardState::configuring) return;
       state_ = BoardState::ready;
+      configured_ = true;
       if (!ok) tell(News::Kind::configuration_refused, result);
       return;
     case Kind::set_id:
@@ -170,6 +176,7 @@ void BoardSession::take_answer(const Answer& answer) noexcept {
       }
       return;
     case Kind::led:
+      if (ok) led_accepted_ |= answer.request_sequence == led_sequence_;
       if (ok || led_refused_told_) return;
       led_refused_told_ = true;
       tell(News::Kind::led_refused, result);
@@ -190,6 +197,7 @@ void BoardSession::take_status(const Status& status, TimePoint arrival) noexcept
   status_ = status;
   has_status_ = true;
   if (status.session == options_.session || state_ < BoardState::configuring) return;
+  if (status.session != 0) configured_ = false;
   if (status.session != 0 && !other_host_told_) {
     other_host_told_ = true;
     tell(News::Kind::other_host, status.session);
@@ -213,7 +221,8 @@ void BoardSession::take_time_reply(const TimeReply& reply, TimePoint arrival,
     misfits_ = clock_.add(half_.exchange) ? 0 : misfits_ + 1;
     if (misfits_ == kMisfitsOfARestart && state_ >= BoardState::configuring) {
       misfits_ = 0;
-      greet_again(arrival);
+      ask_hello_ = true;
+      next_hello_ = arrival;
     }
   }
   half_.waiting = false;

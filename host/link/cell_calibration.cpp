@@ -18,8 +18,8 @@ void check_span(const std::vector<CellPoint>& points) {
   const auto [least, most] = std::minmax_element(points.begin(), points.end(), by_mass);
   if (points.size() < 2 || most->mass_kg - least->mass_kg < 1e-6) {
     throw ConfigError(
-        "calibrate-cell: the masses do not span: at least two different ones are needed; for "
-        "example --mass 0,0.5");
+        "calibrate-cell: all masses are the same: give at least two different ones; for example "
+        "--mass 0,0.5");
   }
   const double difference = std::abs(most->mean_counts - least->mean_counts);
   const double sigma = std::hypot(std::max(most->sigma_counts, kLeastSigma_counts),

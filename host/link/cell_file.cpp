@@ -24,38 +24,62 @@ using nlohmann::json;
 
 constexpr const char* kFormat = "tagwrench-cells-1";
 constexpr std::uintmax_t kMostBytes = 1 << 20;
+constexpr double kMostNumber = 1e12;  ///< far beyond any cell; its square and products are finite
+constexpr std::size_t kMostShown = 40;
 
-[[noreturn]] void refuse(const std::string& path, const std::string& why) {
-  throw ConfigError(
-      fmt::format("{}: {}; remove it and run `tagwrench board calibrate-cell`", path, why));
+/// The file, and what to do if it is none.
+struct Source {
+  const std::string& path;
+  const std::string& remedy;
+};
+
+[[noreturn]] void refuse(const Source& source, const std::string& why) {
+  throw ConfigError(fmt::format("{}: {}; {}", source.path, why, source.remedy));
 }
 
-double number(const std::string& path, const json& cell, const char* key) {
+[[noreturn]] void not_readable(const std::string& path, const std::string& why) {
+  throw ConfigError(fmt::format(
+      "{}: cannot be read: {}; make it readable, or give another file with --cells", path, why));
+}
+
+/// A stranger's words: no control codes to a terminal.
+std::string printable(const std::string& text) {
+  std::string out = text.substr(0, kMostShown);
+  for (char& c : out) {
+    if (c < 0x20 || c > 0x7E) c = '?';
+  }
+  return text.size() > kMostShown ? out + "..." : out;
+}
+
+double number(const Source& source, const json& cell, const char* key) {
   const auto found = cell.find(key);
   if (found == cell.end() || !found->is_number())
-    refuse(path, fmt::format("\"{}\" is missing or no number", key));
+    refuse(source, fmt::format("\"{}\" is missing or no number", key));
   const double value = found->get<double>();
-  if (!std::isfinite(value)) refuse(path, fmt::format("\"{}\" is not finite", key));
+  if (!(std::abs(value) <= kMostNumber))
+    refuse(source, fmt::format("\"{}\" is beyond {:.0e}", key, kMostNumber));
   return value;
 }
 
-void read_cell(const std::string& path, const json& cell, CellCalibrations& out) {
-  if (!cell.is_object()) refuse(path, "\"cells\" holds something that is no cell");
-  const double channel = number(path, cell, "channel");
+void read_cell(const Source& source, const json& cell, CellCalibrations& out) {
+  if (!cell.is_object()) refuse(source, "\"cells\" holds something that is no cell");
+  const double channel = number(source, cell, "channel");
   if (channel < 0 || channel >= kMostChannels || channel != std::floor(channel))
-    refuse(path, fmt::format("channel {} does not exist", channel));
+    refuse(source, fmt::format("channel {} does not exist", channel));
   CellCalibration& to = out[static_cast<std::size_t>(channel)];
-  to.newtons_per_count = number(path, cell, "newtons_per_count");
-  to.newtons_per_count_sigma = number(path, cell, "newtons_per_count_sigma");
-  to.zero_counts = number(path, cell, "zero_counts");
-  to.zero_sigma_counts = number(path, cell, "zero_sigma_counts");
-  to.noise_counts = number(path, cell, "noise_counts");
+  if (to.calibrated) refuse(source, fmt::format("channel {} is in it twice", channel));
+  to.newtons_per_count = number(source, cell, "newtons_per_count");
+  to.newtons_per_count_sigma = number(source, cell, "newtons_per_count_sigma");
+  to.zero_counts = number(source, cell, "zero_counts");
+  to.zero_sigma_counts = number(source, cell, "zero_sigma_counts");
+  to.noise_counts = number(source, cell, "noise_counts");
   if (cell.contains("zero_scale_covariance_n"))
-    to.zero_scale_covariance_n = number(path, cell, "zero_scale_covariance_n");
-  to.residual_n = number(path, cell, "residual_n");
-  if (to.newtons_per_count == 0) refuse(path, "\"newtons_per_count\" is 0");
-  if (to.newtons_per_count_sigma < 0 || to.zero_sigma_counts < 0 || to.noise_counts < 0)
-    refuse(path, "a standard deviation is negative");
+    to.zero_scale_covariance_n = number(source, cell, "zero_scale_covariance_n");
+  to.residual_n = number(source, cell, "residual_n");
+  if (to.newtons_per_count == 0) refuse(source, "\"newtons_per_count\" is 0");
+  if (to.newtons_per_count_sigma < 0 || to.zero_sigma_counts < 0 || to.noise_counts < 0 ||
+      to.residual_n < 0)
+    refuse(source, "a standard deviation or the residual is negative");
   to.calibrated = true;
 }
 
@@ -103,28 +127,35 @@ std::string cell_file_path(const std::string& board_id) {
   return (folder / "tagwrench" / fmt::format("board-{}.json", board_id)).string();
 }
 
-CellCalibrations load_cells(const std::string& path, const std::string& board_id) {
+CellCalibrations load_cells(const std::string& path, const std::string& board_id,
+                            const std::string& remedy) {
+  const Source source{path, remedy};
   CellCalibrations out;
   std::error_code error;
-  if (!fs::exists(path, error)) return out;
+  const fs::file_type type = fs::status(path, error).type();
+  if (type == fs::file_type::not_found) return out;
+  if (error) not_readable(path, error.message());
   if (!fs::is_regular_file(path, error) || fs::file_size(path, error) > kMostBytes)
-    refuse(path, "is no calibration of load cells");
+    refuse(source, "is no calibration of load cells");
+  errno = 0;
   std::ifstream in(path);
+  if (!in) not_readable(path, std::strerror(errno));
   std::ostringstream content;
-  if (!in || !(content << in.rdbuf())) refuse(path, "cannot be read, or is empty");
+  if (!(content << in.rdbuf())) refuse(source, "is empty");
   const json root = json::parse(content.str(), nullptr, /*allow_exceptions=*/false);
   if (!root.is_object() || root.value("format", json()) != kFormat)
-    refuse(path, fmt::format("is not of the format \"{}\"", kFormat));
+    refuse(source, fmt::format("is not of the format \"{}\"", kFormat));
   const json owner = root.value("board", json());
+  if (!owner.is_null() && !owner.is_string()) refuse(source, "\"board\" is no text");
   if (!board_id.empty() && owner.is_string() && owner != "" && owner != board_id) {
     throw ConfigError(fmt::format(
         "{}: belongs to the board {}, this one is {}; calibrate this board's cells, or give "
         "another --cells",
-        path, owner.get<std::string>(), board_id));
+        path, printable(owner.get<std::string>()), board_id));
   }
   const json cells = root.value("cells", json());
-  if (!cells.is_array()) refuse(path, "\"cells\" is missing");
-  for (const json& cell : cells) read_cell(path, cell, out);
+  if (!cells.is_array()) refuse(source, "\"cells\" is missing");
+  for (const json& cell : cells) read_cell(source, cell, out);
   return out;
 }
 

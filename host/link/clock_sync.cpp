@@ -12,6 +12,7 @@ constexpr double kGate = 25;               ///< squared innovation over its vari
 constexpr std::size_t kContradicting = 8;  ///< in a row: it was not they that erred
 constexpr double kOneSidedSigma = 0.29;    ///< k is within +-1/2
 constexpr double kScaleWeight = 20;        ///< exchanges that the assumed scale of errors is worth
+constexpr double kLeastVariance = 1e-13;   ///< s^2: the board's times are whole microseconds
 
 std::int64_t to_ns(TimePoint time) {
   return std::chrono::duration_cast<Duration>(time.time_since_epoch()).count();
@@ -28,6 +29,9 @@ void ClockSync::restart() noexcept {
   state_ = {};
   accepted_ = rejected_ = 0;
   least_ = {};
+  misfit_ = {};
+  unsteady_ = 0;
+  out_of_order_ = 0;
 }
 
 void ClockSync::set_asymmetry(Duration asymmetry, Duration sigma) noexcept {
@@ -60,26 +64,56 @@ bool ClockSync::add(const TimeExchange& exchange) noexcept {
 
   const double trip = round_trip(entry);
   const bool possible = entry.board_span >= 0 && trip >= kLeastRoundTrip && trip <= kMostRoundTrip;
-  const bool forward =
-      count_ == 0 || entry.board_us2 > this->entry(count_ - 1).board_us2 || elapsed_us < 0;
-  if (!possible || !forward) {
+  const bool forward = count_ == 0 || (exchange.host_sent >= last_sent_ &&
+                                       entry.board_us2 > this->entry(count_ - 1).board_us2);
+  if (!possible || (!forward && !begins_anew(entry))) {
     ++rejected_;
     return false;
   }
+  out_of_order_ = 0;
+  last_sent_ = exchange.host_sent;
   append(entry);
+  refit();
+  ++(misfit_.size == 0 ? accepted_ : rejected_);
+  return misfit_.size == 0;
+}
 
+/// Of a clock that stands still or goes back: true, and all others forgotten, when it has done so
+/// for long. Until then it widens the sigma.
+bool ClockSync::begins_anew(const Entry& late) noexcept {
+  const double since = static_cast<double>(late.board_us2 - board_reference_us2_) * 0.5e-6;
+  const double innovation = offset(late) - state_.mean[0] - state_.mean[1] * since;
+  misfit_.size = std::max(misfit_.size, std::abs(innovation));
+  if (++out_of_order_ < kContradicting) return false;
+  note_jump(misfit_.size, late.host_ns);
+  first_ = count_ = 0;
+  state_ = {};
+  return true;
+}
+
+void ClockSync::refit() noexcept {
   least_ = least_round_trip();
   const Pass assumed = pass(1);
   const double scale =
       (assumed.surprise + kScaleWeight) / (static_cast<double>(assumed.fitting) + kScaleWeight);
   const Pass fitted = pass(std::clamp(scale, 1.0, 9.0));
   state_ = fitted.state;
+  misfit_ = fitted.misfit;
+  const std::int64_t now_ns = entry(count_ - 1).host_ns;
   if (fitted.begin > 0) {
     drop_oldest(fitted.begin);
-    ++jumps_;
+    note_jump(fitted.jump, now_ns);
+  } else if (std::abs(now_ns - last_jump_ns_) > kWindow.count()) {
+    unsteady_ = 0;
   }
-  ++(fitted.last_fits ? accepted_ : rejected_);
-  return fitted.last_fits;
+}
+
+/// One jump is a clock that was set. Two in a window are one that the filter cannot follow.
+void ClockSync::note_jump(double size, std::int64_t host_ns) noexcept {
+  const bool again = jumps_ > 0 && std::abs(host_ns - last_jump_ns_) <= kWindow.count();
+  unsteady_ = again ? std::max(unsteady_, size) : 0;
+  last_jump_ns_ = host_ns;
+  ++jumps_;
 }
 
 void ClockSync::append(const Entry& entry) noexcept {
@@ -105,7 +139,6 @@ double ClockSync::round_trip(const Entry& entry) const noexcept {
 /// exceeds the bound, and the sixteenth by three times that. Of few exchanges nothing is known:
 /// zero.
 ClockSync::RoundTrip ClockSync::least_round_trip() const noexcept {
-  if (count_ < kFewForRoundTrip) return {};
   std::array<double, 16> fastest;
   fastest.fill(kMostRoundTrip);
   for (std::size_t i = 0; i < count_; ++i) {
@@ -115,10 +148,17 @@ ClockSync::RoundTrip ClockSync::least_round_trip() const noexcept {
       if (trip < place) std::swap(trip, place);
     }
   }
+  const double beyond_zero = std::max(-fastest[0], 0.0);
+  if (count_ < kFewForRoundTrip) return {0, 0, beyond_zero};
   double excess = fastest[3] - fastest[0];
   if (count_ >= 4 * fastest.size()) excess = std::max(excess, (fastest[15] - fastest[0]) / 3);
   const double bound = fastest[0] - excess;
-  return {fastest[0] > 0 ? std::max(bound, 0.0) : bound, excess};
+  return {fastest[0] > 0 ? std::max(bound, 0.0) : bound, excess, beyond_zero};
+}
+
+/// What a delay might exceed its least by; where the wire times are not as told, either way.
+double ClockSync::excess(const Entry& entry) const noexcept {
+  return std::abs(round_trip(entry) - least_.time);
 }
 
 /// Host minus board time, both since the reference.
@@ -155,12 +195,13 @@ void ClockSync::predict(State& state, double seconds) const noexcept {
 ClockSync::Pass ClockSync::pass(double scale) const noexcept {
   Pass out;
   std::size_t contradicting = 0;
+  std::int64_t fitting_us2 = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const Entry& now = entry(i);
-    const double excess = std::max(round_trip(now) - least_.time, 0.0);
+    const double excess = this->excess(now);
     if (i == 0) {
       start(out.state, now, excess);
-      out.last_fits = true;
+      fitting_us2 = now.board_us2;
       continue;
     }
     predict(out.state, static_cast<double>(now.board_us2 - entry(i - 1).board_us2) * 0.5e-6);
@@ -169,22 +210,31 @@ ClockSync::Pass ClockSync::pass(double scale) const noexcept {
     const double variance = seen * out.state.covariance * seen.transpose() + noise;
     const double innovation = offset(now) - seen * out.state.mean;
     const double surprise = squared(innovation) / variance;
-    out.last_fits = surprise <= kGate;
-    if (out.last_fits) {
+    if (surprise <= kGate) {
       const Eigen::Vector3d gain = out.state.covariance * seen.transpose() / variance;
+      const Eigen::Matrix3d rest = Eigen::Matrix3d::Identity() - gain * seen;
       out.state.mean += gain * innovation;
-      out.state.covariance -= (gain * seen * out.state.covariance).eval();
-      out.state.covariance =
-          (0.5 * (out.state.covariance + out.state.covariance.transpose())).eval();
+      // Joseph's form stays positive whatever the rounding.
+      out.state.covariance = (rest * out.state.covariance * rest.transpose()).eval();
+      out.state.covariance += noise * gain * gain.transpose();
       out.surprise += surprise;
       ++out.fitting;
       contradicting = 0;
-    } else if (++contradicting == kContradicting) {
+      out.misfit = {};
+      fitting_us2 = now.board_us2;
+      continue;
+    }
+    const double since_fitting = static_cast<double>(now.board_us2 - fitting_us2) * 0.5e-6;
+    out.misfit.size = std::max(out.misfit.size, std::abs(innovation));
+    out.misfit.rate = out.misfit.size / std::max(since_fitting, 1e-3);
+    if (++contradicting == kContradicting) {
       out.begin = i - kContradicting + 1;
+      out.jump = std::max(out.jump, out.misfit.size);
       i = out.begin;
-      start(out.state, entry(i), std::max(round_trip(entry(i)) - least_.time, 0.0));
-      out.last_fits = true;
+      start(out.state, entry(i), this->excess(entry(i)));
       contradicting = 0;
+      out.misfit = {};
+      fitting_us2 = entry(i).board_us2;
     }
   }
   return out;
@@ -195,8 +245,16 @@ double ClockSync::variance_after(double seconds) const noexcept {
   const double q = squared(options_.wander_ppm * 1e-6);
   const double variance = p(0, 0) + 2 * seconds * p(0, 1) + seconds * seconds * p(1, 1) +
                           q * std::abs(seconds * seconds * seconds) / 3 +
-                          squared(state_.mean[2] * least_.sigma);
-  return std::max(variance, 0.0);
+                          squared(state_.mean[2] * least_.sigma) + squared(unsteady_) +
+                          squared(misfit_.size + std::abs(seconds) * misfit_.rate);
+  return std::max(variance, kLeastVariance);
+}
+
+/// Uniform between the bounds that the least round trip sets. None is below zero: if one is, wire
+/// times are not as told, and half of what it is below is the least that they err by.
+double ClockSync::asymmetry_sigma() const noexcept {
+  if (asymmetry_sigma_ >= 0) return asymmetry_sigma_ / 2;
+  return std::hypot(least_.time / std::sqrt(12.0), least_.beyond_zero / 2);
 }
 
 HostTime ClockSync::to_host(std::uint32_t board_us) const noexcept {
@@ -205,10 +263,9 @@ HostTime ClockSync::to_host(std::uint32_t board_us) const noexcept {
   const double since = static_cast<double>(since_us2) * 0.5e-6;
   const double correction = state_.mean[0] + state_.mean[1] * since + asymmetry_ / 2;
   const double variance = variance_after(since);
-  const double asymmetry =
-      asymmetry_sigma_ >= 0 ? asymmetry_sigma_ / 2 : std::abs(least_.time) / std::sqrt(12.0);
   return {host_reference_ + Duration(since_us2 * 500) + to_duration(correction),
-          to_duration(std::sqrt(variance + squared(asymmetry))), to_duration(std::sqrt(variance))};
+          to_duration(std::sqrt(variance + squared(asymmetry_sigma()))),
+          to_duration(std::sqrt(variance))};
 }
 
 std::uint32_t ClockSync::to_board(TimePoint host) const noexcept {
@@ -232,8 +289,7 @@ ClockReport ClockSync::report() const noexcept {
   out.round_trip_us = least_.time * 1e6;
   out.one_sided = std::clamp(0.5 + state_.mean[2], 0.0, 1.0);
   out.random_sigma = to_duration(std::sqrt(variance_after(1)));
-  out.asymmetry_sigma = to_duration(
-      asymmetry_sigma_ >= 0 ? asymmetry_sigma_ / 2 : std::abs(least_.time) / std::sqrt(12.0));
+  out.asymmetry_sigma = to_duration(asymmetry_sigma());
   out.converged = count_ >= kFewForRoundTrip && out.random_sigma <= kConverged;
   return out;
 }

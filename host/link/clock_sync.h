@@ -69,8 +69,8 @@ class ClockSync {
   /// The board started anew: everything but the asymmetry is forgotten.
   void restart() noexcept;
 
-  /// False: rejected and counted; it cannot be (a reply before its request, or seconds late), or
-  /// contradicts the others.
+  /// False: rejected and counted; it cannot be (a reply before its request, seconds late, or before
+  /// the last exchange), or contradicts the others; then the sigma covers by how much.
   bool add(const TimeExchange& exchange) noexcept;
 
   /// Delay of the way to the board minus delay of the way back, and its standard deviation; from an
@@ -101,14 +101,21 @@ class ClockSync {
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   };
   struct RoundTrip {
-    double time = 0;   ///< s, without jitter
-    double sigma = 0;  ///< s
+    double time = 0;         ///< s, without jitter
+    double sigma = 0;        ///< s
+    double beyond_zero = 0;  ///< s; the fastest is below zero by so much
+  };
+  /// Of the exchanges since the last that fitted: what their times may err by.
+  struct Misfit {
+    double size = 0;  ///< s
+    double rate = 0;  ///< s per s from the last exchange
   };
   struct Pass {
     State state;
     std::size_t begin = 0;  ///< entries before it are contradicted by those from it on
-    bool last_fits = false;
-    double surprise = 0;  ///< sum of squared innovations over their variances
+    double jump = 0;        ///< s; how much these contradict them
+    Misfit misfit;          ///< zero: the last fits
+    double surprise = 0;    ///< sum of squared innovations over their variances
     std::size_t fitting = 0;
   };
   static constexpr std::size_t kMostEntries = 600;
@@ -120,11 +127,16 @@ class ClockSync {
   std::int64_t unwrap(std::uint32_t board_us, std::int64_t near_us) const noexcept;
   double round_trip(const Entry& entry) const noexcept;
   RoundTrip least_round_trip() const noexcept;
+  double excess(const Entry& entry) const noexcept;
   double offset(const Entry& entry) const noexcept;
+  bool begins_anew(const Entry& late) noexcept;
+  void refit() noexcept;
+  void note_jump(double size, std::int64_t host_ns) noexcept;
   Pass pass(double scale) const noexcept;
   void start(State& state, const Entry& entry, double excess) const noexcept;
   void predict(State& state, double seconds) const noexcept;
   double variance_after(double seconds) const noexcept;
+  double asymmetry_sigma() const noexcept;
 
   ClockSyncOptions options_;
   std::array<Entry, kMostEntries> entries_{};
@@ -133,9 +145,14 @@ class ClockSync {
   State state_;  ///< at the reference
   std::int64_t board_reference_us2_ = 0;
   TimePoint host_reference_{};
+  TimePoint last_sent_{};
   RoundTrip least_;
-  double asymmetry_ = 0;         ///< s
-  double asymmetry_sigma_ = -1;  ///< s; negative: not told
+  Misfit misfit_;
+  double unsteady_ = 0;  ///< s; how far the clock jumps, while it does so again and again
+  std::int64_t last_jump_ns_ = 0;
+  std::size_t out_of_order_ = 0;  ///< exchanges in a row that were before the last
+  double asymmetry_ = 0;          ///< s
+  double asymmetry_sigma_ = -1;   ///< s; negative: not told
   std::uint32_t accepted_ = 0;
   std::uint32_t rejected_ = 0;
   std::uint32_t jumps_ = 0;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <grp.h>
+#include <pwd.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -46,10 +47,10 @@ std::vector<std::string> stable_ports(const std::string& folder) {
   return out;
 }
 
-std::string port_advice(const std::string& folder) {
+std::string port_advice(const std::string& option, const std::string& folder) {
   const std::vector<std::string> ports = stable_ports(folder);
   if (ports.empty()) return "no USB serial port is plugged in here: plug the board in";
-  return fmt::format("give one of: {}", fmt::join(ports, ", "));
+  return fmt::format("give {} one of: {}", option, fmt::join(ports, ", "));
 }
 
 std::string group_of(const std::string& path) {
@@ -57,6 +58,20 @@ std::string group_of(const std::string& path) {
   if (::stat(path.c_str(), &about) != 0) return "?";
   const group* found = ::getgrgid(about.st_gid);
   return found != nullptr ? found->gr_name : std::to_string(about.st_gid);
+}
+
+std::string permission_advice(const std::string& path) {
+  struct stat about {};
+  const bool known = ::stat(path.c_str(), &about) == 0;
+  const mode_t both = S_IRGRP | S_IWGRP;
+  if (!known || (about.st_gid != 0 && (about.st_mode & both) == both)) {
+    const std::string group = group_of(path);
+    return fmt::format("it belongs to the group {}: `sudo usermod -aG {} $USER`, then log in again",
+                       group, group);
+  }
+  const passwd* owner = ::getpwuid(about.st_uid);
+  return fmt::format("only its owner {} may open it: `sudo chown $USER {}`",
+                     owner != nullptr ? owner->pw_name : std::to_string(about.st_uid), path);
 }
 
 std::string holder_of(const std::string& path) {
@@ -74,14 +89,15 @@ std::string holder_of(const std::string& path) {
   return {};
 }
 
-std::string only_port(const std::string& folder) {
+std::string only_port(const std::string& option, const std::string& folder) {
   const std::vector<std::string> ports = stable_ports(folder);
   if (ports.size() == 1) return ports.front();
   if (ports.empty())
-    throw ConfigError(
-        "board: no USB serial port is plugged in here; plug the board in, or give --port PATH");
-  throw ConfigError(fmt::format("board: {} serial ports are plugged in; pick one with --port: {}",
-                                ports.size(), fmt::join(ports, ", ")));
+    throw ConfigError(fmt::format(
+        "board: no USB serial port is plugged in here; plug the board in, or give {} PATH",
+        option));
+  throw ConfigError(fmt::format("board: {} serial ports are plugged in; pick one with {}: {}",
+                                ports.size(), option, fmt::join(ports, ", ")));
 }
 
 }  // namespace tagwrench::link

@@ -6,11 +6,19 @@
 
 namespace tagwrench::link {
 
-/// Stable paths of all serial ports with a USB identity, sorted; of the folder that udev keeps.
-std::vector<std::string> stable_ports(const std::string& folder = "/dev/serial/by-id");
+constexpr const char* kPortOption = "--port";  ///< of the command line
+constexpr const char* kStablePorts = "/dev/serial/by-id";
 
-/// "give one of: ...", or that nothing is plugged in.
-std::string port_advice(const std::string& folder = "/dev/serial/by-id");
+/// Stable paths of all serial ports with a USB identity, sorted; of the folder that udev keeps.
+std::vector<std::string> stable_ports(const std::string& folder = kStablePorts);
+
+/// "give --port one of: ...", or that nothing is plugged in. `option` is what the port was named
+/// by.
+std::string port_advice(const std::string& option = kPortOption,
+                        const std::string& folder = kStablePorts);
+
+/// Why a file that exists may not be opened, and the remedy: its group, if that may, or its owner.
+std::string permission_advice(const std::string& path);
 
 /// Name of the file's group; its number if it has no name; "?" if there is no such file.
 std::string group_of(const std::string& path);
@@ -20,6 +28,7 @@ std::string group_of(const std::string& path);
 std::string holder_of(const std::string& path);
 
 /// The only stable port. Throws ConfigError if there is none or more than one.
-std::string only_port(const std::string& folder = "/dev/serial/by-id");
+std::string only_port(const std::string& option = kPortOption,
+                      const std::string& folder = kStablePorts);
 
 }  // namespace tagwrench::link

@@ -16,7 +16,6 @@
 #include <utility>
 
 #include "host/config_error.h"
-#include "host/link/serial_places.h"
 
 namespace tagwrench::link {
 namespace {
@@ -27,6 +26,12 @@ constexpr std::array<std::pair<unsigned, speed_t>, 6> kBauds{{{115200, B115200},
                                                               {921600, B921600},
                                                               {1000000, B1000000},
                                                               {2000000, B2000000}}};
+
+bool is_pseudo(const struct stat& device) {
+  const unsigned number = major(device.st_rdev);
+  return number >= UNIX98_PTY_SLAVE_MAJOR &&
+         number < UNIX98_PTY_SLAVE_MAJOR + UNIX98_PTY_MAJOR_COUNT;
+}
 
 speed_t speed_of(unsigned baud) {
   for (const auto& [rate, speed] : kBauds) {
@@ -84,9 +89,9 @@ SerialFailure failure_of(int error) {
 
 }  // namespace
 
-SerialPort::SerialPort(const std::string& path, unsigned baud) {
+SerialPort::SerialPort(const std::string& path, unsigned baud, const std::string& option) {
   if (const SerialFailure failure = open(path.c_str(), baud))
-    throw ConfigError(text(failure, path, baud));
+    throw ConfigError(text(failure, path, baud, option));
 }
 
 SerialFailure SerialPort::open(const char* path, unsigned baud) noexcept {
@@ -98,7 +103,9 @@ SerialFailure SerialPort::open(const char* path, unsigned baud) noexcept {
   if (!fd) return failure_of(errno);
   if (!::isatty(fd.get())) return failure_of(ENOTTY);
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) return failure_of(errno);
-  ::ioctl(fd.get(), TIOCEXCL);  // keeps programs out that know no locks
+  // Keeps programs out that know no locks. A pseudo-terminal would stay exclusive after its
+  // closing.
+  if (!is_pseudo(about)) ::ioctl(fd.get(), TIOCEXCL);
   const speed_t speed = speed_of(baud);
   if (speed == B0 || !set_raw(fd.get(), speed)) return {SerialFailure::Kind::no_such_baud, 0};
   ask_for_low_latency(fd.get());
@@ -147,35 +154,28 @@ bool TerminalMark::may_reopen(const char* path) const noexcept {
   struct stat about {};
   TerminalMark now;
   if (::stat(path, &about) != 0 || !look(path, now)) return false;
-  const unsigned number = major(about.st_rdev);
-  const bool pseudo =
-      number >= UNIX98_PTY_SLAVE_MAJOR && number < UNIX98_PTY_SLAVE_MAJOR + UNIX98_PTY_MAJOR_COUNT;
-  if (!pseudo) return true;
+  if (!is_pseudo(about)) return true;
   return now.link_inode_ != 0 &&
          (now.link_inode_ != link_inode_ || now.link_time_ns_ != link_time_ns_);
 }
 
-std::string text(const SerialFailure& failure, const std::string& path, unsigned baud) {
+std::string text(const SerialFailure& failure, const std::string& path, unsigned baud,
+                 const std::string& option) {
   using Kind = SerialFailure::Kind;
   switch (failure.kind) {
     case Kind::none:
       return path + ": open";
     case Kind::absent:
-      return fmt::format("{}: there is no such port; {}", path, port_advice());
-    case Kind::denied: {
-      const std::string group = group_of(path);
-      return fmt::format(
-          "{}: no permission; it belongs to the group {}: `sudo usermod -aG {} $USER`, then log in "
-          "again",
-          path, group, group);
-    }
+      return fmt::format("{}: there is no such port; {}", path, port_advice(option));
+    case Kind::denied:
+      return fmt::format("{}: no permission; {}", path, permission_advice(path));
     case Kind::busy: {
       const std::string holder = holder_of(path);
-      return fmt::format("{}: in use by {}; end it, or give another port", path,
-                         holder.empty() ? "another program" : holder);
+      return fmt::format("{}: in use by {}; end it, or give another port with {}", path,
+                         holder.empty() ? "another program" : holder, option);
     }
     case Kind::no_serial_port:
-      return fmt::format("{}: not a serial port; {}", path, port_advice());
+      return fmt::format("{}: not a serial port; {}", path, port_advice(option));
     case Kind::no_such_baud:
       return fmt::format("{}: its driver does not do {} baud; use another adapter", path, baud);
     case Kind::other:

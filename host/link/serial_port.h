@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "host/link/serial_places.h"
 #include "host/os/unique_fd.h"
 
 namespace tagwrench::link {
@@ -36,8 +37,9 @@ class SerialPort {
   SerialPort() = default;
 
   /// Raw, 8N1, this program's alone; what had come before is thrown away. Throws ConfigError with
-  /// one line that names the remedy. An Arduino resets when its port is opened.
-  SerialPort(const std::string& path, unsigned baud);
+  /// one line that names the remedy, and `option` where another port is one. An Arduino resets when
+  /// its port is opened.
+  SerialPort(const std::string& path, unsigned baud, const std::string& option = kPortOption);
 
   /// The same without message, for a loop that tries again.
   SerialFailure open(const char* path, unsigned baud) noexcept;
@@ -79,6 +81,7 @@ class TerminalMark {
 };
 
 /// One line: what, where, remedy.
-std::string text(const SerialFailure& failure, const std::string& path, unsigned baud);
+std::string text(const SerialFailure& failure, const std::string& path, unsigned baud,
+                 const std::string& option = kPortOption);
 
 }  // namespace tagwrench::link

@@ -103,7 +103,7 @@ Bus look_at_bus(const UsbIdentity& wanted) {
 
 }  // namespace
 
-std::optional<UsbIdentity> parse_usb_identity(const std::string& text) {
+std::optional<UsbIdentity> parse_usb_identity(const std::string& text, const std::string& option) {
   if (text.rfind("usb:", 0) != 0) return {};
   const std::string_view rest = std::string_view(text).substr(4);
   const std::size_t first = rest.find(':');
@@ -116,9 +116,9 @@ std::optional<UsbIdentity> parse_usb_identity(const std::string& text) {
                               second == std::string_view::npos ? second : second - first - 1));
   if (!vendor || !product) {
     throw ConfigError(fmt::format(
-        "--port '{}': not usb:VENDOR:PRODUCT[:SERIAL] in hex; for example usb:2341:0043, see "
+        "{} '{}': not usb:VENDOR:PRODUCT[:SERIAL] in hex; for example usb:2341:0043, see "
         "`lsusb`",
-        text));
+        option, text));
   }
   UsbIdentity out{*vendor, *product, {}};
   if (second != std::string_view::npos) out.serial = rest.substr(second + 1);
@@ -146,7 +146,7 @@ std::vector<std::string> usb_serial_nodes(const UsbIdentity& identity, const std
   return out;
 }
 
-std::string find_usb_port(const UsbIdentity& identity) {
+std::string find_usb_port(const UsbIdentity& identity, const std::string& option) {
   const std::vector<std::string> nodes = usb_serial_nodes(identity);
   if (nodes.size() == 1) return nodes.front();
   const std::string wanted =
@@ -164,10 +164,12 @@ std::string find_usb_port(const UsbIdentity& identity) {
         "cp210x)",
         wanted));
   }
-  throw ConfigError(fmt::format("{}: is not plugged in; {}", wanted,
-                                bus.boards.empty()
-                                    ? std::string("no board that is known is")
-                                    : fmt::format("there is {}", fmt::join(bus.boards, ", "))));
+  if (bus.boards.empty())
+    throw ConfigError(fmt::format(
+        "{}: is not plugged in, nor is any other board that is known; plug it in", wanted));
+  throw ConfigError(
+      fmt::format("{}: is not plugged in; plug it in, or give {} one that is there: {}", wanted,
+                  option, fmt::join(bus.boards, ", ")));
 }
 
 }  // namespace tagwrench::link

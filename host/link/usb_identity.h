@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "host/link/serial_places.h"
+
 namespace tagwrench::link {
 
 struct UsbIdentity {
@@ -16,8 +18,9 @@ struct UsbIdentity {
 };
 
 /// Of "usb:VID:PID[:SERIAL]", numbers in hex; nothing if `text` does not begin with "usb:". Throws
-/// ConfigError if the rest cannot be read.
-std::optional<UsbIdentity> parse_usb_identity(const std::string& text);
+/// ConfigError, naming the `option`, if the rest cannot be read.
+std::optional<UsbIdentity> parse_usb_identity(const std::string& text,
+                                              const std::string& option = kPortOption);
 
 /// "Arduino Uno", "CH340 (Nano clones)", ...; empty if not known.
 std::string_view usb_board_name(std::uint16_t vendor, std::uint16_t product);
@@ -29,6 +32,6 @@ std::vector<std::string> usb_serial_nodes(const UsbIdentity& identity,
 
 /// The only such node. Throws ConfigError with what is plugged in, drivers or not (as libusb sees
 /// the bus), if there is none or more than one.
-std::string find_usb_port(const UsbIdentity& identity);
+std::string find_usb_port(const UsbIdentity& identity, const std::string& option = kPortOption);
 
 }  // namespace tagwrench::link

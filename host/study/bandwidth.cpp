@@ -14,12 +14,16 @@ namespace {
 
 constexpr double kBitsPerFrame = 15.382;  // no fraction of small numbers comes near
 constexpr int kFewestTimed = 8;
-constexpr double kTellsTime = 0.25;      // of a bit
-constexpr double kClear = 9;             // difference of costs: three standard deviations
-constexpr double kGoodShutter = 3;       // standard deviations
-constexpr double kFinestTime = 0.03;     // of the exposure, that a brightness tells at best
-constexpr double kShape = 0.35;          // of the jitter
-constexpr double kGlobalReadout = 0.05;  // of a bit: what a read-out of 0 may be
+constexpr double kTellsTime = 0.25;       // of a bit
+constexpr double kClear = 9;              // difference of costs: three standard deviations
+constexpr double kGoodShutter = 3;        // standard deviations
+constexpr double kModel = 0.15e-6;        // s, that bands of rows leave out of the shutter's times
+constexpr double kFinestTime = 0.03;      // of the exposure, that a brightness tells at best
+constexpr double kShape = 0.35;           // of the jitter
+constexpr double kGlobalReadout = 0.05;   // of a bit: what a read-out of 0 may be
+constexpr double kOffBrightness = 0.1;    // of the LED's light: more is another light's
+constexpr double kByChance = 0.01;        // share of the times near: less is rarer than stale ones
+constexpr double kSameBrightness = 0.02;  // of the LED's light: less may be a stale picture's
 
 std::string unusable(const BandwidthInput& input) {
   const auto frames = static_cast<int>(input.frames.size());
@@ -66,6 +70,82 @@ double usual_interval(const std::vector<TimedFrame>& times, double fallback) {
   return quantile(intervals, 0.5);
 }
 
+/// A straight line through points of which some are off by more than their weights say: each counts
+/// with a variance of its own and one of all points, found such that the residuals fit (Paule and
+/// Mandel), and those far off count less (Huber).
+class Line {
+ public:
+  void add(double x, double y, double weight) { points_.push_back({x, y, 1 / weight, 0}); }
+
+  /// False if there are too few points, or all at one place.
+  bool fit() {
+    constexpr int kRounds = 60;
+    if (points_.size() < 3 || !solve(0)) return false;
+    double low = 0, high = 0;
+    for (const Point& p : points_) high = std::max(high, off(p) * off(p) + p.variance);
+    if (excess() > 1) {
+      for (int i = 0; i < kRounds; ++i) {
+        const double middle = 0.5 * (low + high);
+        if (!solve(middle)) return false;
+        (excess() > 1 ? low : high) = middle;
+      }
+      if (!solve(high)) return false;
+    }
+    return true;
+  }
+
+  double slope() const noexcept { return slope_; }
+  double slope_sigma() const noexcept { return slope_sigma_; }
+
+ private:
+  struct Point {
+    double x, y, variance, weight;
+  };
+  double off(const Point& p) const noexcept { return p.y - offset_ - slope_ * p.x; }
+
+  double excess() const noexcept {
+    double squares = 0;
+    for (const Point& p : points_) squares += p.weight * off(p) * off(p);
+    return squares / (static_cast<double>(points_.size()) - 2);
+  }
+
+  bool solve(double common) {
+    constexpr int kRounds = 10;
+    constexpr double kHuber = 2;  // standard deviations
+    for (Point& p : points_) p.weight = 1 / (p.variance + common);
+    for (int i = 0; i < kRounds; ++i) {
+      double w = 0, x = 0, y = 0, xx = 0, xy = 0;
+      for (const Point& p : points_) {
+        w += p.weight;
+        x += p.weight * p.x;
+        y += p.weight * p.y;
+      }
+      x /= w;
+      y /= w;
+      for (const Point& p : points_) {
+        xx += p.weight * (p.x - x) * (p.x - x);
+        xy += p.weight * (p.x - x) * (p.y - y);
+      }
+      if (!(xx > 0)) return false;
+      slope_ = xy / xx;
+      offset_ = y - slope_ * x;
+      // The scatter of the points themselves, wherever along the line they lie (White).
+      double scatter = 0;
+      for (const Point& p : points_) scatter += std::pow(p.weight * (p.x - x) * off(p), 2);
+      const auto n = static_cast<double>(points_.size());
+      slope_sigma_ = std::sqrt(std::max(scatter * n / (n - 2) / (xx * xx), 1 / xx));
+      for (Point& p : points_) {
+        const double z = std::abs(off(p)) / std::sqrt(p.variance + common);
+        p.weight = std::min(1.0, kHuber / std::max(z, kHuber)) / (p.variance + common);
+      }
+    }
+    return true;
+  }
+
+  std::vector<Point> points_;
+  double slope_ = 0, offset_ = 0, slope_sigma_ = 0;
+};
+
 /// Numbers the exposures, and fits a straight line through their times. Pictures that are not timed
 /// count as their sigmas say, if `all`, or not at all.
 void fit_rate(const BandwidthInput& input, bool all, BandwidthResult& result) {
@@ -98,18 +178,16 @@ void fit_rate(const BandwidthInput& input, bool all, BandwidthResult& result) {
     const double spread = w * xx - x * x;
     if (n >= kFewestTimed && spread > 0) period = (w * xy - x * y) / spread;
   }
-  const double spread = w * xx - x * x;
-  if (n < kFewestTimed || spread <= 0) return;
-  const double slope = (w * xy - x * y) / spread;
-  const double offset = (y - slope * x) / w;
-  double squares = 0;
+  if (n < kFewestTimed) return;
+  Line line;
   for (const TimedFrame& frame : result.times) {
-    if (!usable(frame)) continue;
-    const double off = frame.exposed - start - offset - slope * static_cast<double>(frame.number);
-    squares += weight_of(frame) * off * off;
+    if (usable(frame))
+      line.add(static_cast<double>(frame.number), frame.exposed - start, weight_of(frame));
   }
-  const double sigma = std::sqrt(squares / (n - 2) * w / spread) / slope;
-  result.frame_rate = {1 / slope, std::hypot(sigma, input.clock_rate_sigma) / slope, true};
+  if (!line.fit()) return;
+  result.frame_rate = {
+      1 / line.slope(),
+      std::hypot(line.slope_sigma() / line.slope(), input.clock_rate_sigma) / line.slope(), true};
 }
 
 /// A straight exponential's scatter of a standard deviation is larger than a normal's; so the
@@ -161,12 +239,25 @@ void measure_global_shutter(const BandwidthInput& input, BandwidthFit& fit,
   fit.set_camera(
       {found.latency.value, std::max(found.jitter.value, finest), 0, found.exposure.value});
   copy_times(input, fit, result);
+  bool was_vague = false;
   for (std::size_t i = 0; i < result.times.size(); ++i) {
     TimedFrame& frame = result.times[i];
+    // The same brightness as the picture before may be that of the next time the light stood still.
+    const bool chance = frame.freshness == Freshness::stale && found.chances[i] > kByChance;
+    if (chance) frame.freshness = Freshness::undecided;
     if (frame.freshness == Freshness::stale) continue;
+    // One brightness near the pattern's least or most may fit no time to within the noise, for the
+    // exposure's error alone: then the stamp tells, and whether it is stale only the change does.
+    const bool vague = frame.freshness == Freshness::strange;
+    if (vague && found.misses[i] < kOffBrightness) frame.freshness = Freshness::fresh;
+    if (i > 0 && (vague || was_vague) && frame.freshness == Freshness::fresh &&
+        std::abs(found.changes[i]) < kSameBrightness) {
+      frame.freshness = Freshness::undecided;
+    }
+    was_vague = vague;
     frame.exposed = found.times[i];
     frame.sigma = found.sigmas[i];
-    frame.timed = frame.freshness != Freshness::strange && frame.sigma < kTellsTime * input.bit;
+    frame.timed = !vague && !chance && frame.sigma < kTellsTime * input.bit;
   }
   fit_rate(input, true, result);
   fit_latency(input, fit, result);
@@ -231,8 +322,10 @@ BandwidthResult measure_bandwidth(const BandwidthInput& input) {
   fit_latency(input, fit, result);
   count_frames(input, result);
   const Eigen::Vector2d sigma = fit.covariance().diagonal().cwiseMax(0).cwiseSqrt();
-  result.readout = {fit.camera().readout, sigma[0], sigma[0] < kGoodShutter * input.bit};
-  result.exposure = {fit.camera().exposure, sigma[1], sigma[1] < kGoodShutter * input.bit};
+  result.readout = {fit.camera().readout, std::hypot(sigma[0], kModel),
+                    sigma[0] < kGoodShutter * input.bit};
+  result.exposure = {fit.camera().exposure, std::hypot(sigma[1], kModel),
+                     sigma[1] < kGoodShutter * input.bit};
   return result;
 }
 

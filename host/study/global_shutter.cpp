@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace tagwrench {
 namespace {
@@ -15,11 +16,14 @@ using Parameters = Eigen::Matrix<double, kParameters, 1>;  // latency (s), log j
 constexpr double kNoise = 0.03;     // of the brightness; the response may bend a little
 constexpr double kOutliers = 0.03;  // share of pictures of any brightness
 constexpr double kReach = 4;        // standard deviations of the delay
+constexpr double kLevel = 1e-6;     // slope of the brightness, per exposure
 constexpr int kFewestSteps = 40, kMostSteps = 400;
 constexpr double kStepsPerExposure = 20;
 
 struct Moments {
   double likelihood = 0, time = 0, sigma = 0;
+  double miss = 0;    ///< least difference of brightness, at any time near
+  double chance = 0;  ///< share of the times near that have this brightness and no slope
 };
 
 class Likelihood {
@@ -47,26 +51,33 @@ class Likelihood {
     const int steps =
         std::clamp(static_cast<int>(2 * kReach * jitter / exposure * kStepsPerExposure),
                    kFewestSteps, kMostSteps);
-    double weights = 0, sum = 0, first = 0, second = 0;
+    double weights = 0, sum = 0, first = 0, second = 0, level = 0;
+    double least = std::numeric_limits<double>::infinity();
     for (int k = 0; k < steps; ++k) {
       const double z = kReach * (2 * (k + 0.5) / steps - 1);
       const double off = z * jitter;
-      const double seen = light_.seen({0.5, 0.5}, {middle + off, 0, exposure}).mean;
-      const double miss = (brightness_[picture] - p[3] - p[4] * seen) / kNoise;
+      const SeenLight seen = light_.seen({0.5, 0.5}, {middle + off, 0, exposure});
+      const double miss = (brightness_[picture] - p[3] - p[4] * seen.mean) / kNoise;
+      least = std::min(least, std::abs(miss));
       const double weight = std::exp(-0.5 * z * z);
       const double value = weight * std::exp(-0.5 * miss * miss);
       weights += weight;
+      if (std::abs(seen.by_middle) * exposure < kLevel && std::abs(miss) < 1) level += weight;
       sum += value;
       first += value * off;
       second += value * off * off;
     }
     const double inlier = (1 - kOutliers) * sum / (weights * kNoise * 2.5066);
-    Moments moments{inlier + kOutliers, middle, jitter};
+    Moments moments{inlier + kOutliers, middle, jitter, least * kNoise, level / weights};
     if (inlier > kOutliers) {
       moments.time = middle + first / sum;
       moments.sigma = std::sqrt(std::max(second / sum - std::pow(first / sum, 2), 0.0));
     }
     return moments;
+  }
+
+  double change(std::size_t picture) const {
+    return picture > 0 ? brightness_[picture] - brightness_[picture - 1] : 0;
   }
 
  private:
@@ -169,6 +180,9 @@ GlobalShutter fit_global_shutter(const BandwidthInput& input, const LightSignal&
     const Moments moments = likelihood.of(i, best);
     out.times.push_back(moments.time);
     out.sigmas.push_back(moments.sigma);
+    out.misses.push_back(moments.miss);
+    out.chances.push_back(moments.chance);
+    out.changes.push_back(likelihood.change(i));
   }
   return out;
 }

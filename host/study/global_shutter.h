@@ -13,6 +13,11 @@ struct GlobalShutter {
   Figure latency, jitter, exposure;  ///< s; less the uncertainty of the clocks
   std::vector<double> times;         ///< per picture, middle of the exposure, host clock, s
   std::vector<double> sigmas;        ///< s, of stamp and picture together
+  std::vector<double> misses;        ///< least difference of brightness from the light at any time
+                                     ///< near; 0 dark, 1 lit
+  std::vector<double> chances;  ///< that the light stood still for the exposure's ends, at this
+                                ///< brightness: a picture before it may have the same by chance
+  std::vector<double> changes;  ///< of brightness since the picture before; 0 for the first
 };
 
 /// Greatest likelihood, each picture's time integrated out: its delay normal about the latency, its

@@ -1,14 +1,11 @@
 // `tagwrench board` as its users run it, against a model of a board.
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <csignal>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
-#include "bridge.h"
-#include "served_board.h"
+#include "board_cli.h"
 #include "tests/unit/link/optoforce_frames.h"
 
 namespace tagwrench::test {
@@ -17,35 +14,6 @@ namespace {
 using link::BoardModel;
 using link::ServedBoard;
 using nlohmann::json;
-
-constexpr const char* kCells =
-    R"({"format":"tagwrench-cells-1","board":"0102030405060708","cells":[)"
-    R"({"channel":0,"newtons_per_count":0.001,"newtons_per_count_sigma":1e-7,"zero_counts":0,)"
-    R"("zero_sigma_counts":1,"noise_counts":2,"residual_n":0},)"
-    R"({"channel":1,"newtons_per_count":0.001,"newtons_per_count_sigma":1e-7,"zero_counts":0,)"
-    R"("zero_sigma_counts":1,"noise_counts":2,"residual_n":0},)"
-    R"({"channel":2,"newtons_per_count":0.001,"newtons_per_count_sigma":1e-7,"zero_counts":0,)"
-    R"("zero_sigma_counts":1,"noise_counts":2,"residual_n":0},)"
-    R"({"channel":3,"newtons_per_count":0.001,"newtons_per_count_sigma":1e-7,"zero_counts":0,)"
-    R"("zero_sigma_counts":1,"noise_counts":2,"residual_n":0}]})";
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> out;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) out.push_back(line);
-  return out;
-}
-
-class BoardCliTest : public ::testing::Test {
- protected:
-  BoardCliTest() { ::setenv("XDG_CONFIG_HOME", folder.path().c_str(), 1); }
-
-  std::string cells_file() const {
-    write_file(folder / "cells.json", kCells);
-    return (folder / "cells.json").string();
-  }
-  TemporaryFolder folder;
-};
 
 TEST_F(BoardCliTest, InfoPrintsTheIdentity) {
   ServedBoard board;
@@ -141,6 +109,35 @@ TEST_F(BoardCliTest, LogWritesWholeLinesOfCsv) {
   EXPECT_EQ(lines[0], "kind,channel,t_ns,t_sigma_ns,counts,value,sigma,sequence,lost_before");
   EXPECT_EQ(text.back(), '\n');
   for (const std::string& line : lines) EXPECT_EQ(std::count(line.begin(), line.end(), ','), 8);
+  const std::string count = std::to_string(lines.size() - 1);
+  EXPECT_NE(got.err.find(count + " samples and events written to " + file), std::string::npos)
+      << got.err;
+  EXPECT_EQ(got.err.find("Ctrl-C"), std::string::npos) << got.err;
+}
+
+TEST_F(BoardCliTest, ALogWithoutEndSaysHowItEnds) {
+  ServedBoard board;
+  Bridge bridge({"board", "log", "--out", (folder / "log.csv").string(), "--port", board.path()});
+  EXPECT_TRUE(bridge.wait_for_message("log.csv; Ctrl-C ends it")) << bridge.err();
+  bridge.signal(SIGINT);
+  EXPECT_EQ(bridge.finish().status, 0);
+}
+
+TEST_F(BoardCliTest, WhatIsNoVerbIsNamedAndTheVerbsAreListed) {
+  const Outcome wrong = run_bridge({"board", "infos"});
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_NE(wrong.err.find("`tagwrench board` has no subcommand 'infos' but info, watch, led"),
+            std::string::npos)
+      << wrong.err;
+  const Outcome bare = run_bridge({"board"});
+  EXPECT_EQ(bare.status, 2);
+  EXPECT_NE(bare.err.find("`tagwrench board` needs a subcommand: info, watch, led"),
+            std::string::npos)
+      << bare.err;
+  const Outcome option = run_bridge({"board", "flash", "--bord", "uno"});
+  EXPECT_EQ(option.status, 2);
+  EXPECT_NE(option.err.find("`tagwrench board flash --help`"), std::string::npos) << option.err;
+  for (const std::string& line : {wrong.err, bare.err, option.err}) EXPECT_EQ(lines_in(line), 1u);
 }
 
 TEST_F(BoardCliTest, AFullDiskIsOneLineAndExit1) {
@@ -154,6 +151,7 @@ TEST_F(BoardCliTest, AFullDiskIsOneLineAndExit1) {
 TEST_F(BoardCliTest, LedStaysUntilCtrlCAndThenGoesOut) {
   ServedBoard board;
   Bridge bridge({"board", "led", "20%", "--port", board.path()});
+  EXPECT_TRUE(bridge.wait_for_message("the light stays until Ctrl-C"));
   EXPECT_TRUE(board.wait_for([](const BoardModel& m) { return m.leds.size() >= 3; }))
       << "it is repeated";
   bridge.signal(SIGINT);
@@ -184,68 +182,32 @@ TEST_F(BoardCliTest, ALightBeyondTheLimitsIsRefusedHereOrByTheBoard) {
   const Outcome got = run_bridge({"board", "led", "strobe", "10", "5", "--port", board.path()});
   EXPECT_EQ(got.status, 2);
   EXPECT_NE(got.err.find("beyond its limits"), std::string::npos) << got.err;
+  EXPECT_EQ(got.err.find("stays until"), std::string::npos) << got.err;
 }
 
-TEST_F(BoardCliTest, CalibrateCellMakesNewtonsThatWatchShows) {
-  ServedBoard board;
-  const std::string keys = (folder / "keys").string();
-  ASSERT_EQ(::mkfifo(keys.c_str(), 0600), 0);
-  UniqueFd keyboard(::open(keys.c_str(), O_RDWR | O_CLOEXEC));
-  board.set_counts(1000);
-  Bridge bridge({"board", "calibrate-cell", "--channel", "0", "--mass", "0,0.5", "--port",
-                 board.path(), "--conversions", "20"},
-                keys);
-  ASSERT_TRUE(bridge.wait_for_message("take everything off"));
-  ASSERT_EQ(::write(keyboard.get(), "\n", 1), 1);
-  ASSERT_TRUE(bridge.wait_for_message("put 0.5 kg"));
-  board.set_counts(1000 + 49'033);
-  ASSERT_EQ(::write(keyboard.get(), "\n", 1), 1);
-  const Outcome got = bridge.finish();
-  EXPECT_EQ(got.status, 0) << got.err;
-  EXPECT_NE(got.out.find("board-0102030405060708.json"), std::string::npos) << got.out;
-
-  Bridge watch({"board", "watch", "--json", "--port", board.path()});
-  ASSERT_TRUE(watch.wait_for_lines(20)) << watch.err();
-  watch.signal(SIGINT);
-  for (const std::string& text : lines_of(watch.finish().out)) {
-    const json line = json::parse(text);
-    if (line["channel"] == 0) {
-      EXPECT_NEAR(line["f_n"].get<double>(), 4.9033, 1e-3);
-    } else {
-      EXPECT_TRUE(line["f_n"].is_null()) << "not calibrated: no newtons";
-    }
-  }
-  // The zero follows a tare (the model always answers 1234).
-  const Outcome tare = run_bridge({"board", "tare", "--port", board.path()});
-  EXPECT_EQ(tare.status, 0) << tare.err;
-  EXPECT_NE(tare.out.find("cell 0: zero moved by +0.0234 N"), std::string::npos) << tare.out;
-}
-
-TEST_F(BoardCliTest, MassesThatDoNotSpanAreRefused) {
-  const Outcome same =
-      run_bridge({"board", "calibrate-cell", "--channel", "0", "--mass", "0.5,0.5"});
-  EXPECT_EQ(same.status, 2);
-  EXPECT_NE(same.err.find("do not span"), std::string::npos) << same.err;
-  ServedBoard board;
-  write_file(folder / "keys", "\n\n");
-  Bridge bridge({"board", "calibrate-cell", "--channel", "0", "--mass", "0,0.5", "--port",
-                 board.path(), "--conversions", "10"},
-                (folder / "keys").string());
-  const Outcome unmoved = bridge.finish();
-  EXPECT_EQ(unmoved.status, 2) << "nothing was put on";
-  EXPECT_NE(unmoved.err.find("take a larger mass"), std::string::npos) << unmoved.err;
-  EXPECT_FALSE(std::filesystem::exists(folder / "tagwrench"));
-}
-
-TEST_F(BoardCliTest, AnUnwiredCellIsSaidWhenItIsCalibrated) {
-  ServedBoard board(0b1110);
-  write_file(folder / "keys", "\n\n");
-  Bridge bridge({"board", "calibrate-cell", "--channel", "0", "--mass", "0,0.5", "--port",
-                 board.path(), "--conversions", "10"},
-                (folder / "keys").string());
-  const Outcome got = bridge.finish();
-  EXPECT_EQ(got.status, 2);
-  EXPECT_NE(got.err.find("check the wires"), std::string::npos) << got.err;
+TEST_F(BoardCliTest, PulsesBeyondTheLimitsAreRefusedWithTheLimits) {
+  ServedBoard board(0xF, [](BoardModel& m) {
+    m.capabilities.strobe_width_min_us = 100;
+    m.capabilities.strobe_width_max_us = 20'000;
+    m.capabilities.strobe_period_min_us = 2000;
+    m.capabilities.strobe_period_max_us = 1'000'000;
+  });
+  const auto refusal = [&](std::vector<std::string> light) {
+    std::vector<std::string> words{"board", "led", "--port", board.path()};
+    words.insert(words.end(), light.begin(), light.end());
+    const Outcome got = run_bridge(words);
+    EXPECT_EQ(got.status, 2);
+    return got.err;
+  };
+  EXPECT_EQ(refusal({"strobe", "50", "10"}),
+            "tagwrench: period 50 us: this board does 2000 to 1000000 us\n");
+  EXPECT_EQ(refusal({"strobe", "4000", "10"}),
+            "tagwrench: width 10 us: this board does 100 to 20000 us\n");
+  EXPECT_EQ(refusal({"strobe", "4000", "3950"}),
+            "tagwrench: width 3950 us: this board does 100 to 3900 us with a period of 4000 us\n");
+  EXPECT_EQ(refusal({"pattern", "1999"}),
+            "tagwrench: bit 1999 us: this board does 2000 to 1000000 us\n");
+  EXPECT_TRUE(board.wait_for([](const BoardModel& m) { return m.leds.empty(); }));
 }
 
 TEST_F(BoardCliTest, AnotherVersionSaysWhichSideToUpdate) {
@@ -275,6 +237,14 @@ TEST_F(BoardCliTest, WhatIsNoBoardIsSaid) {
   const Outcome got = run_bridge({"board", "info", "--port", silent.path()});
   EXPECT_EQ(got.status, 2);
   EXPECT_NE(got.err.find("nothing answers"), std::string::npos) << got.err;
+}
+
+TEST_F(BoardCliTest, APortWithoutOptoforceSensorEndsWith1) {
+  link::Pty device;
+  const Outcome got = run_bridge(
+      {"board", "optoforce", "--port", device.path(), "--counts-per-unit", "100,100,20"});
+  EXPECT_EQ(got.status, 1);
+  EXPECT_NE(got.err.find("nothing comes"), std::string::npos) << got.err;
 }
 
 TEST_F(BoardCliTest, AnOptoforceSensorIsShownInNewtons) {

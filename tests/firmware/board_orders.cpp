@@ -1,5 +1,6 @@
 #include "tests/firmware/board_orders.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <sstream>
@@ -10,29 +11,66 @@ namespace {
 
 using Words = std::istringstream;
 
+struct Order {
+  const char* form;
+  const char* effect;
+};
+
+constexpr std::array<Order, 15> kOrders{{
+    {"cell N FORCE_N", "load cell N (0 to 3), where it is wired, feels this force"},
+    {"cell N sine AMPLITUDE_N HZ", "it feels a force that goes up and down"},
+    {"cell N disconnect", "its wires come off"},
+    {"cell N connect", "they are put on again"},
+    {"cell N stuck", "its data line stays low"},
+    {"adc N VOLT", "voltage at the analogue input N (0 or 1)"},
+    {"supply VOLT", "voltage that the board runs on"},
+    {"button N press|release", "button N (0 or 1), whose contact bounces"},
+    {"reset", "presses the board's reset button"},
+    {"power", "takes its power away for a moment"},
+    {"hang", "its program stops, until the watchdog strikes"},
+    {"unplug | plug", "pulls the USB cable out, puts it in again"},
+    {"noise BIT_ERROR_RATE", "flips bits on the line, either way (0.001: one in 1000); 0 ends it"},
+    {"babble BYTES", "sends the host so many bytes that mean nothing"},
+    {"quit", "ends the emulated board"},
+}};
+
+/// Has all of the order been read?
+bool done(std::istringstream& words) {
+  words >> std::ws;
+  return words.eof();
+}
+
 double seconds_of(VirtualTime time) { return static_cast<double>(time.count()) * 1e-9; }
+
+void apply_sine(Hx711& cell, double amplitude_n, double hz) {
+  cell.bridge().force = [=](VirtualTime t) {
+    return amplitude_n * std::sin(2 * std::numbers::pi * hz * seconds_of(t));
+  };
+}
 
 bool order_cell(Words& words, EmulatedBoard& board) {
   unsigned channel = 0;
   std::string what;
   if (!(words >> channel >> what) || channel >= kCells) return false;
-  if (what == "connect") {
-    board.cell(channel).set_wiring(Hx711::Wiring::connected);
-  } else if (what == "disconnect") {
-    board.cell(channel).set_wiring(Hx711::Wiring::disconnected);
-  } else if (what == "stuck") {
-    board.cell(channel).set_wiring(Hx711::Wiring::stuck_low);
-  } else if (what == "sine") {
+  Hx711& cell = board.cell(channel);
+  if (what == "sine") {
     double amplitude = 0;
     double hz = 0;
-    if (!(words >> amplitude >> hz)) return false;
-    board.cell(channel).bridge().force = [=](VirtualTime t) {
-      return amplitude * std::sin(2 * std::numbers::pi * hz * seconds_of(t));
-    };
+    if (!(words >> amplitude >> hz) || !done(words)) return false;
+    apply_sine(cell, amplitude, hz);
+    return true;
+  }
+  if (!done(words)) return false;
+  if (what == "connect") {
+    cell.set_wiring(Hx711::Wiring::connected);
+  } else if (what == "disconnect") {
+    cell.set_wiring(Hx711::Wiring::disconnected);
+  } else if (what == "stuck") {
+    cell.set_wiring(Hx711::Wiring::stuck_low);
   } else {
     std::istringstream number(what);
     double force = 0;
-    if (!(number >> force)) return false;
+    if (!(number >> force) || !done(number)) return false;
     board.set_force(channel, force);
   }
   return true;
@@ -41,14 +79,14 @@ bool order_cell(Words& words, EmulatedBoard& board) {
 bool order_adc(Words& words, EmulatedBoard& board) {
   unsigned channel = 0;
   double volts = 0;
-  if (!(words >> channel >> volts) || channel > 1) return false;
+  if (!(words >> channel >> volts) || channel > 1 || !done(words)) return false;
   board.set_adc(channel, volts);
   return true;
 }
 
 bool order_supply(Words& words, EmulatedBoard& board) {
   double volts = 0;
-  if (!(words >> volts)) return false;
+  if (!(words >> volts) || !done(words)) return false;
   board.adc().set_supply(volts);
   return true;
 }
@@ -56,7 +94,7 @@ bool order_supply(Words& words, EmulatedBoard& board) {
 bool order_button(Words& words, EmulatedBoard& board) {
   unsigned button = 0;
   std::string what;
-  if (!(words >> button >> what) || button >= kButtons) return false;
+  if (!(words >> button >> what) || button >= kButtons || !done(words)) return false;
   if (what != "press" && what != "release") return false;
   constexpr unsigned kBounces = 3;
   board.move_button(button, what == "press", board.now(), kBounces);
@@ -65,19 +103,57 @@ bool order_button(Words& words, EmulatedBoard& board) {
 
 bool order_noise(Words& words, PtyLine& port) {
   double rate = 0;
-  if (!(words >> rate) || rate < 0 || rate > 1) return false;
+  if (!(words >> rate) || rate < 0 || rate > 1 || !done(words)) return false;
   port.set_bit_errors(rate);
   return true;
 }
 
 bool order_babble(Words& words, PtyLine& port) {
   unsigned count = 0;
-  if (!(words >> count) || count > 100000) return false;
+  if (!(words >> count) || count > 100000 || !done(words)) return false;
   port.babble(count);
   return true;
 }
 
+std::optional<std::string> plug(EmulatedBoard& board, PtyLine& port) {
+  if (port.plugged()) return std::nullopt;
+  try {
+    port.plug();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  board.power_cycle();  // it has its power from the cable
+  return std::nullopt;
+}
+
 }  // namespace
+
+std::string help_on_orders() {
+  std::string text = "Orders, on standard input:";
+  for (const Order& order : kOrders) {
+    const std::string form = order.form;
+    text += "\n  " + form + std::string(28 - form.size(), ' ') + order.effect;
+  }
+  return text;
+}
+
+void wire(EmulatedBoard& board, const board::CellOption& option) {
+  Hx711& cell = board.cell(option.channel);
+  switch (option.cell.model) {
+    case board::CellModel::constant:
+      board.set_force(option.channel, option.cell.force_n);
+      break;
+    case board::CellModel::sine:
+      apply_sine(cell, option.cell.force_n, option.cell.hz);
+      break;
+    case board::CellModel::none:
+      cell.set_wiring(Hx711::Wiring::disconnected);
+      break;
+    case board::CellModel::stuck:
+      cell.set_wiring(Hx711::Wiring::stuck_low);
+      break;
+  }
+}
 
 std::optional<std::string> carry_out(const std::string& line, EmulatedBoard& board, PtyLine& port) {
   Words words(line);
@@ -92,27 +168,29 @@ std::optional<std::string> carry_out(const std::string& line, EmulatedBoard& boa
     good = order_supply(words, board);
   } else if (order == "button") {
     good = order_button(words, board);
+  } else if (order == "noise") {
+    good = order_noise(words, port);
+  } else if (order == "babble") {
+    good = order_babble(words, port);
+  } else if (!done(words)) {
+    good = false;
   } else if (order == "reset") {
     board.press_reset();
   } else if (order == "power") {
     board.power_cycle();
   } else if (order == "hang") {
     board.hang();
-  } else if (order == "noise") {
-    good = order_noise(words, port);
-  } else if (order == "babble") {
-    good = order_babble(words, port);
   } else if (order == "unplug") {
     port.unplug();
   } else if (order == "plug") {
-    // The board has its power from the cable.
-    if (!port.plugged()) board.power_cycle();
-    port.plug();
+    return plug(board, port);
   } else {
     good = false;
   }
   if (good) return std::nullopt;
-  return "'" + line + "' is no order; there are: " + kOrders;
+  std::string all;
+  for (const Order& one : kOrders) all += std::string(all.empty() ? "" : " | ") + one.form;
+  return "'" + line + "' is no order; there are: " + all;
 }
 
 }  // namespace tagwrench::emulator

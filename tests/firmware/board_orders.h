@@ -4,17 +4,18 @@
 #include <optional>
 #include <string>
 
+#include "firmware/board/pc/cell_option.h"
 #include "tests/firmware/emulated_board.h"
 #include "tests/firmware/pty_line.h"
 
 namespace tagwrench::emulator {
 
-constexpr const char* kOrders =
-    "cell N FORCE_N | cell N sine AMPLITUDE_N HZ | cell N connect|disconnect|stuck | adc N VOLT | "
-    "supply VOLT | button N press|release | reset | power | hang | unplug | plug | noise "
-    "BIT_ERROR_RATE | babble BYTES | quit";
+/// All orders, one line each.
+std::string help_on_orders();
 
 /// Carries out one line. Returns what is wrong with it; nothing if it was done.
 std::optional<std::string> carry_out(const std::string& line, EmulatedBoard& board, PtyLine& port);
+
+void wire(EmulatedBoard& board, const board::CellOption& option);
 
 }  // namespace tagwrench::emulator

@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "host/config_error.h"
 #include "tests/firmware/board_orders.h"
 #include "tests/firmware/other_version.h"
 
@@ -36,7 +37,7 @@ void say(const std::string& line) {
 struct Options {
   std::string elf = TAGWRENCH_FIRMWARE_ELF;
   std::string port;
-  std::vector<std::string> cells;
+  std::vector<board::CellOption> cells;  ///< none: all four are wired
   std::string led_log;
   std::string eeprom;
   double seconds = 0;
@@ -56,24 +57,17 @@ class RealTimeBoard {
         version_(options.protocol_major) {
     for (unsigned i = 0; i < kCells; ++i) board_.cell(i).bridge().noise_counts = 20;
     for (unsigned i = 0; i < 2; ++i) board_.set_adc(i, 1.0 + i);
+    wire_cells();
     load_eeprom();
     if (!options.led_log.empty()) log_.open(options.led_log);
   }
 
-  void order(const std::string& line) {
-    if (const auto wrong = carry_out(line, board_, port_)) say(*wrong);
-  }
-
-  int run() {
+  /// `signals` is readable when it is time to end.
+  int run(int signals) {
     say("board on " + port_.name());
-    sigset_t ends;
-    sigemptyset(&ends);
-    for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&ends, number);
-    sigprocmask(SIG_BLOCK, &ends, nullptr);
-    const UniqueFd signals(::signalfd(-1, &ends, SFD_CLOEXEC));
     start_ = std::chrono::steady_clock::now() - board_.now();
     while (options_.seconds <= 0 || board_.now() < seconds(options_.seconds)) {
-      if (wait(signals.get())) break;
+      if (wait(signals)) break;
       listen();
       advance();
     }
@@ -118,7 +112,7 @@ class RealTimeBoard {
       const std::string line = typed_.substr(0, end);
       typed_.erase(0, end + 1);
       if (line == "quit") return true;
-      order(line);
+      if (const auto wrong = carry_out(line, board_, port_)) say(*wrong);
     }
     return false;
   }
@@ -179,6 +173,16 @@ class RealTimeBoard {
     if (log_) log_ << ns << ',' << level << std::endl;
   }
 
+  void wire_cells() {
+    if (options_.cells.empty()) return;
+    for (unsigned i = 0; i < kCells; ++i) {
+      const auto named = [i](const board::CellOption& cell) { return cell.channel == i; };
+      if (std::none_of(options_.cells.begin(), options_.cells.end(), named))
+        wire(board_, {i, {board::CellModel::none}});
+    }
+    for (const board::CellOption& cell : options_.cells) wire(board_, cell);
+  }
+
   void load_eeprom() {
     std::ifstream file(options_.eeprom, std::ios::binary);
     const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
@@ -209,12 +213,23 @@ class RealTimeBoard {
   bool same_baud_ = true;
 };
 
+UniqueFd ends() {
+  sigset_t ends;
+  sigemptyset(&ends);
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&ends, number);
+  sigprocmask(SIG_BLOCK, &ends, nullptr);
+  return UniqueFd(::signalfd(-1, &ends, SFD_CLOEXEC));
+}
+
 int run(int argc, char** argv) {
   Options options;
   CLI::App app("tagwrench's board, emulated: the flashable image on a pseudo terminal");
   app.add_option("--elf", options.elf, "image")->capture_default_str();
   app.add_option("--port", options.port, "name to give the terminal, a symbolic link");
-  app.add_option("--cell", options.cells, "N=FORCE_N or N=sine:AMPLITUDE_N:HZ");
+  std::vector<std::string> cells;
+  app.add_option(
+      "--cell", cells,
+      std::string(board::kCellForms) + "; with any of them, a cell that is not named is not wired");
   app.add_option("--seconds", options.seconds, "then end");
   app.add_option("--led-log", options.led_log, "CSV file: t_ns,level");
   app.add_option("--eeprom", options.eeprom, "file that keeps the EEPROM");
@@ -226,14 +241,22 @@ int run(int argc, char** argv) {
   app.add_option("--protocol-major", options.protocol_major,
                  "the version of the protocol that it says it speaks");
   app.add_flag("--quiet", options.quiet, "no lines for the light");
-  CLI11_PARSE(app, argc, argv);
-  RealTimeBoard board(options);
-  for (std::string cell : options.cells) {
-    std::replace_if(
-        cell.begin(), cell.end(), [](char c) { return c == '=' || c == ':'; }, ' ');
-    board.order("cell " + cell);
+  app.footer(help_on_orders());
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    throw ConfigError(error.what() + std::string("; --help shows what there is"));
   }
-  return board.run();
+  for (const std::string& text : cells) {
+    const auto cell = board::parse_cell(text);
+    if (!cell) throw ConfigError("--cell " + text + " is none of " + board::kCellForms);
+    options.cells.push_back(*cell);
+  }
+  // Before the port has its name, which whoever ends this program wants removed.
+  const UniqueFd signals = ends();
+  return RealTimeBoard(options).run(signals.get());
 }
 
 }  // namespace
@@ -244,6 +267,9 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   try {
     return tagwrench::emulator::run(argc, argv);
+  } catch (const tagwrench::ConfigError& error) {
+    tagwrench::emulator::say(error.what());
+    return 2;
   } catch (const std::exception& error) {
     tagwrench::emulator::say(error.what());
     return 1;

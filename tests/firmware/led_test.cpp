@@ -2,6 +2,9 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <utility>
+
 #include "protocol/pattern.h"
 #include "tests/firmware/board_client.h"
 
@@ -329,6 +332,34 @@ TEST_F(LedTest, PulsesOverTheSustainedLevelAreLimitedToo) {
   EXPECT_EQ(faults(link::FaultCode::led_limited), 1U);
   EXPECT_LE(board.led().mean(board.now() - seconds(2), board.now()), 0.31);
   EXPECT_GE(board.led().mean(board.now() - seconds(2), board.now()), 0.25);
+}
+
+/// Compare A makes the pulses, compare B of the same timer the conversions.
+TEST_F(LedTest, PulsesDelayNoVoltageSample) {
+  ASSERT_EQ(client.ask(full_configuration()), link::Result::ok);
+  link::Led strobe{};
+  strobe.mode = link::LedMode::strobe;
+  for (const auto& [period_us, width_us] : {std::pair(2000, 1000), {2000, 600}, {40000, 600}}) {
+    strobe.period_us = static_cast<std::uint32_t>(period_us);
+    strobe.width_us = static_cast<std::uint16_t>(width_us);
+    strobe.start_us = board_us(milliseconds(20));
+    ASSERT_EQ(client.ask(strobe), link::Result::ok);
+    client.forget();
+    run_heard(seconds(15));
+    std::array<std::optional<std::uint32_t>, 2> before;
+    int samples = 0;
+    for (const auto& sample : client.all<link::AdcSample>()) {
+      auto& last = before.at(sample.message.channel);
+      if (last) {
+        ASSERT_NEAR(sample.message.time_us - *last, 10000, 10)
+            << "us, at " << sample.message.time_us * 1e-6 << " s, pulses of " << width_us
+            << " us every " << period_us << " us";
+      }
+      last = sample.message.time_us;
+      ++samples;
+    }
+    EXPECT_GE(samples, 2990);
+  }
 }
 
 TEST_F(LedTest, FromPulsesToSteadyAndOffLeavesNoLight) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "tests/firmware/board_process.h"
 
@@ -85,7 +86,8 @@ TEST_F(Program, TheIdThatItWasGivenIsKept) {
 }
 
 TEST_F(Program, WatchShowsFourCellsInNewtonsWithTimes) {
-  BoardProcess board(folder, {"--cell", "0=0.5", "--cell", "1=-1", "--cell", "2=1.5"});
+  BoardProcess board(folder,
+                     {"--cell", "0=0.5", "--cell", "1=-1", "--cell", "2=1.5", "--cell", "3=0"});
   Bridge watch(watching(board));
   ASSERT_TRUE(watch.wait_for_lines(400)) << watch.err();
   watch.signal(SIGINT);
@@ -109,6 +111,19 @@ TEST_F(Program, WatchShowsFourCellsInNewtonsWithTimes) {
     EXPECT_GT(seen.at(i), 50);
     EXPECT_EQ(gaps.at(i), 0);
   }
+}
+
+TEST_F(Program, ACellThatIsNotNamedIsNotWired) {
+  BoardProcess board(folder, {"--cell", "0=0.5", "--cell", "1=none", "--cell", "3=sine:2:0.5"});
+  Bridge watch(watching(board));
+  EXPECT_TRUE(watch.wait_for_message("cell 1"));
+  EXPECT_TRUE(watch.wait_for_message("cell 2"));
+  ASSERT_TRUE(watch.wait_for_lines(lines_so_far(watch) + 40));
+  std::set<int> wired;
+  for (const json& sample : samples(watch.out())) {
+    if (sample["kind"] == "cell") wired.insert(sample["channel"].get<int>());
+  }
+  EXPECT_EQ(wired, (std::set<int>{0, 3}));
 }
 
 TEST_F(Program, ACellThatIsPulledOffIsSaidWhileTheOthersGoOn) {
@@ -191,7 +206,8 @@ TEST_F(Program, AResetInTheStreamIsSaidAndTheStreamGoesOn) {
 }
 
 TEST_F(Program, NoiseOfOneBitInAThousandCostsFramesOnly) {
-  BoardProcess board(folder, {"--cell", "0=0.5"});
+  BoardProcess board(folder,
+                     {"--cell", "0=0.5", "--cell", "1=0", "--cell", "2=0", "--cell", "3=0"});
   Bridge watch(watching(board));
   ASSERT_TRUE(watch.wait_for_lines(100)) << watch.err();
   board.order("noise 0.001");
@@ -211,7 +227,8 @@ TEST_F(Program, NoiseOfOneBitInAThousandCostsFramesOnly) {
 }
 
 TEST_F(Program, GarbageInTheStreamIsDropped) {
-  BoardProcess board(folder, {"--cell", "0=0.5"});
+  BoardProcess board(folder,
+                     {"--cell", "0=0.5", "--cell", "1=0", "--cell", "2=0", "--cell", "3=0"});
   Bridge watch(watching(board));
   ASSERT_TRUE(watch.wait_for_lines(80)) << watch.err();
   for (int i = 0; i < 20; ++i) {
@@ -269,6 +286,85 @@ TEST_F(Program, AButtonIsShownOnce) {
     ASSERT_TRUE(watch.wait_for_lines(lines_so_far(watch) + 80)) << "and nothing more";
   }
   EXPECT_EQ(button_events(watch), (std::vector<bool>{true, false}));
+}
+
+/// Both programs that stand for a board, and what their users get wrong.
+struct BoardProgram : testing::TestWithParam<const char*> {
+  TemporaryFolder folder;
+  const std::string port = (folder / "port").string();
+
+  void expect_refused(std::vector<std::string> arguments, const std::string& message) const {
+    arguments.insert(arguments.end(), {"--port", port});
+    const Outcome got = Bridge(arguments, "/dev/null", GetParam()).finish();
+    EXPECT_EQ(got.status, 2) << got.err;
+    EXPECT_EQ(lines_in(got.err), 1U) << got.err;
+    EXPECT_NE(got.err.find(message), std::string::npos) << got.err;
+    EXPECT_EQ(got.out, "");
+  }
+  void wait_for_port() const {
+    while (!std::filesystem::exists(port)) ::usleep(1000);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(All, BoardProgram,
+                         testing::Values(TAGWRENCH_EMULATED_BOARD, TAGWRENCH_BOARD_PC),
+                         [](const auto& program) {
+                           return program.index == 0 ? "emulated" : "pc";
+                         });
+
+TEST_P(BoardProgram, LeavesAFileThatHasItsNameAlone) {
+  write_file(port, "precious");
+  expect_refused({}, port + ": is there and no symbolic link; give --port a name that is free");
+  EXPECT_EQ(read_file(port), "precious");
+}
+
+TEST_P(BoardProgram, LeavesALinkToSomethingElseAlone) {
+  write_file(folder / "file", "precious");
+  std::filesystem::create_symlink(folder / "file", port);
+  expect_refused({}, "give --port a name that is free");
+  EXPECT_EQ(read_file(port), "precious");
+}
+
+TEST_P(BoardProgram, LeavesTheNameOfALivingBoardAlone) {
+  Bridge first({"--port", port}, "/dev/null", GetParam());
+  wait_for_port();
+  const auto terminal = std::filesystem::read_symlink(port);
+  expect_refused({}, port + ": another program serves it");
+  EXPECT_EQ(std::filesystem::read_symlink(port), terminal);
+  first.signal(SIGTERM);
+  EXPECT_EQ(first.finish().status, 0);
+  EXPECT_FALSE(std::filesystem::is_symlink(port)) << "and it goes with its board";
+}
+
+TEST_P(BoardProgram, TakesTheNameOfABoardThatIsGone) {
+  std::filesystem::create_symlink("/dev/pts/987654321", port);
+  Bridge board({"--port", port}, "/dev/null", GetParam());
+  wait_for_port();
+  EXPECT_TRUE(std::filesystem::is_character_file(port));
+}
+
+TEST_P(BoardProgram, LeavesANameThatAnotherHasTakenMeanwhile) {
+  Bridge board({"--port", port}, "/dev/null", GetParam());
+  wait_for_port();
+  std::filesystem::remove(port);
+  std::filesystem::create_symlink("/dev/pts/987654321", port);
+  board.signal(SIGTERM);
+  EXPECT_EQ(board.finish().status, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(port));
+}
+
+TEST_P(BoardProgram, RefusesANameWithoutAFolder) {
+  const Outcome got = Bridge({"--port", "/nonexistent/board"}, "/dev/null", GetParam()).finish();
+  EXPECT_EQ(got.status, 2);
+  EXPECT_EQ(lines_in(got.err), 1U) << got.err;
+  EXPECT_NE(got.err.find("/nonexistent/board: cannot be made"), std::string::npos) << got.err;
+}
+
+TEST_P(BoardProgram, RefusesACellThatCannotBe) {
+  for (const char* cell : {"7=1", "0", "0=", "0=0.5N", "=1", "0=sine:1", "0=1e999", "0:1"}) {
+    expect_refused({"--cell", cell}, cell);
+    EXPECT_FALSE(std::filesystem::is_symlink(port)) << "no start";
+  }
 }
 
 }  // namespace

@@ -12,6 +12,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "firmware/board/pc/port_name.h"
+#include "host/config_error.h"
+
 namespace tagwrench::emulator {
 
 namespace {
@@ -31,7 +34,7 @@ constexpr std::array<std::pair<speed_t, double>, 8> kSpeeds{{{B9600, 9600},
 
 }  // namespace
 
-PtyLine::PtyLine(std::filesystem::path link) : link_(std::move(link)) { plug(); }
+PtyLine::PtyLine(std::string link) : link_(std::move(link)) { plug(); }
 
 void PtyLine::plug() {
   if (plugged()) return;
@@ -50,18 +53,15 @@ void PtyLine::plug() {
     ::tcsetattr(terminal.get(), TCSANOW, &settings);
   }
   if (!link_.empty()) {
-    const std::filesystem::path temporary = link_.string() + ".new";
-    std::filesystem::remove(temporary);
-    std::filesystem::create_symlink(terminal_, temporary);
-    std::filesystem::rename(temporary, link_);
+    const std::string wrong = board::take_name(link_, terminal_);
+    if (!wrong.empty()) throw ConfigError(wrong);
   }
   master_ = std::move(master);
 }
 
 void PtyLine::unplug() {
   if (!plugged()) return;
-  std::error_code gone;
-  if (!link_.empty()) std::filesystem::remove(link_, gone);
+  if (!link_.empty()) board::leave_name(link_, terminal_);
   master_.reset();
 }
 

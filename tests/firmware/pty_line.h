@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <random>
 #include <span>
 #include <string>
@@ -16,12 +15,13 @@ namespace tagwrench::emulator {
 class PtyLine {
  public:
   /// `link` becomes a symbolic link to the terminal; empty: none. Plugged in from the start. Throws
-  /// std::runtime_error.
-  explicit PtyLine(std::filesystem::path link);
+  /// ConfigError if the link cannot be had, std::runtime_error without a pseudo terminal.
+  explicit PtyLine(std::string link);
   PtyLine(const PtyLine&) = delete;
   PtyLine& operator=(const PtyLine&) = delete;
   ~PtyLine() { unplug(); }
 
+  /// Throws as the constructor does, and stays unplugged.
   void plug();
   void unplug();
   bool plugged() const { return static_cast<bool>(master_); }
@@ -31,7 +31,7 @@ class PtyLine {
   double baud() const;
   /// Readable when the host sent something; only worth waiting for while open().
   int fd() const { return master_.get(); }
-  std::string name() const { return link_.empty() ? terminal_ : link_.string(); }
+  std::string name() const { return link_.empty() ? terminal_ : link_; }
 
   /// From now on each bit, either way, is flipped with this probability.
   void set_bit_errors(double probability) { bit_errors_ = probability; }
@@ -45,7 +45,7 @@ class PtyLine {
  private:
   void disturb(std::vector<std::uint8_t>& bytes);
 
-  std::filesystem::path link_;
+  std::string link_;
   std::string terminal_;
   UniqueFd master_;
   double bit_errors_ = 0;

@@ -35,13 +35,17 @@ Timer1::Timer1(AvrCore& core)
   core.replace_write(reg::kTcnt1l, [this](std::uint8_t value) {
     write_count(static_cast<std::uint16_t>(value | temporary_ << 8));
   });
-  for (const std::uint16_t low : {reg::kOcr1al, reg::kOcr1bl}) {
-    core.replace_write(low, [this, low](std::uint8_t value) {
-      core_.data(low) = value;
-      core_.data(static_cast<std::uint16_t>(low + 1)) = temporary_;
-      schedule_all();
-    });
-  }
+  // Only the match of the register written: one of the others may be due within this instruction.
+  core.replace_write(reg::kOcr1al, [this](std::uint8_t value) {
+    core_.data(reg::kOcr1al) = value;
+    core_.data(reg::kOcr1ah) = temporary_;
+    schedule(a_, core_.word(reg::kOcr1al) + 1U);
+  });
+  core.replace_write(reg::kOcr1bl, [this](std::uint8_t value) {
+    core_.data(reg::kOcr1bl) = value;
+    core_.data(reg::kOcr1bh) = temporary_;
+    schedule(b_, core_.word(reg::kOcr1bl) + 1U);
+  });
   core.replace_write(reg::kTifr1, [this](std::uint8_t value) {
     const std::uint8_t flags = core_.written_flags(value);
     if ((flags & 1) != 0) core_.clear(reg::kTimer1Overflow);

@@ -5,25 +5,16 @@
 
 #include <string>
 
+#include "firmware/board/pc/cell_option.h"
+
 namespace tagwrench {
 namespace board {
 
-/// What is wired to a load-cell channel.
-enum class CellModel {
-  sine,      ///< a force that goes slowly up and down
-  constant,  ///< of `force_n`
-  none,      ///< nothing: its data line stays high
-  stuck,     ///< its data line stays low
-};
-
-struct Cell {
-  CellModel model;
-  double force_n;
-};
-
-/// Opens a pseudo-terminal and makes `link` a symbolic link to it, in place of an old one. False
-/// with errno set if that cannot be.
-bool open_port(const std::string& link);
+/// Opens a pseudo-terminal and makes `link` a symbolic link to it (port_name.h). Returns what is
+/// wrong; nothing if it was done.
+std::string open_port(const std::string& link);
+/// Removes the link, unless another has it by now.
+void close_port();
 void wire_cell(unsigned channel, const Cell& cell);
 /// Presses a button for 0.2 s.
 void press_button(unsigned button);

@@ -1,5 +1,6 @@
 """The board on a real USB serial driver: found by its stable path and by its USB identity, refused to an ordinary user,
-pulled out in the middle of a stream and plugged in again. Its image runs on the emulated board outside of the guest."""
+pulled out in the middle of a stream and plugged in again, and lit for a camera. Its image runs on the emulated board outside of the guest."""
+import csv
 import glob
 import json
 import os
@@ -9,6 +10,7 @@ import rig
 
 USER = "1500"
 IDENTITY = "usb:0403:6001"
+REFERENCE = "/run/reference.csv"
 
 
 def touch(path):
@@ -20,8 +22,16 @@ def cells(lines):
     return [sample for sample in map(json.loads, lines) if sample["kind"] == "cell"]
 
 
+def whole_rows():
+    if not os.path.exists(REFERENCE):
+        return 0
+    with open(REFERENCE, encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return sum(all(row.get(f"cell{i}_counts") for i in range(4)) for row in rows)
+
+
 def body(setup):
-    rig.load("xhci-pci", "ftdi_sio", "uhid", "hid-generic", "evdev")
+    rig.load("xhci-pci", "ftdi_sio", "uhid", "hid-generic", "evdev", "v4l2loopback video_nr=0 exclusive_caps=1")
     rig.start_udevd(setup.project + "/host/output/70-tagwrench.rules")
     ports = rig.wait_until(lambda: glob.glob("/dev/serial/by-id/*"))
     rig.check("the serial driver and udev make a stable path", ports, os.listdir("/dev"))
@@ -57,6 +67,15 @@ def body(setup):
     backwards = [(a, b) for a, b in zip(times, times[1:]) if a >= b]
     rig.check("time stamps go on growing", len(times) > 100 and not backwards, backwards[:3])
     rig.check("Ctrl-C ends it with status 0", watch.stop(rig.signal.SIGINT) == 0, watch.state())
+
+    feeder = setup.feeder(["rest"])
+    feeder.tell("loop rest")
+    bridge = setup.bridge(f"reference:{REFERENCE}", more=["--board", port])
+    rig.check("a run settles the light with a camera and the board", bridge.wait_error("light: LED", patience=90),
+              bridge.state())
+    rig.check("and writes frames beside all four load cells", rig.wait_until(lambda: whole_rows() >= 10, patience=90),
+              bridge.state())
+    rig.check("Ctrl-C ends the run with status 0", bridge.stop(rig.signal.SIGINT) == 0, bridge.state())
 
 
 rig.main(body)

@@ -20,6 +20,7 @@ class BoardModel {
   Capabilities capabilities{};
   Result configure_result = Result::ok;
   Result led_result = Result::ok;
+  TareResult tare_result{0, 1234, 4, 80};
   bool answers = true;
   bool configured = false;
   Configure configuration{};
@@ -106,7 +107,7 @@ class BoardModel {
       case Kind::tare:
         ++tares;
         answer(Result::ok);
-        return send(TareResult{0, 1234, 10, 80});
+        return send(tare_result);
       case Kind::time_request:
         ++time_requests;
         send(TimeReply{reader_.sequence(), clock_.board_us(now), previous_sequence_,

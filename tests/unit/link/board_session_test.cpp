@@ -320,6 +320,99 @@ TEST_F(BoardSessionTest, AnOldStartOfAPatternIsMovedOnWithoutMovingItsBits) {
   EXPECT_EQ(sent_led.pattern_seed, state);
 }
 
+/// A restarted board's clock begins at zero; the light goes on as if it had not.
+TEST_F(BoardSessionTest, AfterARestartALightKeepsItsPhaseInHostTime) {
+  for (const LedMode mode : {LedMode::strobe, LedMode::pattern}) {
+    run(40);
+    Led led{};
+    led.mode = mode;
+    led.period_us = 7000;
+    led.width_us = 500;
+    led.pattern_seed = 21;
+    led.start_us = clock.board_us(now) - 300'000;
+    const double start = now - 0.3 / (1 + 1500e-6);
+    session.set_led(led);
+    run(5.5);
+    for (const std::uint32_t boot_id : {board.hello.boot_id + 1, board.hello.boot_id + 2}) {
+      board.leds.clear();
+      board.led_times.clear();
+      board.restart(boot_id, now);
+      const double restarted = now;
+      run(6);
+      ASSERT_FALSE(board.leds.empty());
+      EXPECT_LT(board.led_times.front() - restarted, 3) << "s that it is dark";
+      const Led& again = board.leds.front();
+      const double ago = static_cast<std::int32_t>(clock.board_us(now) - again.start_us) * 1e-6;
+      ASSERT_GT(ago, 0) << "not dark until the new clock comes to the old start";
+      // Periods are those of the board's clock, which is 1500 ppm faster.
+      const double periods = (now - ago / (1 + 1500e-6) - start) * (1 + 1500e-6) / 7e-3;
+      EXPECT_NEAR((periods - std::round(periods)) * 7000, 0, 100) << "us of phase";
+      if (mode == LedMode::pattern) {
+        std::uint16_t state = led.pattern_seed;
+        for (long k = std::lround(periods); k > 0; --k) state = next_pattern_state(state);
+        EXPECT_EQ(again.pattern_seed, state);
+      }
+      for (const Led& repeated : board.leds) EXPECT_EQ(repeated.start_us, again.start_us);
+    }
+  }
+}
+
+TEST_F(BoardSessionTest, AfterAnOutageLongerThanHalfAWrapALightGoesOnAtOnce) {
+  run(5);
+  Led led{};
+  led.mode = LedMode::strobe;
+  led.period_us = 7000;
+  led.width_us = 500;
+  led.start_us = clock.board_us(now);
+  session.set_led(led);
+  run(2);
+  session.reconnect();
+  now += 2400;
+  board.leds.clear();
+  board.restart(78, now);
+  run(6);
+  ASSERT_FALSE(board.leds.empty());
+  const auto ago = static_cast<std::int32_t>(clock.board_us(now) - board.leds.front().start_us);
+  EXPECT_GT(ago, 0);
+  EXPECT_LT(ago, 6'000'000);
+}
+
+TEST_F(BoardSessionTest, AClockThatJumpsDoesNotRestartTheCells) {
+  run(10);
+  const unsigned greeted = board.hello_requests;
+  board.configured = false;
+  clock.set_board_start(4000);
+  for (int i = 0; i < 2000; ++i) {
+    run(0.001);
+    ASSERT_EQ(session.state(), BoardState::ready);
+  }
+  EXPECT_GT(board.hello_requests, greeted) << "it might have started anew";
+  EXPECT_FALSE(board.configured) << "it is still as it was";
+  EXPECT_EQ(session.counters().restarts, 0u);
+  connected = false;
+  run(2);
+  connected = true;
+  run(1);
+  EXPECT_EQ(session.state(), BoardState::ready);
+  EXPECT_FALSE(board.configured);
+}
+
+TEST_F(BoardSessionTest, ABoardThatAnotherHostHadIsConfiguredAgain) {
+  run(3);
+  board.configured = false;
+  board.hello.session = 0xBAD;
+  run(2);
+  EXPECT_TRUE(board.configured);
+}
+
+TEST_F(BoardSessionTest, ABoardBehindANewLineIsConfiguredAgain) {
+  run(3);
+  board.configured = false;
+  session.reconnect();
+  run(1);
+  EXPECT_TRUE(board.configured);
+}
+
 TEST_F(BoardSessionTest, TareIsRepeatedUntilAnsweredAndItsResultComes) {
   session.tare(1, 80);
   run(2);

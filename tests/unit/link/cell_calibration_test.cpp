@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -145,9 +146,33 @@ TEST_F(CellFileTest, DamagedFilesAreRefusedWithTheirName) {
        {std::string(), std::string("{"), std::string("[]"), std::string("{\"format\":\"x\"}"),
         file("7"), with("\"channel\":0", "\"channel\":4"), with("\"channel\":0", "\"channel\":-1"),
         with("\"channel\":0", "\"channel\":0.5"), with("1e-3", "0"), with("1e-3", "\"a\""),
-        with("1e-6", "-1"), with("\"noise_counts\":1,", "")}) {
+        with("1e-6", "-1"), with("1e-6", "1e308"), with("1e-3", "-1e13"), with("1e-3", "1e999"),
+        with("\"residual_n\":0", "\"residual_n\":-5"), file(cell + "," + cell),
+        with("\"zero_counts\":1", "\"zero_counts\":NaN"), with("\"noise_counts\":1,", "")}) {
     EXPECT_NE(refusal(text).find("cells.json"), std::string::npos) << text;
   }
+}
+
+TEST_F(CellFileTest, TheNameOfAnotherBoardSendsNoControlCodesToATerminal) {
+  const std::string said =
+      refusal(R"({"format":"tagwrench-cells-1","board":"ffff\n\u001b[2Jx\u00e9","cells":[]})");
+  EXPECT_NE(said.find("belongs to the board ffff??[2Jx??,"), std::string::npos) << said;
+  const std::string number = refusal(R"({"format":"tagwrench-cells-1","board":5,"cells":[]})");
+  EXPECT_NE(number.find("\"board\""), std::string::npos) << number;
+}
+
+TEST_F(CellFileTest, AFileThatCannotBeLookedAtIsSaidAndNotTakenForNone) {
+  const fs::path loop = folder / "loop.json";
+  fs::create_symlink(loop, loop);
+  const fs::path below = folder / "locked" / "cells.json";
+  fs::create_directory(folder / "locked");
+  fs::permissions(folder / "locked", fs::perms::none);
+  EXPECT_THROW(load_cells(loop.string(), "aa"), ConfigError);
+  if (::geteuid() != 0) {  // root may look everywhere
+    EXPECT_THROW(load_cells(below.string(), "aa"), ConfigError);
+  }
+  fs::permissions(folder / "locked", fs::perms::owner_all);
+  EXPECT_NO_THROW(load_cells(below.string(), "aa"));
 }
 
 TEST_F(CellFileTest, AFolderThatCannotBeWrittenIsSaid) {

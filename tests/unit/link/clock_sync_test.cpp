@@ -220,6 +220,109 @@ TEST(ClockSyncTest, RestartForgetsEverythingButTheAsymmetry) {
   EXPECT_NEAR(clock.report().asymmetry_sigma.count(), 3500, 1);
 }
 
+/// Error over sigma of a time 50 ms after the exchange.
+double error_over_sigma(const SyntheticLink& link, const ClockSync& clock, double end) {
+  const HostTime told = clock.to_host(link.board_us(end + 0.05));
+  return std::abs(SyntheticLink::seconds(told.time - SyntheticLink::host(end + 0.05))) /
+         SyntheticLink::seconds(told.sigma);
+}
+
+TEST(ClockSyncTest, AClockTenPercentOffIsNotFollowedButItsSigmaSaysSo) {
+  SyntheticLink link(12, {.jitter = 0.2e-3}, 0.1);
+  ClockSync clock;
+  double end = 0;
+  for (int i = 0; i < 600; ++i) {
+    clock.add(link.exchange(100 + 0.1 * i, end));
+    if (i > 0) {
+      ASSERT_LT(error_over_sigma(link, clock, end), 2) << i;
+      ASSERT_FALSE(clock.report().converged);
+    }
+  }
+}
+
+TEST(ClockSyncTest, WhileExchangesContradictTheSigmaCoversByHowMuch) {
+  for (const double jump : {0.05, -0.05, 3.0, -3.0}) {
+    SyntheticLink link(13, {.jitter = 0.2e-3}, 200e-6);
+    ClockSync clock;
+    double end = 0;
+    for (double t = 100; t < 120; t += 0.1) clock.add(link.exchange(t, end));
+    link.set_board_start(3000 + jump);
+    for (int i = 0; i < 50; ++i) {
+      clock.add(link.exchange(120 + 0.1 * i, end));
+      ASSERT_LT(error_over_sigma(link, clock, end), 2) << jump << " s, " << i;
+    }
+    EXPECT_EQ(clock.report().jumps, 1u) << jump;
+    EXPECT_TRUE(clock.report().converged) << "a single jump is over";
+  }
+}
+
+TEST(ClockSyncTest, AClockThatStandsStillHasNoSmallSigma) {
+  SyntheticLink link(14, {}, 0);
+  ClockSync clock;
+  double end = 0;
+  TimeExchange exchange = link.exchange(100, end);
+  for (int i = 0; i < 100; ++i) {
+    clock.add(exchange);
+    exchange.host_sent += std::chrono::milliseconds(100);
+    exchange.host_received += std::chrono::milliseconds(100);
+    if (i <= 8) continue;  // one jump is believed
+    ASSERT_GT(clock.to_host(exchange.board_received_us).sigma, std::chrono::milliseconds(90)) << i;
+  }
+}
+
+TEST(ClockSyncTest, RoundTripsBelowZeroWidenTheSigmaFromTheFirstOn) {
+  for (const PathDelays path : {PathDelays{.there = -400e-6, .back = -400e-6, .jitter = 0.1e-3},
+                                PathDelays{.there = 100e-6, .back = -450e-6, .jitter = 50e-6}}) {
+    SyntheticLink link(15, {path.there, path.back, path.jitter, 0}, 0);
+    ClockSync clock;
+    double end = 0;
+    for (int i = 0; i < 100; ++i) {
+      EXPECT_TRUE(clock.add(link.exchange(100 + 0.1 * i, end))) << i;
+      ASSERT_LT(error_over_sigma(link, clock, end), 2) << i;
+    }
+  }
+}
+
+TEST(ClockSyncTest, ARequestBeforeTheLastOneIsRejected) {
+  SyntheticLink link(16, {}, 0);
+  ClockSync clock;
+  double end = 0;
+  for (double t = 100; t < 105; t += 0.1) clock.add(link.exchange(t, end));
+  TimeExchange early = link.exchange(105, end);
+  early.host_sent -= std::chrono::seconds(1);
+  early.host_received -= std::chrono::seconds(1);
+  EXPECT_FALSE(clock.add(early));
+  EXPECT_TRUE(clock.add(link.exchange(105.1, end)));
+}
+
+TEST(ClockSyncTest, WhateverTheStampsTheSigmaIsAPositiveNumber) {
+  std::mt19937_64 random(3);
+  for (int run = 0; run < 50; ++run) {
+    ClockSync clock;
+    double host = 1000;
+    for (int i = 0; i < 300; ++i) {
+      constexpr double kSteps[] = {1e-9, 0.1, 30, -0.05};
+      host += kSteps[random() % 4];
+      TimeExchange exchange{};
+      exchange.host_sent = SyntheticLink::host(host);
+      exchange.host_received = SyntheticLink::host(host + 1e-6 * double(random() % 1000));
+      exchange.board_received_us = static_cast<std::uint32_t>(
+          random() % 3 ? static_cast<std::uint64_t>(host * 1e6) + random() % 2000 : random());
+      exchange.board_sent_us =
+          exchange.board_received_us + static_cast<std::uint32_t>(random() % 100);
+      exchange.request_bytes = 9;
+      exchange.reply_bytes = 25;
+      clock.add(exchange);
+      if (!clock.known()) continue;
+      const HostTime told = clock.to_host(static_cast<std::uint32_t>(random()));
+      ASSERT_GT(told.random_sigma.count(), 0);
+      ASSERT_GE(told.sigma, told.random_sigma);
+      ASSERT_TRUE(std::isfinite(clock.report().skew_ppm));
+      ASSERT_GE(clock.report().skew_sigma_ppm, 0);
+    }
+  }
+}
+
 TEST(ClockSyncTest, TheFirstExchangeAlreadyGivesATimeWithAnHonestSigma) {
   double normal = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {

@@ -2,6 +2,7 @@
 
 #include <grp.h>
 #include <gtest/gtest.h>
+#include <pwd.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 
@@ -110,6 +111,24 @@ TEST(SerialPortTest, ASecondHostIsToldWhoHasThePort) {
   EXPECT_EQ(refusal(device.path()), "");
 }
 
+TEST(SerialPortTest, AnOrdinaryUserMayOpenAPseudoTerminalAgain) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    constexpr uid_t kNobody = 65534;  // root may open what is exclusive
+    if (::geteuid() == 0 && ::seteuid(kNobody) != 0) ::_exit(3);
+    Pty device;
+    for (int i = 0; i < 2; ++i) {
+      SerialPort port;
+      if (port.open(device.path().c_str(), 500'000)) ::_exit(1 + i);
+    }
+    ::_exit(0);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0) << "1: the first time, 2: the second, 3: no other user";
+}
+
 TEST(SerialPortTest, WhatIsNoSerialPortIsRefused) {
   EXPECT_NE(refusal("/dev/null").find("not a serial port"), std::string::npos);
   EXPECT_NE(refusal("/etc/hostname").find("not a serial port"), std::string::npos);
@@ -123,11 +142,20 @@ TEST(SerialPortTest, ABaudRateThatIsNotToBeHadIsRefused) {
   EXPECT_EQ(refusal(device.path(), 1'000'000), "");
 }
 
-TEST(SerialPortTest, NoPermissionNamesTheGroupAndTheCommand) {
+TEST(SerialPortTest, NoPermissionNamesTheRemedyThatHelps) {
   const std::string path = (fs::temp_directory_path() / "tagwrench-port").string();
   std::ofstream(path) << "";
+  const bool root = ::geteuid() == 0;
+  ASSERT_EQ(::chown(path.c_str(), ~0u, root ? ::getgrnam("dialout")->gr_gid : ::getegid()), 0);
   struct stat about {};
   ASSERT_EQ(::stat(path.c_str(), &about), 0);
+  ASSERT_EQ(::chmod(path.c_str(), 0620), 0);
+  const std::string owner = ::getpwuid(about.st_uid)->pw_name;
+  const std::string owners = text({SerialFailure::Kind::denied, EACCES}, path, 500'000);
+  EXPECT_NE(owners.find("only its owner " + owner + " may open it: `sudo chown $USER " + path),
+            std::string::npos)
+      << owners;
+  ASSERT_EQ(::chmod(path.c_str(), 0660), 0);
   const std::string group = ::getgrgid(about.st_gid)->gr_name;
   const std::string message = text({SerialFailure::Kind::denied, EACCES}, path, 500'000);
   EXPECT_NE(message.find("group " + group), std::string::npos) << message;
@@ -156,7 +184,7 @@ class PlacesTest : public ::testing::Test {
   }
   std::string refused() const {
     try {
-      return only_port(folder.string());
+      return only_port("--board", folder.string());
     } catch (const ConfigError& e) {
       return e.what();
     }
@@ -166,15 +194,16 @@ class PlacesTest : public ::testing::Test {
 
 TEST_F(PlacesTest, TheOnlyPortIsTaken) {
   const std::string one = add("usb-1a86_USB_Serial-if00-port0");
-  EXPECT_EQ(only_port(folder.string()), one);
+  EXPECT_EQ(only_port("--port", folder.string()), one);
 }
 
 TEST_F(PlacesTest, NoneAndTwoAreRefusedAndTwoAreListed) {
-  EXPECT_NE(refused().find("plug the board in"), std::string::npos);
+  EXPECT_NE(refused().find("plug the board in, or give --board"), std::string::npos);
   const std::string a = add("usb-a");
   const std::string b = add("usb-b");
   EXPECT_NE(refused().find(a + ", " + b), std::string::npos) << refused();
-  EXPECT_NE(port_advice(folder.string()).find("give one of: " + a), std::string::npos);
+  EXPECT_NE(port_advice("--board", folder.string()).find("give --board one of: " + a),
+            std::string::npos);
 }
 
 }  // namespace

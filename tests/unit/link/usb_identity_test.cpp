@@ -83,6 +83,7 @@ TEST(UsbIdentityTest, ABoardThatIsNotPluggedInIsSaidByName) {
     EXPECT_NE(std::string(e.what()).find("2341:0043 (Arduino Uno R3)"), std::string::npos)
         << e.what();
     EXPECT_NE(std::string(e.what()).find("is not plugged in"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("plug it in"), std::string::npos) << e.what();
   }
 }
 

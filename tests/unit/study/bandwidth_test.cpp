@@ -137,6 +137,78 @@ TEST(Bandwidth, AGlobalShutterTellsWhatItCan) {
   }
 }
 
+FlashedCamera global_camera(double rate, double exposure, unsigned seed) {
+  FlashedCamera camera;
+  camera.period = 1 / (0.995 * rate);
+  camera.announced = 1 / rate;
+  camera.exposure = exposure;
+  camera.readout = 0;
+  camera.stale = 0.02;
+  camera.lost = 0.02;
+  camera.seed = seed;
+  return camera;
+}
+
+// One brightness that fits no time to within the noise, but almost, is not another light's; and one
+// like that of the picture before need not be the same picture.
+TEST(Bandwidth, AGlobalShuttersGoodPicturesAreNeitherStrangeNorStale) {
+  int pictures = 0, strange = 0, stale = 0, hidden = 0, timed = 0;
+  for (const unsigned seed : {1U, 3U, 4U}) {
+    const Played played = play(global_camera(30, 8e-3, seed));
+    const BandwidthResult& r = played.result;
+    ASSERT_EQ(r.refusal, "");
+    pictures += r.frames;
+    strange += r.strange;
+    timed += r.timed;
+    for (std::size_t i = 0; i < r.times.size(); ++i) {
+      const Freshness found = r.times[i].freshness;
+      stale += !played.truth.stale[i] && found == Freshness::stale ? 1 : 0;
+      hidden += played.truth.stale[i] && found == Freshness::fresh ? 1 : 0;
+    }
+  }
+  std::printf("of %d pictures strange %d, wrongly stale %d, stale and not seen %d, timed %d\n",
+              pictures, strange, stale, hidden, timed);
+  EXPECT_LE(strange, pictures / 200);
+  EXPECT_LE(stale, pictures / 200);
+  EXPECT_LE(hidden, pictures / 200);
+  EXPECT_GT(timed, pictures / 4);
+}
+
+TEST(Bandwidth, AGlobalShuttersPicturesOfAnotherLightAreStrange) {
+  FlashedTruth truth;
+  FlashedCamera camera = global_camera(30, 8e-3, 1);
+  BandwidthInput input = flash(camera, truth);
+  constexpr std::size_t kFlashed[] = {40, 90, 140, 190, 230};
+  for (const std::size_t i : kFlashed) {
+    for (std::size_t b = 0; b < input.bands.size(); ++b)
+      input.frames[i].rows[b] = input.dark[b] + 1.4 * (input.lit[b] - input.dark[b]);
+  }
+  const BandwidthResult r = measure_bandwidth(input);
+  ASSERT_EQ(r.refusal, "");
+  for (const std::size_t i : kFlashed) {
+    EXPECT_EQ(r.times[i].freshness, Freshness::strange) << i;
+    EXPECT_FALSE(r.times[i].timed) << i;
+  }
+  EXPECT_LE(r.strange, 6);
+}
+
+TEST(Bandwidth, AGlobalShuttersFrameRateIsWithinItsSigma) {
+  constexpr int kRuns = 8;
+  double squares = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    const FlashedCamera camera = global_camera(60, 2e-3, 1 + static_cast<unsigned>(run));
+    const BandwidthResult r = play(camera).result;
+    ASSERT_TRUE(r.frame_rate.known) << r.refusal;
+    EXPECT_NEAR(r.frame_rate.value, 1 / camera.period, 1e-4 / camera.period);
+    squares += std::pow((r.frame_rate.value - 1 / camera.period) / r.frame_rate.sigma, 2);
+  }
+  const double normalised = std::sqrt(squares / kRuns);
+  std::printf("error over sigma, rms of %d: %.2f\n", kRuns, normalised);
+  // Pictures that do not tell count with the whole jitter, which makes the sigma a careful one.
+  EXPECT_GT(normalised, 0.25);
+  EXPECT_LT(normalised, 1.45);
+}
+
 // A camera's response may bend; edges still lie where they lie, but slopes look shorter.
 TEST(Bandwidth, ABentResponseHardlyMovesLatencyAndReadout) {
   FlashedCamera camera;
