@@ -19,7 +19,8 @@ CLI::Validator number(double least, double most, const char* what) {
 
 constexpr const char* kLight =
     "off | LEVEL% | strobe PERIOD_US WIDTH_US [PHASE_US] | pattern [BIT_US [SEED]]; pulses begin "
-    "where CLOCK_MONOTONIC is a multiple of the period plus the phase";
+    "where CLOCK_MONOTONIC is a multiple of the period plus the phase, then go by the board's "
+    "clock";
 
 }  // namespace
 

@@ -5,10 +5,13 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
+#include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <string_view>
 
 #include "host/board/loop.h"
 #include "host/config_error.h"
@@ -44,18 +47,44 @@ std::string find_image() {
       kImageName, looked));
 }
 
+enum class HexRecord : std::uint8_t { wrong, data, end };
+
+/// One line of Intel HEX: ":", then length, address (2), type, data and checksum in hex digits; all
+/// bytes together are 0 modulo 256 (Intel, "Hexadecimal Object File Format Specification", 1988).
+HexRecord hex_record(std::string_view line) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  if (line.size() < 11 || line.size() % 2 == 0 || line[0] != ':') return HexRecord::wrong;
+  unsigned sum = 0;
+  std::array<unsigned, 4> head{};
+  for (std::size_t i = 0; i < line.size() / 2; ++i) {
+    unsigned byte = 0;
+    const char* digits = line.data() + 1 + 2 * i;
+    const auto [end, error] = std::from_chars(digits, digits + 2, byte, 16);
+    if (error != std::errc{} || end != digits + 2) return HexRecord::wrong;
+    if (i < head.size()) head[i] = byte;
+    sum += byte;
+  }
+  if (sum % 256 != 0 || line.size() != 11 + 2 * head[0]) return HexRecord::wrong;
+  return head[3] == 1 ? HexRecord::end : HexRecord::data;
+}
+
+/// Half an image would be worse than none.
 void check_image(const std::string& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error))
     throw ConfigError(fmt::format("{}: there is no such file; give --image FILE.hex", path));
   std::ifstream in(path);
-  std::string line;
-  if (fs::file_size(path, error) > kMostImageBytes || !std::getline(in, line) || line.size() < 11 ||
-      line[0] != ':')
-    throw ConfigError(
-        fmt::format("{}: not an Intel HEX file of an ATmega328P; give --image "
-                    "FILE.hex",
-                    path));
+  HexRecord last = HexRecord::wrong;
+  if (fs::file_size(path, error) <= kMostImageBytes) {
+    for (std::string line; std::getline(in, line);) {
+      last = hex_record(line);
+      if (last != HexRecord::data) break;
+    }
+  }
+  if (last != HexRecord::end)
+    throw ConfigError(fmt::format(
+        "{}: not an Intel HEX file of an ATmega328P, or not a whole one; give --image FILE.hex",
+        path));
 }
 
 std::string flash_port(const BoardOptions& options) {

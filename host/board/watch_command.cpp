@@ -29,6 +29,7 @@ class Watch {
 
   int run() {
     if (!loop_.settle()) return 0;
+    drop_samples();
     load_calibrations();
     if (style_ == Style::csv && !options_.seconds)
       tell(fmt::format("writing to {}; Ctrl-C ends it", place()));
@@ -51,6 +52,16 @@ class Watch {
 
  private:
   std::string place() const { return path_ == "-" ? "standard output" : path_; }
+
+  /// What came while the clock was being settled; nobody asked for it, and some of it is lost.
+  void drop_samples() {
+    link::BoardSession& session = loop_.session();
+    for (link::CellReading r; session.next(r);) {
+    }
+    for (link::AdcReading r; session.next(r);) {
+    }
+    overwritten_before_ = session.overwritten();
+  }
 
   Duration period() const { return in_seconds(options_.line_period); }
 
@@ -113,7 +124,8 @@ class Watch {
 
   void say_losses() {
     const link::SessionCounters counters = loop_.session().counters();
-    const std::uint64_t lost = counters.lost_conversions + loop_.session().overwritten();
+    const std::uint64_t lost =
+        counters.lost_conversions + loop_.session().overwritten() - overwritten_before_;
     if (lost > 0 || counters.damaged_frames > 0)
       tell(fmt::format("{} samples were lost, {} frames came damaged", lost,
                        counters.damaged_frames));
@@ -129,6 +141,7 @@ class Watch {
   link::CellCalibrations cells_{};
   BoardView view_;
   TimePoint next_line_{};
+  std::uint64_t overwritten_before_ = 0;
 };
 
 }  // namespace

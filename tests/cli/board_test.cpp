@@ -318,14 +318,21 @@ TEST_F(FlashTest, AnotherChipIsRefusedByAvrdudeAndSaid) {
   EXPECT_NE(got.err.find("is it a uno with an ATmega328P?"), std::string::npos) << got.err;
 }
 
-TEST_F(FlashTest, WhatIsNoImageIsRefused) {
-  write_file(folder / "image.hex",
-             "\x7f"
-             "ELF and so on");
-  const Outcome got =
-      run_bridge({"board", "flash", "--board", "uno", "--image", image(), "--dry-run"});
-  EXPECT_EQ(got.status, 2);
-  EXPECT_NE(got.err.find("not an Intel HEX file"), std::string::npos) << got.err;
+TEST_F(FlashTest, WhatIsNoWholeImageIsRefused) {
+  const std::string record = ":100000000C9434000C943E000C943E000C943E0082\n";
+  std::string wrong_digit = record;
+  wrong_digit[12] = 'G';
+  std::string wrong_sum = record;
+  wrong_sum[12] = '0';
+  for (const std::string& content : {std::string("\x7f", 1) + "ELF and so on", std::string(),
+                                     record, record.substr(0, 30) + "\n:00000001FF\n",
+                                     wrong_digit + ":00000001FF\n", wrong_sum + ":00000001FF\n"}) {
+    write_file(folder / "image.hex", content);
+    const Outcome got =
+        run_bridge({"board", "flash", "--board", "uno", "--image", image(), "--dry-run"});
+    EXPECT_EQ(got.status, 2) << content;
+    EXPECT_NE(got.err.find("not an Intel HEX file"), std::string::npos) << got.err;
+  }
 }
 
 }  // namespace
