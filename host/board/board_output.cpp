@@ -96,11 +96,13 @@ void BoardOutput::write_ripe(bool all) noexcept {
     Row row;
     rows_.pop(row);
     try {
+      SendStatus written = SendStatus::ok;
       if (!header_written_) {
-        status_ = std::max(status_, sink_->write(header()));
-        header_written_ = status_ == SendStatus::ok;
+        written = sink_->write(header());
+        header_written_ = written == SendStatus::ok;
       }
-      if (header_written_) status_ = std::max(status_, sink_->write(text(row)));
+      if (header_written_) written = sink_->write(text(row));
+      status_ = std::max(status_, written);
     } catch (const std::exception&) {
       status_ = std::max(status_, SendStatus::skipped);  // out of memory
     }
