@@ -203,7 +203,7 @@ class BoardSession {
   Status status_{};
   bool has_status_ = false;
   bool other_host_told_ = false;
-  bool configured_ = false;  ///< by this session, in the board's present life
+  bool configured_ = false;  ///< confirmed by the board since it last started
   bool ask_hello_ = false;   ///< while all else goes on: whether it has started anew
   TimePoint restarted_{};
   std::uint32_t boot_id_ = 0;

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/inotify.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -32,8 +33,7 @@ struct Outcome {
 class Bridge {
  public:
   /// `input` is the path of its standard input.
-  explicit Bridge(const std::vector<std::string>& arguments,
-                  const std::string& input = "/dev/null",
+  explicit Bridge(const std::vector<std::string>& arguments, const std::string& input = "/dev/null",
                   const std::string& program = TAGWRENCH_PROGRAM) {
     int out[2];
     int err[2];
@@ -140,6 +140,19 @@ class Bridge {
   UniqueFd err_;
   Outcome outcome_;
 };
+
+/// Waits until there is such a file, a minute at most.
+inline void wait_for_file(const std::filesystem::path& path) {
+  const UniqueFd watch(::inotify_init1(IN_CLOEXEC));
+  ::inotify_add_watch(watch.get(), path.parent_path().c_str(), IN_CREATE | IN_MOVED_TO);
+  while (!std::filesystem::exists(path)) {
+    constexpr int kPatience_ms = 60'000;
+    pollfd entry{watch.get(), POLLIN, 0};
+    if (::poll(&entry, 1, kPatience_ms) <= 0) throw std::runtime_error("no " + path.string());
+    alignas(inotify_event) char events[4096];
+    [[maybe_unused]] const ssize_t count = ::read(watch.get(), events, sizeof events);
+  }
+}
 
 inline Outcome run_bridge(const std::vector<std::string>& arguments) {
   return Bridge(arguments).finish();

@@ -56,7 +56,7 @@ class RunBoard : public ::testing::Test {
       : board({"--port", port(), "--cell", "0=0.5", "--cell", "1=1", "--cell", "2=none"},
               "/dev/null", TAGWRENCH_BOARD_PC) {
     ::setenv("XDG_CONFIG_HOME", folder.path().c_str(), 1);
-    while (!std::filesystem::exists(port())) ::usleep(1000);
+    wait_for_file(port());
     write_file(folder / "still.yaml", kStill);
   }
 
@@ -141,6 +141,30 @@ TEST_F(RunBoard, WritesEveryFrameBesideTheLoadCellsOfThatTime) {
     EXPECT_NEAR(std::stod(row.at("cell1_n")) / std::stod(row.at("cell0_n")), 2, 0.1);
   }
   EXPECT_GE(aligned, 35U) << "all but the last ones, whose cells had not spoken when it ended";
+}
+
+TEST_F(RunBoard, TheCameraLatencyPutsTheCellsAtTheTimeOfTheExposure) {
+  // Half a second back the cells have spoken about every frame, the last one too; without it, or
+  // the other way, the last rows are empty.
+  const std::string made = (folder / "made").string();
+  ASSERT_EQ(run_bridge({"sim", "--scenario", folder / "still.yaml", "--out", made, "--frames", "1"})
+                .status,
+            0);
+  std::ifstream in(made + "/sensor.yaml");
+  std::string sensor{std::istreambuf_iterator<char>(in), {}};
+  const std::size_t camera = sensor.find("width:");
+  ASSERT_NE(camera, std::string::npos);
+  sensor.insert(camera, "latency_ms: 500\n  ");
+  write_file(folder / "late.yaml", sensor);
+  const std::string file = (folder / "reference.csv").string();
+  const Outcome run =
+      run_bridge({"run", "--source", source(), "--sensor", folder / "late.yaml", "--board", port(),
+                  "--output", "reference:" + file, "--frames", "30"});
+  EXPECT_EQ(run.status, 0) << run.err;
+  const auto rows = rows_of(file);
+  ASSERT_EQ(rows.size(), 30U);
+  EXPECT_NE(rows.back().at("cell0_counts"), "");
+  EXPECT_NE(rows[25].at("cell1_counts"), "");
 }
 
 TEST_F(RunBoard, ABoardThatGoesAwayIsSaidAndTheFramesGoOn) {

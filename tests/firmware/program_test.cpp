@@ -301,9 +301,7 @@ struct BoardProgram : testing::TestWithParam<const char*> {
     EXPECT_NE(got.err.find(message), std::string::npos) << got.err;
     EXPECT_EQ(got.out, "");
   }
-  void wait_for_port() const {
-    while (!std::filesystem::exists(port)) ::usleep(1000);
-  }
+  void wait_for_port() const { wait_for_file(port); }
 };
 
 INSTANTIATE_TEST_SUITE_P(All, BoardProgram,
