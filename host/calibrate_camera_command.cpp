@@ -70,7 +70,7 @@ Record open_record(const CalibrateCameraOptions& options) {
   }
   if (record.known) {
     record.text = read_text(options.sensor);
-    record.sensor = load_sensor(options.sensor);
+    record.sensor = load_sensor(options.sensor, WrenchCalibration::ignore);
   } else {
     const std::string paper = paper_sensor_yaml();
     record.text =
@@ -196,7 +196,8 @@ class Guide {
 std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& options,
                                               const BoardSpec& board, const Record& record,
                                               const UniqueFd& stop) {
-  const Input input = open_input({options.sensor, options.source, false});
+  const Input input =
+      open_input({options.sensor, options.source, false, WrenchCalibration::ignore});
   FrameSource& source = *input.source;
   tell("source: " + source.format().description);
   tell(
@@ -322,6 +323,10 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   write_sensor(record.text, {camera_section(fit.camera, fit)}, record.target);
   report(fit, views, coverage, record);
   tell("written: " + record.target);
+  if (!record.sensor.calibration.empty())
+    tell(
+        "the calibration in newtons was made with the lens as it was described; run `tagwrench "
+        "calibrate wrench` again");
   return 0;
 }
 

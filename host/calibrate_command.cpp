@@ -25,7 +25,8 @@ CalibrateCommand::CalibrateCommand(CLI::App& app)
           "camera", "the lens, from a printed board shown to the camera (tagwrench tags --board)")),
       target_(verb_->add_subcommand("target",
                                     "where the tags sit, from the platform at rest and then "
-                                    "moved about")) {
+                                    "moved about")),
+      wrench_(verb_->add_subcommand("wrench", "newtons, from known loads; step by step")) {
   verb_->require_subcommand(1);
   auto* source = camera_->add_option("--source", camera_options_.source,
                                      "the camera: v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or "
@@ -64,9 +65,48 @@ CalibrateCommand::CalibrateCommand(CLI::App& app)
                    "use no more than S seconds; without it a folder is used up and anything else "
                    "for 30 s")
       ->check(duration());
+  declare_wrench();
+}
+
+void CalibrateCommand::declare_wrench() {
+  CalibrateWrenchOptions& o = wrench_options_;
+  auto* list = wrench_->add_flag("--list-plans", o.list_plans, "name the ready-made plans");
+  auto* show = wrench_->add_option("--show-plan", o.show_plan,
+                                   "print a plan, to be changed and given as a file");
+  wrench_->add_option("--sensor", o.sensor, "sensor.yaml of this sensor");
+  wrench_->add_option("--source", o.source,
+                      "sim | sim:SCENARIO.yaml, which loads itself, or "
+                      "v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]");
+  wrench_->add_option("--plan", o.plan, "a ready-made plan (--list-plans) or a plan file");
+  wrench_->add_option("--out", o.out, "file to write; without it calibration.json beside --sensor");
+  wrench_->add_option("--notes", o.notes, "temperature, place, who: goes into the record");
+  wrench_->add_option("--board", o.board, "serial port of the board with the load cell, or auto");
+  wrench_->add_option("--cells", o.cells,
+                      "its load cells' calibration; without it the one kept for this board");
+  wrench_->add_option("--optoforce", o.optoforce, "serial port of an OptoForce sensor");
+  wrench_
+      ->add_option("--counts-per-unit", o.counts_per_unit,
+                   "of that, from its data sheet: per N of Fx Fy Fz, per N m of Tx Ty Tz")
+      ->delimiter(',')
+      ->expected(6)
+      ->check(CLI::PositiveNumber);
+  wrench_->add_flag("--resume", o.resume, "go on with a calibration that was stopped");
+  wrench_->add_flag("--force", o.force, "begin anew, whatever is there");
+  wrench_->add_flag("--require-all", o.require_all,
+                    "refuse unless all six axes are measured, in place of completing them from the "
+                    "spring model");
+  wrench_->add_option("--seconds", o.seconds, "stop after S seconds of frames; --resume goes on")
+      ->check(duration());
+  wrench_->callback([this, list, show] {
+    if (list->count() > 0 || show->count() > 0) return;
+    for (const char* needed : {"--sensor", "--source", "--plan"}) {
+      if (wrench_->count(needed) == 0) throw CLI::RequiredError(needed);
+    }
+  });
 }
 
 int CalibrateCommand::run() const {
+  if (wrench_->parsed()) return calibrate_wrench(wrench_options_);
   return target_->parsed() ? calibrate_target(target_options_) : calibrate_camera(camera_options_);
 }
 

@@ -5,6 +5,7 @@
 
 #include "host/calibrate_camera_command.h"
 #include "host/calibrate_target_command.h"
+#include "host/calibrate_wrench_command.h"
 
 namespace tagwrench {
 
@@ -19,11 +20,15 @@ class CalibrateCommand {
   int run() const;
 
  private:
+  void declare_wrench();
+
   CLI::App* verb_;
   CLI::App* camera_;
   CLI::App* target_;
+  CLI::App* wrench_;
   CalibrateCameraOptions camera_options_;
   CalibrateTargetOptions target_options_;
+  CalibrateWrenchOptions wrench_options_;
 };
 
 }  // namespace tagwrench

@@ -16,6 +16,7 @@
 #include "host/input.h"
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
+#include "host/zero_command.h"
 
 namespace tagwrench {
 namespace {
@@ -142,16 +143,18 @@ std::vector<SectionEdit> placeholders() {
 
 /// Both files or neither: the picture belongs to the poses.
 void write(const fs::path& sensor, const std::string& text, const fs::path& appearance,
-           const TargetEstimate& estimate, const TargetDescription& target,
-           const RestImage& image) {
+           const TargetEstimate& estimate, const SensorConfig& described, const RestImage& image) {
   std::error_code error;
   std::optional<std::string> before;
   if (fs::exists(appearance, error)) before = read_text(appearance);
   save_rest_image(appearance, image);
   std::vector<SectionEdit> edits = {
-      target_section(estimate, target),
+      target_section(estimate, described.target),
       rest_section(estimate, image, appearance_name(sensor, appearance))};
   if (readout_is_clear(estimate)) edits.push_back(camera_section(estimate));
+  // What read at the old rest says nothing about the new one.
+  const std::vector<YamlEntry> no_zero = without_zero(described);
+  if (!no_zero.empty()) edits.push_back({"wrench", no_zero});
   try {
     write_sensor(text, edits, sensor);
   } catch (...) {
@@ -177,7 +180,7 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   const std::string text = read_text(options.sensor);
   check_replaceable(sensor_file);
   check_replaceable(appearance);
-  const Input input = open_input({options.sensor, options.source, true});
+  const Input input = open_input({options.sensor, options.source, true, WrenchCalibration::ignore});
   check_editable(text, placeholders(), options.sensor);
   check_size(input);
   const SensorConfig& sensor = input.sensor;
@@ -200,11 +203,15 @@ int calibrate_target(const CalibrateTargetOptions& options) {
       });
   if (signalled(stop)) return stopped();
   check_estimate(estimate, sensor.camera);
-  write(sensor_file, text, appearance, estimate, sensor.target, record.at_rest().image);
+  write(sensor_file, text, appearance, estimate, sensor, record.at_rest().image);
   for (const std::string& line : describe(record, estimate, sensor.target, sensor.camera))
     tell(line);
   if (readout_is_clear(estimate)) tell("the shutter rolls: camera.readout_ms is written too");
   tell(fmt::format("written: {} and {}", sensor_file.string(), appearance.string()));
+  if (!sensor.calibration.empty())
+    tell(
+        "the calibration in newtons was made with the target as it was; run `tagwrench calibrate "
+        "wrench` again");
   return 0;
 }
 

@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "host/config/sensor_config.h"
 #include "host/os/unique_fd.h"
+#include "host/record/records.h"
 #include "host/source/frame_source.h"
 
 namespace tagwrench {
@@ -24,13 +26,17 @@ struct InputOptions {
   std::string sensor;  ///< path of sensor.yaml; empty: what the source suggests
   std::string source;  ///< SRC
   bool fast = false;   ///< sources that are not live run as fast as they can, no frame dropped
+  WrenchCalibration calibration = WrenchCalibration::use;
 };
 
 /// A source and the sensor that it shows.
 struct Input {
   SensorConfig sensor;
   std::unique_ptr<FrameSource> source;
-  bool camera = false;  ///< a real one, that sees what an LED lights
+  bool camera = false;      ///< a real one, that sees what an LED lights
+  std::string sensor_name;  ///< path of the sensor.yaml that was loaded, or what stands for it
+  std::string sensor_text;  ///< of a sensor that has no file
+  std::optional<record::Head> recorded;  ///< of a recording, whose sensor is its own
 };
 
 /// Throws ConfigError if the source is none, cannot be opened, or the sensor cannot be used.

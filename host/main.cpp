@@ -9,16 +9,23 @@
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 
+#include "host/analyze_command.h"
 #include "host/bandwidth/command.h"
 #include "host/board/command.h"
 #include "host/calibrate_command.h"
+#include "host/certificate_command.h"
+#include "host/check_command.h"
 #include "host/config/scenario_config.h"
 #include "host/config_error.h"
+#include "host/design_command.h"
 #include "host/doctor.h"
+#include "host/export_command.h"
+#include "host/record_command.h"
 #include "host/run_command.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/tags_command.h"
 #include "host/tell.h"
+#include "host/zero_command.h"
 
 namespace {
 
@@ -31,6 +38,7 @@ constexpr const char* kSources =
     "  sim | sim:SCENARIO.yaml       the simulated sensor\n"
     "  v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]\n"
     "  images:DIR                    PNG, PGM or JPEG in name order, times from DIR/frames.csv\n"
+    "  recording:FILE                what `tagwrench record` made\n"
     "Without it: a camera that sees the tags, else sim";
 constexpr const char* kOutputs =
     "where samples go (repeat it for more than one):\n"
@@ -88,6 +96,8 @@ int dispatch(int argc, char** argv) {
   run->add_option("--seconds", run_options.seconds, "end after S seconds")->check(duration);
   run->add_flag("--fast", run_options.fast,
                 "sources that are not live run as fast as they can, no frame dropped");
+  run->add_flag("--no-zero-tracking", run_options.no_zero_tracking,
+                "the zero does not follow what reads while nobody touches the sensor");
   run->add_option("--board", run_options.board,
                   "serial port of the board that lights the tags and reads load cells:\n"
                   "a path, usb:VENDOR:PRODUCT[:SERIAL], or auto for the only one");
@@ -105,11 +115,18 @@ int dispatch(int argc, char** argv) {
       ->required()
       ->check(CLI::Range(1, 10'000'000));
 
+  tagwrench::RecordCommand record(app, kSources, kOutputs, duration);
+  tagwrench::ExportCommand exporting(app);
   tagwrench::CalibrateCommand calibrate(app);
   tagwrench::TagsCommand tags(app);
   tagwrench::BoardCommand board(app);
 
+  tagwrench::AnalyzeCommand analyze(app);
   tagwrench::BandwidthCommand bandwidth(app);
+  tagwrench::CheckCommand check(app);
+  tagwrench::ZeroCommand zero(app);
+  tagwrench::CertificateCommand certificate(app);
+  tagwrench::DesignCommand design(app);
 
   CLI::App* doctor = app.add_subcommand(
       "doctor", "say line by line what works here and what to do about the rest");
@@ -123,10 +140,17 @@ int dispatch(int argc, char** argv) {
     return kUnusable;
   }
   if (run->parsed()) return tagwrench::run(run_options);
+  if (record.parsed()) return record.run();
+  if (exporting.parsed()) return exporting.run();
   if (calibrate.parsed()) return calibrate.run();
   if (tags.parsed()) return tags.run();
   if (board.parsed()) return board.run();
+  if (analyze.parsed()) return analyze.run();
   if (bandwidth.parsed()) return bandwidth.run();
+  if (check.parsed()) return check.run();
+  if (zero.parsed()) return zero.run();
+  if (certificate.parsed()) return certificate.run();
+  if (design.parsed()) return design.run();
   if (doctor->parsed()) return tagwrench::run_doctor(std::cout);
   if (sim->parsed()) {
     const tagwrench::sim::Scenario described =

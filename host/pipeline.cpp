@@ -24,9 +24,9 @@ constexpr std::size_t kMostOutputs = 14;
 
 }  // namespace
 
-Pipeline::Pipeline(FrameSource& source, Tracker& tracker, const WrenchEstimator& wrench,
+Pipeline::Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench,
                    const Shaping& shaping, std::vector<std::unique_ptr<Output>>& outputs,
-                   DeadMan& dead_man, int stop_fd)
+                   DeadMan& dead_man, int stop_fd, FrameLog* log)
     : source_(source),
       tracker_(tracker),
       wrench_(wrench),
@@ -34,11 +34,13 @@ Pipeline::Pipeline(FrameSource& source, Tracker& tracker, const WrenchEstimator&
       outputs_(outputs),
       dead_man_(dead_man),
       stop_fd_(stop_fd),
+      log_(log),
       intervals_{source.format().period, source.format().period, source.format().period},
       interval_(source.format().period) {}
 
 /// The life of a frame.
 void Pipeline::step(Frame& frame) noexcept {
+  const Region decoded = frame.readable();
   Track track = tracker_.track(frame);  // pixels -> displacement of the platform
   if (track.needs_whole_frame && source_.complete(frame)) track = tracker_.track(frame);
   source_.want(track.wanted);
@@ -47,8 +49,11 @@ void Pipeline::step(Frame& frame) noexcept {
                 .latency_origin = frame.latency_origin,
                 .dropped = frame.dropped};
   wrench_.estimate(track, sample);  // displacement -> newtons
-  shaping_.shape(sample);           // newtons -> motion of an input device
-  send(sample);                     // to every output
+  sample.touched = frame.touched || touched();
+  if (zero_ != nullptr) zero_->follow(sample, wrench_.noise(track));  // less what reads untouched
+  shaping_.shape(sample);                // newtons -> motion of an input device
+  send(sample, frame.recorded_latency);  // to every output
+  if (log_ != nullptr) log_->frame({frame, decoded, source_.raw(), track, sample});
   ++report_.frames;
   report_.dropped += sample.dropped;
   if (carries_numbers(sample.status)) ++report_.with_numbers;
@@ -62,7 +67,7 @@ RunReport Pipeline::run(const RunLimits& limits) {
     if (limits.time && std::chrono::steady_clock::now() - start_ >= *limits.time) break;
     wait(wake_time(limits));
     const bool came = source_ready_ && read_source();
-    if (!came && std::chrono::steady_clock::now() >= missing_at()) send_neutral();
+    if (!came && std::chrono::steady_clock::now() >= missing_at()) send_neutral({});
   }
   dead_man_.stand_down();
   report_.end = end_.value_or(RunReport::End::limit);
@@ -119,12 +124,17 @@ bool Pipeline::read_source() noexcept {
       return true;
     case ReadStatus::nothing:
       return false;
+    case ReadStatus::missing:
+      send_neutral(frame.recorded_latency);
+      return false;
     case ReadStatus::disconnected:
-      send_neutral();
+      send_neutral({});
       say(source_.detail());
+      if (log_ != nullptr) log_->disconnected(source_.detail());
       return false;
     case ReadStatus::reconnected:
       say(source_.detail());
+      if (log_ != nullptr) log_->reconnected(source_.detail());
       return false;
     case ReadStatus::end:
       end_ = RunReport::End::source_ended;
@@ -144,7 +154,9 @@ void Pipeline::note_arrival(TimePoint now) noexcept {
   interval_ = std::clamp(sorted[1], period, std::max(period, kSlowestInterval));
 }
 
-void Pipeline::send(const Sample& sample) noexcept {
+void Pipeline::send(Sample& sample, std::optional<Duration> recorded_latency) noexcept {
+  sample.output_time = recorded_latency ? sample.latency_origin + *recorded_latency
+                                        : std::chrono::steady_clock::now();
   if (carries_numbers(sample.status)) guard();
   for (const std::unique_ptr<Output>& output : outputs_) {
     const SendStatus status = output->send(sample);
@@ -159,16 +171,23 @@ void Pipeline::send(const Sample& sample) noexcept {
   if (neutral_) dead_man_.stand_down();
 }
 
+bool Pipeline::touched() const noexcept {
+  return std::any_of(outputs_.begin(), outputs_.end(),
+                     [](const std::unique_ptr<Output>& output) { return output->touched(); });
+}
+
 /// If the loop should hang from here on, the guardian sends neutral.
 void Pipeline::guard() noexcept { dead_man_.expect_by(last_arrival_ + interval_ + kGuardianGrace); }
 
 /// The frame that should have come did not: one sample that says so, with zeros.
-void Pipeline::send_neutral() noexcept {
+void Pipeline::send_neutral(std::optional<Duration> recorded_latency) noexcept {
   if (neutral_) return;
-  send({.sequence = last_sample_.sequence,
-        .capture_time = last_sample_.capture_time,
-        .latency_origin = last_sample_.latency_origin,
-        .status = Status::lost});
+  Sample sample{.sequence = last_sample_.sequence,
+                .capture_time = last_sample_.capture_time,
+                .latency_origin = last_sample_.latency_origin,
+                .status = Status::lost};
+  send(sample, recorded_latency);
+  if (log_ != nullptr) log_->missing(sample);
 }
 
 /// What was wrong is not, once the target is held.

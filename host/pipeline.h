@@ -10,12 +10,14 @@
 #include <string_view>
 #include <vector>
 
+#include "host/frame_log.h"
 #include "host/output/dead_man.h"
 #include "host/output/output.h"
 #include "host/source/frame_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
 #include "host/wrench/shaping.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 
@@ -39,10 +41,13 @@ struct RunReport {
 class Pipeline {
  public:
   /// Borrows everything; `stop_fd` becomes readable when the run shall end (a signalfd), -1 for
-  /// never.
-  Pipeline(FrameSource& source, Tracker& tracker, const WrenchEstimator& wrench,
-           const Shaping& shaping, std::vector<std::unique_ptr<Output>>& outputs, DeadMan& dead_man,
-           int stop_fd);
+  /// never. `log` is told of every frame; there may be none.
+  Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, const Shaping& shaping,
+           std::vector<std::unique_ptr<Output>>& outputs, DeadMan& dead_man, int stop_fd,
+           FrameLog* log = nullptr);
+
+  /// Takes the zero off every sample; without it the wrench stays as it is estimated. Borrowed.
+  void follow_zero(ZeroTracking& zero) noexcept { zero_ = &zero; }
 
   /// Runs until a limit, the source's end, a stop or a failed output. Does not throw on account of
   /// the outside world.
@@ -50,8 +55,9 @@ class Pipeline {
 
  private:
   void step(Frame& frame) noexcept;
-  void send(const Sample& sample) noexcept;
-  void send_neutral() noexcept;
+  void send(Sample& sample, std::optional<Duration> recorded_latency) noexcept;
+  void send_neutral(std::optional<Duration> recorded_latency) noexcept;
+  bool touched() const noexcept;
   void guard() noexcept;
   bool read_source() noexcept;
   void note_arrival(TimePoint now) noexcept;
@@ -63,11 +69,13 @@ class Pipeline {
 
   FrameSource& source_;
   Tracker& tracker_;
-  const WrenchEstimator& wrench_;
+  WrenchEstimator& wrench_;
   const Shaping& shaping_;
   std::vector<std::unique_ptr<Output>>& outputs_;
   DeadMan& dead_man_;
   int stop_fd_;
+  FrameLog* log_;
+  ZeroTracking* zero_ = nullptr;
 
   TimePoint start_{};
   TimePoint last_arrival_{};

@@ -22,6 +22,7 @@
 #include "host/output/terminal.h"
 #include "host/output/wrench_hid.h"
 #include "host/pipeline.h"
+#include "host/source/region_source.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/tell.h"
 
@@ -180,7 +181,8 @@ void check_board(const RunOptions& options) {
   }
   if (options.fast)
     throw ConfigError("--fast: a board has its own time; leave it out, or leave out --board");
-  if (split_spec(options.source).kind == "images") {
+  const std::string kind = split_spec(options.source).kind;
+  if (kind == "images" || kind == "recording") {
     throw ConfigError(fmt::format(
         "--source {}: these pictures are of another time than what the board says now; leave out "
         "--board",
@@ -201,7 +203,7 @@ std::vector<Spec> output_specs(const RunOptions& options) {
 Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* board) {
   Outputs outputs;
   if (options.outputs.empty()) {
-    add_default_outputs(outputs, input);
+    if (!options.record) add_default_outputs(outputs, input);
     if (board != nullptr) outputs.all.push_back(board->output(input.sensor, {}));
     return outputs;
   }
@@ -227,6 +229,56 @@ Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* bo
         board->output(input.sensor, reference == specs.end() ? "" : reference->argument));
   }
   return outputs;
+}
+
+/// What reads as nothing, as samples have it, and whether it may follow.
+ZeroOptions zero_options(const SensorConfig& sensor, const Matrix6& tool, bool may_follow) {
+  ZeroOptions options;
+  options.follow = may_follow && sensor.zero.follow;
+  options.range = range_through(tool, sensor.wrench.range);
+  options.set = tool * sensor.zero.set;
+  options.band = sensor.zero.band;
+  options.rate = sensor.zero.rate;
+  return options;
+}
+
+/// Says how far the zero went, if it is far enough to be seen.
+void say_zero(const ZeroTracking& zero, const Vector6& range, double band) {
+  constexpr double kSeen = 5e-4;  // of the range
+  const Vector6& moved = zero.moved();
+  double most = 0;
+  for (int i = 0; i < 6; ++i) {
+    if (range[i] > 0 && range[i] < kUnknownRange)
+      most = std::max(most, std::abs(moved[i]) / range[i]);
+  }
+  if (most < kSeen) return;
+  tell(fmt::format(
+      "the zero followed what read while nobody touched: by {:.3g} {:.3g} {:.3g} N, {:.3g} {:.3g} "
+      "{:.3g} mN m, {:.2g} % of the range{}",
+      moved[0], moved[1], moved[2], moved[3] * 1e3, moved[4] * 1e3, moved[5] * 1e3, 100 * most,
+      most > 0.9 * band ? ", about as far as it may: run `tagwrench zero`" : ""));
+}
+
+/// What is recorded of the run, told to all who have something to say. The guardian of the outputs
+/// has been forked already: the recording has a thread.
+Recording& start_recording(const RunOptions& options, const record::Head& head, const Input& input,
+                           const RunLimits& limits, RunBoard* board, Outputs& outputs) {
+  const bool lossless = options.fast && input.source->poll_fd() < 0;
+  auto recording =
+      std::make_unique<Recording>(*options.record, head, lossless, limits.frames, limits.time);
+  Recording& started = *recording;
+  outputs.all.push_back(std::move(recording));
+  if (board != nullptr) board->record_to(started.writer());
+  return started;
+}
+
+/// Ends it, and says so. False: something went wrong.
+bool end_recording(std::unique_ptr<Output> output) {
+  auto& recording = static_cast<Recording&>(*output);
+  const std::string trouble = recording.finish();
+  tell(recording.summary());
+  if (!trouble.empty()) tell(trouble);
+  return trouble.empty();
 }
 
 std::string summary(const RunReport& report, const SensorConfig& sensor) {
@@ -258,6 +310,7 @@ std::string summary(const RunReport& report, const SensorConfig& sensor) {
 int run(const RunOptions& options) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
   output_specs(options);          // refused before anything is opened or lit
+  if (options.record) check_recording(*options.record);
   std::unique_ptr<RunBoard> board;
   if (!options.board.empty()) {
     BoardOptions board_options;
@@ -272,10 +325,19 @@ int run(const RunOptions& options) {
   const UniqueFd stop = signals_as_fd();
   check_size(input);
   check_appearance(input);
+  record::Head head;
+  if (options.record) {
+    head = recording_head(input, options.record->keep);
+    if (head.keep == record::Keep::region)
+      input.source = std::make_unique<RegionSource>(std::move(input.source));
+  }
   if (board && !board->settle_light(input, stop)) return 0;
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
-  const WrenchEstimator wrench(input.sensor.wrench);
+  WrenchEstimator wrench(input.sensor.wrench);
   const Shaping shaping(input.sensor.shaping);
+  const ZeroOptions zero_limits =
+      zero_options(input.sensor, wrench.tool(), !options.no_zero_tracking);
+  ZeroTracking zero(zero_limits);
   Outputs outputs = open_outputs(options, input, board.get());
   tell("source: " + input.source->format().description);
 
@@ -287,17 +349,29 @@ int run(const RunOptions& options) {
   RunReport report;
   {
     DeadMan dead_man(outputs.devices);
-    report = Pipeline(*input.source, tracker, wrench, shaping, outputs.all, dead_man, stop.get())
-                 .run(limits);
+    Recording* recording = nullptr;
+    if (options.record)
+      recording = &start_recording(options, head, input, limits, board.get(), outputs);
+    Pipeline pipeline(*input.source, tracker, wrench, shaping, outputs.all, dead_man, stop.get(),
+                      recording);
+    pipeline.follow_zero(zero);
+    report = pipeline.run(limits);
+  }
+  std::unique_ptr<Output> recording;
+  if (options.record) {
+    recording = std::move(outputs.all.back());
+    outputs.all.pop_back();
   }
   outputs.all.clear();  // neutral, then gone, before anything else is said
+  const bool recorded = recording == nullptr || end_recording(std::move(recording));
   if (report.end == RunReport::End::output_failed) {
-    tell(report.failure);
+    if (recorded) tell(report.failure);
     return 1;
   }
   tell(summary(report, input.sensor));
+  say_zero(zero, zero_limits.range, zero_limits.band);
   if (const std::string unusable = input.source->unusable(); !unusable.empty()) tell(unusable);
-  return 0;
+  return recorded ? 0 : 1;
 }
 
 }  // namespace tagwrench

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "host/recording.h"
+
 namespace tagwrench {
 
 struct RunOptions {
@@ -16,7 +18,9 @@ struct RunOptions {
   std::optional<long> frames;
   std::optional<double> seconds;
   bool fast = false;
-  std::string board;  ///< its port; empty: there is none
+  std::string board;                    ///< its port; empty: there is none
+  bool no_zero_tracking = false;        ///< the zero stays what sensor.yaml says
+  std::optional<RecordOptions> record;  ///< what is to be kept of the run
   std::string cells;  ///< calibration file of its load cells; empty: by the board's id
 };
 

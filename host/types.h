@@ -18,6 +18,8 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -79,9 +81,28 @@ struct Frame {
                          ///< capture_time for live sources, the hand-over time for replayed ones
   std::uint64_t sequence = 0;  ///< counts the frames that the source captured, lost ones included
   std::uint32_t dropped = 0;   ///< frames lost since the previous Frame
+  std::optional<Duration> recorded_latency;  ///< of a replayed frame: latency_origin to the output
+                                             ///< call, when it was recorded
+  bool touched = false;  ///< of a replayed frame: somebody pressed a button of the board
 
   /// `decoded`, spelt out when it is all.
   constexpr Region readable() const { return decoded.clipped(image.width, image.height); }
+};
+
+/// Four characters as V4L2 packs them: 'G' of "GREY" is the lowest byte.
+constexpr std::uint32_t fourcc(const char (&name)[5]) {
+  std::uint32_t code = 0;
+  for (int i = 4; i-- > 0;) code = code << 8 | static_cast<std::uint8_t>(name[i]);
+  return code;
+}
+
+/// What a source had before it was decoded: a camera's buffer or a file's bytes. Valid as long as
+/// its Frame.
+struct RawFrame {
+  /// GREY, NV12, YUYV, UYVY, MJPG (and any JPEG file), "PNG " and "PGM " for such files
+  std::uint32_t fourcc = 0;
+  std::span<const std::uint8_t> bytes;  ///< empty: the source keeps none
+  int stride = 0;                       ///< bytes between rows, 0 where the format itself tells
 };
 
 enum class Status : std::uint8_t {
@@ -166,6 +187,13 @@ struct HintDetails {
   bool rest_given = false;           ///< by the sensor's description, not learned
 };
 
+/// Where a tag lies in the image, by the fitted pose and not by what single corners look like.
+struct TagCorners {
+  int id = 0;
+  std::array<double, 8> px{};  ///< x, y of its corners as printed: top left, top right, bottom
+                               ///< right, bottom left; in the camera's raw image, mirrored or not
+};
+
 /// The platform's displacement from rest, as the tracker sees it. Numbers are zero unless status is
 /// ok.
 struct Track {
@@ -176,10 +204,25 @@ struct Track {
                                            ///< exp(r) R_rest (rad), both along camera axes
   Matrix6 covariance = Matrix6::Zero();    ///< of displacement, m^2, m rad, rad^2
   double residual_px = 0;                  ///< RMS of the fit
-  std::uint8_t tags_held = 0;              ///< number of tags that carried the fit
-  Region wanted;                   ///< what the next frame must show to be tracked; empty: all
+  /// What the fit to the picture at rest leaves: RMS, over the contrast between black and white;
+  /// and how much wider the image of an edge is than there, as growth of its variance, px^2. Both
+  /// are zero where there is no such picture, and known even if status is doubtful.
+  double residual_part = 0;
+  double blur_px2 = 0;
+  std::uint8_t tags_held = 0;           ///< number of tags that carried the fit
+  std::array<TagCorners, 8> corners{};  ///< of the target's tags, while it is held
+  std::uint8_t corner_count = 0;        ///< tags in `corners`; 0 while it is not
+  Region wanted;                        ///< what the next frame must show to be tracked; empty: all
   bool needs_whole_frame = false;  ///< Frame::decoded was too small to tell: ask again with the
                                    ///< completed frame. If there is none, the rest stands
+};
+
+/// Whether the zero follows what reads while nobody touches the sensor.
+enum class ZeroState : std::uint8_t {
+  off,
+  touched,    ///< somebody holds it, or it moves: the zero stays
+  far,        ///< it stands still, but too far from zero to be taken for it
+  following,  ///< it stands still, and nobody holds it
 };
 
 /// One line of output: all that the instrument knows about one frame.
@@ -193,9 +236,15 @@ struct Sample {
   Vector6 wrench = Vector6::Zero();        ///< N, N m: what the user applies TO the platform, about
                                            ///< wrench_origin, along wrench_frame
   Vector6 wrench_sigma = Vector6::Zero();  ///< one standard deviation, N, N m
+  Vector6 zero = Vector6::Zero();  ///< N, N m: what `tagwrench zero` and the following of zero have
+                                   ///< taken off the wrench
+  ZeroState zero_state = ZeroState::off;
+  bool touched = false;              ///< somebody presses a button of the board
   Vector6 motion = Vector6::Zero();  ///< -1..1 per axis in the HID frame, dead zone and full scale
                                      ///< applied; exactly zero at rest
   std::uint32_t dropped = 0;
+  TimePoint output_time{};  ///< when it was handed to the outputs, on latency_origin's clock; the
+                            ///< same for all of them
 };
 
 }  // namespace tagwrench

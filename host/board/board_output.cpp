@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -45,10 +46,10 @@ BoardOutput::BoardOutput(link::BoardLink& link, const link::CellCalibrations& ce
 BoardOutput::~BoardOutput() { write_ripe(/*all=*/true); }
 
 SendStatus BoardOutput::send(const Sample& sample) noexcept {
-  if (!sink_) return SendStatus::ok;
+  if (!sink_ && !comparison_) return SendStatus::ok;
   const TimePoint now = std::chrono::steady_clock::now();
   const bool room = rows_.size() < kMostRows;
-  if (room) rows_.push({sample, latency_us(sample, now), now});
+  if (room) rows_.push({sample, now});
   write_ripe(/*all=*/false);
   const SendStatus status = std::exchange(status_, SendStatus::ok);
   if (status == SendStatus::failed) status_ = status;  // for good
@@ -63,7 +64,9 @@ std::string_view BoardOutput::service() noexcept {
   write_ripe(/*all=*/false);
   said_.clear();
   try {
+    said_.swap(found_);
     for (link::News news; link_.next(news);) {
+      if (record_) record_->news(news);
       if (!said_.empty()) said_ += "; ";
       said_ += link::text(news);
     }
@@ -75,9 +78,15 @@ std::string_view BoardOutput::service() noexcept {
 
 void BoardOutput::take_readings() noexcept {
   link::BoardSession& session = link_.session();
+  if (record_) record_->state(session);
   for (link::CellReading r; session.next(r);) {
+    if (record_) record_->cell(r);
     if (r.channel < counts_.size() && !r.saturated)
       counts_[r.channel].add(r.time.time, r.time.sigma, r.counts, 0, r.lost_before > 0);
+  }
+  for (link::ButtonReading r; session.next(r);) {
+    if (record_) record_->button(r);
+    buttons_down_[r.button] = r.pressed;
   }
 }
 
@@ -90,11 +99,12 @@ bool BoardOutput::ripe(const Row& row, TimePoint now) const noexcept {
 }
 
 void BoardOutput::write_ripe(bool all) noexcept {
-  if (!sink_) return;
   const TimePoint now = std::chrono::steady_clock::now();
   while (!rows_.empty() && (all || ripe(rows_[0], now))) {
     Row row;
     rows_.pop(row);
+    compare(row);
+    if (!sink_) continue;
     try {
       SendStatus written = SendStatus::ok;
       if (!header_written_) {
@@ -109,8 +119,40 @@ void BoardOutput::write_ripe(bool all) noexcept {
   }
 }
 
+void BoardOutput::compare(const Row& row) noexcept {
+  if (!comparison_ || row.sample.status != Status::ok) return;
+  const ReferenceLine& line = comparison_->line;
+  const auto channel = static_cast<std::size_t>(line.channel);
+  const link::Aligned counts = counts_[channel].at(row.sample.capture_time - latency_);
+  if (counts.status != link::AlignStatus::ok || !cells_[channel].calibrated) return;
+  // Where the point has gone with the platform; a turn of some hundredths is small.
+  const Vector6& d = row.sample.displacement;
+  const Eigen::Vector3d turn = d.tail<3>();
+  const Eigen::Vector3d point = line.point + d.head<3>() + turn.cross(line.point);
+  Vector6 unit;
+  unit << line.direction, point.cross(line.direction);
+  const ReferenceFault fault =
+      monitor_.add(row.sample.capture_time, row.sample.wrench, comparison_->tool * unit,
+                   comparison_->range, newtons(cells_[channel], counts).value);
+  if (fault == ReferenceFault::none) return;
+  try {
+    found_ = fault == ReferenceFault::scale
+                 ? fmt::format(
+                       "against load cell {} the sensor measures {:.3f} +/- {:.3f} of the "
+                       "force: look at the cell's line of action (wrench.reference), then "
+                       "`tagwrench check` and `tagwrench calibrate wrench`",
+                       line.channel, monitor_.scale(), monitor_.scale_sigma())
+                 : fmt::format(
+                       "against load cell {} the zero is off by {:.4f} +/- {:.4f} N along "
+                       "its line: hands off, `tagwrench board tare` and `tagwrench zero`",
+                       line.channel, monitor_.zero(), monitor_.zero_sigma());
+  } catch (const std::exception&) {
+    found_.clear();  // out of memory: unsaid
+  }
+}
+
 std::string_view BoardOutput::text(const Row& row) noexcept {
-  const std::string_view sample = csv_line(sample_line_, row.sample, row.latency_us);
+  const std::string_view sample = csv_line(sample_line_, row.sample);
   char* out = std::copy(sample.begin(), sample.end() - 1, line_.data());
   const char* end = line_.data() + line_.size() - 1;
   for (std::size_t i = 0; i < counts_.size(); ++i) {

@@ -3,9 +3,13 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <optional>
 #include <string>
 
+#include "host/board/board_record.h"
+#include "host/check/reference_line.h"
+#include "host/check/reference_monitor.h"
 #include "host/link/board_link.h"
 #include "host/link/cell_calibration.h"
 #include "host/link/ring.h"
@@ -15,6 +19,13 @@
 #include "host/output/text_sink.h"
 
 namespace tagwrench {
+
+/// A load cell that is there for good, and what the samples' frame makes of its line.
+struct ReferenceComparison {
+  ReferenceLine line;
+  Matrix6 tool = Matrix6::Identity();  ///< wrench at the platform -> as samples have it
+  Vector6 range = Vector6::Zero();     ///< as samples have it, N and N m; 0: not known
+};
 
 class BoardOutput final : public Output {
  public:
@@ -27,16 +38,22 @@ class BoardOutput final : public Output {
               double camera_latency, const std::string& path);
   ~BoardOutput() override;
 
+  /// Compares every sample with this cell from now on, and says once what is wrong of each kind.
+  void compare(const ReferenceComparison& comparison) { comparison_ = comparison; }
+
   /// A row waits until the cells have spoken about its time, half a second at most.
   SendStatus send(const Sample& sample) noexcept override;
   std::string failure() const override;
   int poll_fd() const noexcept override { return link_.poll_fd(); }
   std::string_view service() noexcept override;
+  bool touched() const noexcept override { return buttons_down_.any(); }
+
+  /// From now on all that the board says is recorded as well. Borrowed.
+  void record_to(record::RecordingWriter& writer) { record_.emplace(writer, cells_); }
 
  private:
   struct Row {
     Sample sample;
-    std::int64_t latency_us = 0;
     TimePoint sent{};
   };
   using Line = std::array<char, 2048>;
@@ -46,16 +63,22 @@ class BoardOutput final : public Output {
   bool ripe(const Row& row, TimePoint now) const noexcept;
   void write_ripe(bool all) noexcept;
   std::string_view text(const Row& row) noexcept;
+  void compare(const Row& row) noexcept;
 
   link::BoardLink& link_;
   link::CellCalibrations cells_;
   Duration latency_;
   std::array<link::SampleHistory, link::kMostChannels> counts_;
+  std::bitset<256> buttons_down_;  ///< by their number, one byte of the protocol
+  std::optional<ReferenceComparison> comparison_;
+  ReferenceMonitor monitor_{{}};
+  std::string found_;  ///< by it, and not said yet
   std::optional<TextSink> sink_;
   link::Ring<Row, kMostRows> rows_;
   LineBuffer sample_line_{};
   Line line_{};
   bool header_written_ = false;
+  std::optional<BoardRecord> record_;
   SendStatus status_ = SendStatus::ok;
   std::string said_;
 };

@@ -9,6 +9,7 @@
 #include "host/light/settle.h"
 #include "host/link/cell_file.h"
 #include "host/tell.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 namespace {
@@ -77,7 +78,29 @@ std::unique_ptr<Output> RunBoard::output(const SensorConfig& sensor, const std::
         "the load cells are not calibrated: the reference has counts alone; `tagwrench board "
         "calibrate-cell` makes newtons of them");
   }
-  return std::make_unique<BoardOutput>(loop_.link(), cells_, rate_, sensor.camera_latency, path);
+  auto output =
+      std::make_unique<BoardOutput>(loop_.link(), cells_, rate_, sensor.camera_latency, path);
+  output_ = output.get();
+  if (sensor.reference) compare(*output, sensor);
+  return output;
+}
+
+void RunBoard::compare(BoardOutput& output, const SensorConfig& sensor) const {
+  const ReferenceLine& line = *sensor.reference;
+  if (!cells_[static_cast<std::size_t>(line.channel)].calibrated) {
+    tell(fmt::format(
+        "wrench.reference: load cell {} is not calibrated, so nothing is compared with it; run "
+        "`tagwrench board calibrate-cell`",
+        line.channel));
+    return;
+  }
+  const WrenchEstimator wrench(sensor.wrench);
+  output.compare({line, wrench.tool(), range_through(wrench.tool(), sensor.wrench.range)});
+  tell(fmt::format("every sample is compared with load cell {}", line.channel));
+}
+
+void RunBoard::record_to(record::RecordingWriter& writer) {
+  if (output_ != nullptr) output_->record_to(writer);
 }
 
 }  // namespace tagwrench

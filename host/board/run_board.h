@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "host/board/board_output.h"
 #include "host/board/loop.h"
 #include "host/input.h"
 #include "host/output/output.h"
@@ -30,11 +31,17 @@ class RunBoard {
   /// Serves the link from the run's loop; see BoardOutput. Must not outlive this.
   std::unique_ptr<Output> output(const SensorConfig& sensor, const std::string& path);
 
+  /// What the board says goes there too, as long as that output is there. Borrowed.
+  void record_to(record::RecordingWriter& writer);
+
  private:
+  void compare(BoardOutput& output, const SensorConfig& sensor) const;
+
   double rate_;  ///< conversions/s
   BoardLoop loop_;
   link::CellCalibrations cells_{};
   bool connected_ = false;
+  BoardOutput* output_ = nullptr;
 };
 
 }  // namespace tagwrench

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "host/config/bench_config.h"
 #include "host/config/disturbance_config.h"
 #include "host/config/yaml_section.h"
 #include "host/config_error.h"
@@ -28,6 +29,10 @@ void read_mechanics(YamlSection s, sim::Mechanics& m) {
   s.number("bending_nm_per_rad", m.bending_stiffness);
   s.number("torsion_nm_per_rad", m.torsion_stiffness);
   s.numbers("range", m.range);
+  s.number("creep_share", m.creep_share);
+  s.number("creep_s", m.creep_time);
+  s.number("friction", m.friction);
+  s.number("friction_travel", m.friction_travel);
   s.finish();
 }
 
@@ -175,6 +180,7 @@ sim::Scenario read_scenario(YamlReader root) {
   if (root.has("disturbances")) {
     read_disturbances(root.child("disturbances"), scenario.disturbances);
   }
+  if (root.has("bench")) read_bench(root.child("bench"), scenario.bench);
   root.finish();
   return scenario;
 }

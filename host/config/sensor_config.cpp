@@ -240,22 +240,63 @@ Vector6 force_and_torque(YamlReader& node, const std::string& force_key,
   return value;
 }
 
-WrenchModel read_wrench(YamlReader node, const SensorConfig& sensor) {
+ZeroConfig read_zero(YamlReader& node) {
+  constexpr double kPercent = 0.01;
+  ZeroConfig zero;
+  if (node.has("zero_n") != node.has("zero_nm")) {
+    node.fail(node.has("zero_n") ? "zero_n" : "zero_nm",
+              "zero_n and zero_nm belong together; give both or neither, or run `tagwrench zero`");
+  }
+  zero.set << vector3(node.numbers_or("zero_n", {0, 0, 0})),
+      vector3(node.numbers_or("zero_nm", {0, 0, 0}));
+  zero.date = node.text_or("zero_date", "");
+  if (!zero.date.empty() && !is_date(zero.date))
+    node.fail("zero_date", fmt::format("'{}' is not YYYY-MM-DD", zero.date));
+  zero.follow = node.boolean_or("zero_tracking", zero.follow);
+  if (node.has("zero_band_percent")) zero.band = node.within("zero_band_percent", 0, 10) * kPercent;
+  if (node.has("zero_rate_percent_per_s"))
+    zero.rate = node.within("zero_rate_percent_per_s", 0, 1) * kPercent;
+  return zero;
+}
+
+ReferenceLine read_reference(YamlReader node) {
+  ReferenceLine line;
+  line.channel = node.integer("channel", 0, 3);
+  line.point = vector3(node.numbers("point_mm", 3)) * kMm;
+  line.direction = vector3(node.numbers("direction", 3));
+  const double length = line.direction.norm();
+  if (!(length > 1e-6))
+    node.fail("direction", "has no length; give the direction of the force on the platform");
+  line.direction /= length;
+  node.finish();
+  return line;
+}
+
+/// Fills the wrench's part of `sensor`. A calibration wins over springs, which then complete the
+/// next one.
+WrenchModel read_wrench(YamlReader node, SensorConfig& sensor, WrenchCalibration use) {
   WrenchModel model;
   const bool calibrated = node.has("calibration");
-  if (node.has("springs") == calibrated) {
-    node.fail(
-        calibrated ? "springs" : "calibration",
-        "give either calibration: FILE or springs: {...}, so that displacement becomes newtons");
+  if (!calibrated && !node.has("springs")) {
+    node.fail("calibration",
+              "give either calibration: FILE or springs: {...}, so that displacement becomes "
+              "newtons");
+  }
+  if (node.has("springs")) {
+    sensor.spring_stiffness = stiffness(read_springs(node.child("springs")));
+    model.K = *sensor.spring_stiffness;
   }
   if (calibrated) {
-    load_calibration(beside(node, node.text("calibration")), sensor.camera, sensor.target, model);
-  } else {
-    model.K = stiffness(read_springs(node.child("springs")));
+    sensor.calibration = beside(node, node.text("calibration"));
+    if (use == WrenchCalibration::use) {
+      load_calibration(sensor.calibration, sensor.camera, sensor.target, sensor.rest, model);
+    }
   }
   model.range = force_and_torque(node, "range_n", "range_nm", model.range);
   model.wrench_origin = vector3(node.numbers_or("origin_mm", {0, 0, 0})) * kMm;
   model.camera_R_wrench_frame = rotation(vector3(node.numbers_or("frame_rotation_rad", {0, 0, 0})));
+  sensor.zero = read_zero(node);
+  if (node.has("reference")) sensor.reference = read_reference(node.child("reference"));
   node.finish();
   return model;
 }
@@ -319,13 +360,13 @@ HidIdentity read_identity(YamlReader node) {
   return identity;
 }
 
-SensorConfig read_sensor(YamlReader root) {
+SensorConfig read_sensor(YamlReader root, WrenchCalibration use) {
   SensorConfig sensor;
   sensor.camera =
       read_camera(root.child("camera"), sensor.camera_calibrated, sensor.camera_latency);
   sensor.target = read_target(root.child("target"));
   if (root.has("rest")) sensor.rest = read_rest(root.child("rest"), sensor.camera);
-  sensor.wrench = read_wrench(root.child("wrench"), sensor);
+  sensor.wrench = read_wrench(root.child("wrench"), sensor, use);
   if (root.has("mounting")) sensor.shaping.hid_R_camera = read_mounting(root.child("mounting"));
   if (root.has("shaping")) sensor.shaping = read_shaping(root.child("shaping"), sensor.shaping);
   if (root.has("spacemouse")) sensor.spacemouse = read_identity(root.child("spacemouse"));
@@ -335,12 +376,12 @@ SensorConfig read_sensor(YamlReader root) {
 
 }  // namespace
 
-SensorConfig load_sensor(const std::string& path) {
-  return read_sensor(YamlReader::from_file(path));
+SensorConfig load_sensor(const std::string& path, WrenchCalibration use) {
+  return read_sensor(YamlReader::from_file(path), use);
 }
 
-SensorConfig parse_sensor(const std::string& text, const std::string& name) {
-  return read_sensor(YamlReader::from_text(text, name));
+SensorConfig parse_sensor(const std::string& text, const std::string& name, WrenchCalibration use) {
+  return read_sensor(YamlReader::from_text(text, name), use);
 }
 
 }  // namespace tagwrench

@@ -263,7 +263,8 @@ void check_editable(std::string yaml, const std::vector<SectionEdit>& edits,
 
 void write_sensor(std::string yaml, const std::vector<SectionEdit>& edits, const fs::path& to) {
   for (const SectionEdit& edit : edits) yaml = with_keys(yaml, edit, to.string());
-  parse_sensor(yaml, to.string());
+  // What is calibrated anew may make a calibration of the wrench void; that is no reason to refuse.
+  parse_sensor(yaml, to.string(), WrenchCalibration::ignore);
   write_atomically(to, yaml);
 }
 

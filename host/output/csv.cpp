@@ -14,8 +14,7 @@ SendStatus CsvOutput::send(const Sample& sample) noexcept {
     if (status != SendStatus::ok) return status;
     header_written_ = true;
   }
-  const auto now = std::chrono::steady_clock::now();
-  return sink_.write(csv_line(line_, sample, latency_us(sample, now)));
+  return sink_.write(csv_line(line_, sample));
 }
 
 }  // namespace tagwrench

@@ -35,6 +35,9 @@ class Output {
   /// Answers. What a client has changed, in words for people; empty if nothing.
   virtual std::string_view service() noexcept { return {}; }
 
+  /// Whether somebody presses a button that this output knows of.
+  virtual bool touched() const noexcept { return false; }
+
   /// Offers a line meant for people; true if this output has shown it. An empty one takes the last
   /// one away.
   virtual bool notice(std::string_view) noexcept { return false; }

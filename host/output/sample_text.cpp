@@ -23,8 +23,7 @@ constexpr std::string_view kCsv =
     "{},{}\n";
 
 template <typename Format>
-std::string_view line(LineBuffer& buffer, Format format, const Sample& sample,
-                      std::int64_t latency) noexcept {
+std::string_view line(LineBuffer& buffer, Format format, const Sample& sample) noexcept {
   const Status status = shown_status(sample);
   const bool numbers = carries_numbers(status);
   static const Vector6 kZero = Vector6::Zero();
@@ -40,24 +39,23 @@ std::string_view line(LineBuffer& buffer, Format format, const Sample& sample,
                                      ds[0], ds[1], ds[2], ds[3], ds[4], ds[5],  //
                                      w[0], w[1], w[2], w[3], w[4], w[5],        //
                                      ws[0], ws[1], ws[2], ws[3], ws[4], ws[5],  //
-                                     sample.dropped, latency);
+                                     sample.dropped, latency_us(sample));
   return {buffer.data(), std::min(done.size, buffer.size())};
 }
 
 }  // namespace
 
-std::string_view json_line(LineBuffer& buffer, const Sample& sample,
-                           std::int64_t latency) noexcept {
-  return line(buffer, FMT_STRING(kJson), sample, latency);
+std::string_view json_line(LineBuffer& buffer, const Sample& sample) noexcept {
+  return line(buffer, FMT_STRING(kJson), sample);
 }
 
-std::string_view csv_line(LineBuffer& buffer, const Sample& sample, std::int64_t latency) noexcept {
-  return line(buffer, FMT_STRING(kCsv), sample, latency);
+std::string_view csv_line(LineBuffer& buffer, const Sample& sample) noexcept {
+  return line(buffer, FMT_STRING(kCsv), sample);
 }
 
-std::int64_t latency_us(const Sample& sample, TimePoint now) noexcept {
-  const auto late =
-      std::chrono::duration_cast<std::chrono::microseconds>(now - sample.latency_origin);
+std::int64_t latency_us(const Sample& sample) noexcept {
+  const auto late = std::chrono::duration_cast<std::chrono::microseconds>(sample.output_time -
+                                                                          sample.latency_origin);
   return std::max<std::int64_t>(late.count(), 0);
 }
 

@@ -25,12 +25,10 @@ inline constexpr std::string_view kCsvHeader =
 
 /// A status that carries no numbers has zeros in all of them. The view is into `buffer` and ends
 /// with a newline.
-std::string_view json_line(LineBuffer& buffer, const Sample& sample,
-                           std::int64_t latency_us) noexcept;
-std::string_view csv_line(LineBuffer& buffer, const Sample& sample,
-                          std::int64_t latency_us) noexcept;
+std::string_view json_line(LineBuffer& buffer, const Sample& sample) noexcept;
+std::string_view csv_line(LineBuffer& buffer, const Sample& sample) noexcept;
 
-/// Microseconds from the sample's latency origin to `now`, never negative.
-std::int64_t latency_us(const Sample& sample, TimePoint now) noexcept;
+/// Microseconds from the sample's latency origin to the output call, never negative.
+std::int64_t latency_us(const Sample& sample) noexcept;
 
 }  // namespace tagwrench

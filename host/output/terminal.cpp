@@ -50,9 +50,9 @@ bool TerminalOutput::notice(std::string_view line) noexcept {
   return true;
 }
 
-void TerminalOutput::account(const Sample& sample, TimePoint now) noexcept {
+void TerminalOutput::account(const Sample& sample) noexcept {
   figures_.dropped += sample.dropped;
-  const double late_ms = static_cast<double>(latency_us(sample, now)) * 1e-3;
+  const double late_ms = static_cast<double>(latency_us(sample)) * 1e-3;
   if (!first_capture_) {
     first_capture_ = next_line_ = sample.capture_time;
     figures_.latency_ms = late_ms;
@@ -70,7 +70,7 @@ void TerminalOutput::account(const Sample& sample, TimePoint now) noexcept {
 
 SendStatus TerminalOutput::send(const Sample& sample) noexcept {
   const TimePoint now = std::chrono::steady_clock::now();
-  account(sample, now);
+  account(sample);
   const bool changed = sample.status != last_.status;  // shown at once: nothing may follow a loss
   last_ = sample;
   if (live_) return changed || now >= next_draw_ ? draw(sample, now) : SendStatus::ok;

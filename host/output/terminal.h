@@ -48,7 +48,7 @@ class TerminalOutput : public Output {
  private:
   SendStatus draw(const Sample& sample, TimePoint now) noexcept;
   SendStatus print_line(const Sample& sample) noexcept;
-  void account(const Sample& sample, TimePoint now) noexcept;
+  void account(const Sample& sample) noexcept;
 
   TerminalOptions options_;
   TextSink sink_;

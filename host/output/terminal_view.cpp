@@ -148,6 +148,31 @@ void draw_axis(View& view, int i, const TerminalOptions& options, const Sample& 
   if (wide) view.print(" +/- {:<8.3g} of {:.4g} {}", sigma * a.scale, full * a.scale, a.unit);
 }
 
+const char* in_words(ZeroState state) {
+  switch (state) {
+    case ZeroState::off:
+      return "set";
+    case ZeroState::touched:
+      return "kept: touched";
+    case ZeroState::far:
+      return "kept: far off; nobody there? run `tagwrench zero`";
+    case ZeroState::following:
+      return "following";
+  }
+  return "?";
+}
+
+/// What is taken off, in the axes' own units.
+void draw_zero(View& view, const TerminalOptions& options, const Sample& sample) {
+  view.print("zero    ");
+  for (int i = 0; i < 6; ++i) {
+    const Axis a = axis(i, options.full_scale);
+    view.print("{:.3f} ", sample.zero[i] * a.scale);
+    if (i % 3 == 2) view.print("{}  ", a.unit);
+  }
+  view.text(in_words(sample.zero_state));
+}
+
 /// Over as many lines as it takes, broken at spaces.
 void draw_note(View& view, std::string_view note, int width) {
   constexpr std::string_view kFirst = "note    ", kNext = "        ";
@@ -189,6 +214,8 @@ std::size_t draw_view(Screen& screen, const TerminalOptions& options, const Samp
   for (int i = 0; i < 6 && view.next_line(); ++i) {
     draw_axis(view, i, options, sample, carries_numbers(status), width);
   }
+  const bool zero_is_of_use = sample.zero_state != ZeroState::off || !sample.zero.isZero();
+  if (zero_is_of_use && view.next_line()) draw_zero(view, options, sample);
   if (!options.source.empty() && view.next_line()) view.print("source  {}", options.source);
   for (const std::string& device : options.devices) {
     if (view.next_line()) view.print("output  {}", device);

@@ -41,6 +41,10 @@ std::string_view name(PixelFormat format) noexcept {
   return kNames[static_cast<std::size_t>(format)];
 }
 
+std::uint32_t fourcc_of(PixelFormat format) noexcept {
+  return code(kNames[static_cast<std::size_t>(format)]);
+}
+
 int row_bytes(PixelFormat format, int width) noexcept {
   switch (format) {
     case PixelFormat::grey:

@@ -26,6 +26,8 @@ std::optional<PixelFormat> pixel_format(std::uint32_t fourcc) noexcept;
 /// "GREY", "NV12", "YUYV", "UYVY", "MJPG", in any case.
 std::optional<PixelFormat> pixel_format(std::string_view name) noexcept;
 std::string_view name(PixelFormat format) noexcept;
+/// Its V4L2 code.
+std::uint32_t fourcc_of(PixelFormat format) noexcept;
 /// Bytes that one row of pixels takes; 0 for mjpg.
 int row_bytes(PixelFormat format, int width) noexcept;
 

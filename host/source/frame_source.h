@@ -21,6 +21,8 @@ enum class ReadStatus : std::uint8_t {
   nothing,       ///< woken for nothing (a corrupt or stale frame was skipped); poll again
   disconnected,  ///< the device went away or stalled; detail() says so. Reported once; keep polling
   reconnected,   ///< it is back; detail() says so
+  missing,       ///< a recording says that here no frame had come in time; of the Frame argument
+                 ///< only recorded_latency is filled
   end,           ///< no more frames will come
 };
 
@@ -50,6 +52,10 @@ class FrameSource {
   /// Decodes the rest of the frame that the last read() delivered, in place. False: the rest is
   /// damaged, and the frame is as it was.
   virtual bool complete(Frame& /*frame*/) noexcept { return true; }
+
+  /// The frame that the last read() delivered, as it was before it was decoded; no bytes where the
+  /// source has none. Valid until the next read().
+  virtual RawFrame raw() const noexcept { return {}; }
 
   /// Exposure and gain, where the source has them; owned by it. Valid for its lifetime.
   virtual CameraLight* camera_light() noexcept { return nullptr; }

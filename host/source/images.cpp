@@ -11,14 +11,10 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <optional>
 
 #include "host/config_error.h"
-#include "host/source/decode.h"
 #include "host/source/frame_times.h"
 #include "host/source/image_header.h"
-#include "host/source/pgm.h"
-#include "host/source/png.h"
 
 namespace tagwrench {
 namespace {
@@ -105,20 +101,14 @@ std::vector<Duration> frame_times(const std::string& dir, const std::vector<std:
 
 }  // namespace
 
-struct ImagesSource::Picture {
-  std::vector<std::uint8_t> bytes;  ///< grows to the largest file and stays there
-  std::vector<std::uint8_t> grey;
-  std::optional<Decoder> jpeg;
-};
-
-ImagesSource::ImagesSource(const std::string& dir, bool fast)
-    : picture_(std::make_unique<Picture>()) {
+ImagesSource::ImagesSource(const std::string& dir, bool fast) {
   const std::vector<std::string> names = picture_names(dir);
   for (const std::string& name : names) paths_.push_back((fs::path(dir) / name).string());
   const ImageSize size = common_size(paths_);
   times_ = frame_times(dir, names);
   format_.width = size.width;
   format_.height = size.height;
+  decoder_ = std::make_unique<RawDecoder>(size.width, size.height);
   format_.period = times_.size() < 2 ? kDefaultPeriod
                                      : (times_.back() - times_.front()) /
                                            static_cast<std::int64_t>(times_.size() - 1);
@@ -132,8 +122,6 @@ ImagesSource::ImagesSource(const std::string& dir, bool fast)
   }
   arm();
 }
-
-ImagesSource::~ImagesSource() = default;
 
 std::string ImagesSource::unusable() const {
   if (corrupt_ == 0) return {};
@@ -182,40 +170,27 @@ ReadStatus ImagesSource::read(Frame& frame) noexcept {
 
 bool ImagesSource::complete(Frame& frame) noexcept {
   const Region whole{0, 0, format_.width, format_.height};
-  const auto& bytes = picture_->bytes;
-  return frame.readable() == whole ||
-         (picture_->jpeg &&
-          picture_->jpeg->decode(bytes, bytes.size(), whole, frame.image, frame.decoded));
+  return frame.readable() == whole || decoder_->decode(raw_, whole, frame);
 }
 
 bool ImagesSource::load(const std::string& path, Frame& frame) noexcept {
+  raw_ = {};
   try {
     std::ifstream file(path, std::ios::binary | std::ios::ate);
     const std::streamoff length = file.tellg();
     if (length <= 0 || length > kMaxFileBytes) return false;
-    auto& bytes = picture_->bytes;
-    bytes.resize(static_cast<std::size_t>(length));
+    bytes_.resize(static_cast<std::size_t>(length));
     file.seekg(0);
-    if (!file.read(reinterpret_cast<char*>(bytes.data()), length)) return false;
-    // Asked again, so that a file that has changed cannot make a decoder allocate without bound.
-    if (image_size(bytes) != ImageSize{format_.width, format_.height}) return false;
-    if (bytes[0] == 0xFF) {
-      if (!picture_->jpeg) {
-        picture_->jpeg.emplace(PixelFormat::mjpg, format_.width, format_.height, 0);
-      }
-      return picture_->jpeg->decode(bytes, bytes.size(), wanted_, frame.image, frame.decoded);
-    }
-    std::vector<std::uint8_t>& grey = picture_->grey;
-    if (!(bytes[0] == 'P' ? decode_pgm(bytes, format_.width, format_.height, grey)
-                          : decode_png(bytes, format_.width, format_.height, grey))) {
-      return false;
-    }
-    frame.image = {grey.data(), format_.width, format_.height, format_.width};
-    frame.decoded = {};
-    return true;
+    if (!file.read(reinterpret_cast<char*>(bytes_.data()), length)) return false;
   } catch (const std::exception&) {
     return false;
   }
+  // Asked again: the file may have changed.
+  if (image_size(bytes_) != ImageSize{format_.width, format_.height}) return false;
+  const std::uint8_t first = bytes_[0];
+  raw_.fourcc = first == 0xFF ? fourcc("MJPG") : first == 'P' ? fourcc("PGM ") : fourcc("PNG ");
+  raw_.bytes = bytes_;
+  return decoder_->decode(raw_, wanted_, frame);
 }
 
 }  // namespace tagwrench

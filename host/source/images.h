@@ -8,6 +8,7 @@
 
 #include "host/os/unique_fd.h"
 #include "host/source/frame_source.h"
+#include "host/source/raw_decoder.h"
 
 namespace tagwrench {
 
@@ -18,7 +19,6 @@ class ImagesSource final : public FrameSource {
   /// the first read(), and a loop that is late loses frames. Throws ConfigError: no folder, no
   /// pictures, an unreadable header, sizes that differ, a bad frames.csv.
   ImagesSource(const std::string& dir, bool fast);
-  ~ImagesSource() override;
 
   const SourceFormat& format() const noexcept override { return format_; }
   int poll_fd() const noexcept override { return timer_ ? timer_.get() : -1; }
@@ -26,6 +26,7 @@ class ImagesSource final : public FrameSource {
   /// Saves work where the picture is a JPEG; PNG and PGM are always decoded whole.
   void want(const Region& region) noexcept override { wanted_ = region; }
   bool complete(Frame& frame) noexcept override;
+  RawFrame raw() const noexcept override { return raw_; }
 
   std::size_t count() const noexcept { return paths_.size(); }
   /// The file that a Frame came from, by its sequence.
@@ -36,8 +37,6 @@ class ImagesSource final : public FrameSource {
   std::uint64_t corrupt_frames() const noexcept { return corrupt_; }
 
  private:
-  struct Picture;  ///< keeps the picture library out of this header
-
   TimePoint due(std::size_t index) const noexcept { return start_ + (times_[index] - times_[0]); }
   void arm() const noexcept;
   bool load(const std::string& path, Frame& frame) noexcept;
@@ -46,7 +45,9 @@ class ImagesSource final : public FrameSource {
   std::vector<Duration> times_;
   SourceFormat format_;
   UniqueFd timer_;
-  std::unique_ptr<Picture> picture_;
+  std::vector<std::uint8_t> bytes_;  ///< of the last file; grows to the largest and stays there
+  RawFrame raw_;                     ///< points there
+  std::unique_ptr<RawDecoder> decoder_;
   Region wanted_;
   TimePoint start_{};
   std::size_t next_ = 0;

@@ -74,6 +74,7 @@ V4l2Source::V4l2Source(const V4l2Options& options)
   format_ = {stream.width, stream.height, stream.period, {}};
   ledger_ = FrameLedger(stream.period);
   decoder_.emplace(stream.pixels, stream.width, stream.height, stream.stride);
+  stride_ = stream.stride;
   device_->start();
   settle(options.exposure_us);
   watch_camera();
@@ -225,8 +226,15 @@ ReadStatus V4l2Source::read(Frame& frame) noexcept {
 }
 
 bool V4l2Source::complete(Frame& frame) noexcept {
-  return !held_ ||
+  const Region whole{0, 0, format_.width, format_.height};
+  return frame.readable() == whole || !held_ ||
          decoder_->decode(held_->bytes, held_->bytes_used, {}, frame.image, frame.decoded);
+}
+
+RawFrame V4l2Source::raw() const noexcept {
+  if (!held_) return {};
+  const std::size_t used = std::min<std::size_t>(held_->bytes_used, held_->bytes.size());
+  return {fourcc_of(choice_.mode.pixels), held_->bytes.first(used), stride_};
 }
 
 /// `queued`: how many buffers the driver had to fill since the last read().
@@ -288,12 +296,7 @@ ReadStatus V4l2Source::deliver(const V4l2Buffer& newest, bool queue_was_full,
     device_->requeue(newest.index);
     return ReadStatus::nothing;
   }
-  const bool whole = frame.decoded == Region{0, 0, format_.width, format_.height};
-  if (decoder_->borrows() || !whole) {
-    held_ = newest;
-  } else {
-    device_->requeue(newest.index);
-  }
+  held_ = newest;
   frame.capture_time = frame.latency_origin = ledger_.capture_time();
   frame.sequence = ledger_.sequence();
   frame.dropped = ledger_.take();
@@ -323,6 +326,7 @@ void V4l2Source::open_device() {
   device->start();
   // The driver may pad its rows otherwise this time.
   decoder_.emplace(stream.pixels, stream.width, stream.height, stream.stride);
+  stride_ = stream.stride;
   ledger_.stream_started();
   device_ = std::move(device);
   watch_camera();

@@ -40,6 +40,7 @@ class V4l2Source final : public FrameSource, private CameraLight {
   ReadStatus read(Frame& frame) noexcept override;
   void want(const Region& region) noexcept override { wanted_ = region; }
   bool complete(Frame& frame) noexcept override;
+  RawFrame raw() const noexcept override;
   std::string detail() const override { return detail_; }
   std::string unusable() const override;
   /// Nothing where the exposure could not be locked.
@@ -85,7 +86,8 @@ class V4l2Source final : public FrameSource, private CameraLight {
   std::optional<Decoder> decoder_;
   FrameLedger ledger_;
   ControlLock controls_;
-  std::optional<V4l2Buffer> held_;  ///< that the last Frame points into, or may be completed from
+  std::optional<V4l2Buffer> held_;  ///< of the last Frame, until the next read()
+  int stride_ = 0;                  ///< of its rows in bytes, 0 for mjpg
   Region wanted_;
   State state_ = State::streaming;
   TimePoint last_buffer_{};

@@ -14,6 +14,7 @@
 #include "host/tracker/refine.h"
 #include "host/tracker/rest.h"
 #include "host/tracker/shutter_check.h"
+#include "host/tracker/tag_corners.h"
 #include "host/tracker/trust.h"
 
 namespace tagwrench {
@@ -363,7 +364,12 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
   }
   track.tags_held = fit.converged ? fit.tags_held : edges.tags_held;
   track.residual_px = edges.residual_px;
+  if (fit.converged) {
+    track.residual_part = fit.residual_part;
+    track.blur_px2 = 2 * light.blur[0];
+  }
   track.status = Status::doubtful;
+  set_corners(camera, target, rest.platform_T_tag, pose, track);
   say_misfit(good, track);
   if (!good) return track;
   track.status = Status::ok;

@@ -20,15 +20,73 @@ Matrix6 tool_transform(const Eigen::Vector3d& o, const Eigen::Matrix3d& camera_R
 }  // namespace
 
 WrenchEstimator::WrenchEstimator(const WrenchModel& model)
-    : model_(model), tool_(tool_transform(model.wrench_origin, model.camera_R_wrench_frame)) {}
+    : model_(model),
+      tool_(tool_transform(model.wrench_origin, model.camera_R_wrench_frame)),
+      features_(model.features) {
+  if (model.parameter_covariance.size() > 0) set_parameter_variances();
+}
 
-void WrenchEstimator::estimate(const Track& track, Sample& sample) const noexcept {
+/// The parameters' covariance as it bears on each number put out, once and for all.
+void WrenchEstimator::set_parameter_variances() {
+  parameters_known_ = true;
+  const auto n = model_.parameter_covariance.rows() / 6;
+  for (Quadratic& q : parameter_variance_) q.setZero(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    for (Eigen::Index l = 0; l < n; ++l) {
+      const Matrix6 moved =
+          tool_ * model_.parameter_covariance.block<6, 6>(6 * k, 6 * l) * tool_.transpose();
+      for (int axis = 0; axis < 6; ++axis)
+        parameter_variance_[static_cast<std::size_t>(axis)](k, l) = moved(axis, axis);
+    }
+  }
+}
+
+Vector6 WrenchEstimator::parameter_variance(const FeatureVector& features) const noexcept {
+  Vector6 out = Vector6::Zero();
+  const auto n = features.size();
+  for (int axis = 0; axis < 6; ++axis) {
+    const Quadratic& q = parameter_variance_[static_cast<std::size_t>(axis)];
+    double sum = q(n, n);
+    for (Eigen::Index l = 0; l < n; ++l) {
+      double column = q(n, l) + q(l, n);
+      for (Eigen::Index k = 0; k < n; ++k) column += q(k, l) * features[k];
+      sum += column * features[l];
+    }
+    out[axis] = sum;
+  }
+  return out;
+}
+
+void WrenchEstimator::estimate(const Track& track, Sample& sample) noexcept {
   sample.status = track.status;
   if (track.status != Status::ok) return;
-  const Vector6 at_platform = model_.K * track.displacement + model_.B;
+  Vector6 at_platform = model_.K * track.displacement + model_.B;
+  Matrix6 tangent = model_.K;
+  if (!at_platform.allFinite()) {  // before it can spoil the memory
+    sample.status = Status::doubtful;
+    return;
+  }
+  if (parameters_known_ || model_.extra.cols() > 0) {
+    const double dt =
+        has_last_ ? std::chrono::duration<double>(sample.capture_time - last_).count() : 0.0;
+    features_.update(track.displacement, dt);
+    last_ = sample.capture_time;
+    has_last_ = true;
+  }
+  if (model_.extra.cols() > 0) {
+    const auto further = features_.values().size() - 6;
+    at_platform.noalias() += model_.extra.lazyProduct(features_.values().tail(further));
+    tangent.noalias() += model_.extra.lazyProduct(features_.jacobian().bottomRows(further));
+  }
   const Matrix6 covariance =
-      model_.K * track.covariance * model_.K.transpose() + model_.model_covariance;
+      tangent * track.covariance * tangent.transpose() + model_.model_covariance;
   const Matrix6 moved = tool_ * covariance * tool_.transpose();
+  Vector6 variance = moved.diagonal();
+  if (parameters_known_) {
+    const double load = at_platform.cwiseQuotient(model_.full_load).squaredNorm();
+    variance += parameter_variance(features_.values());
+    variance.noalias() += load * (tool_.cwiseAbs2() * model_.error_at_full_load.cwiseAbs2()).eval();
+  }
   if (!at_platform.allFinite() || !moved.allFinite()) {
     sample.status = Status::doubtful;
     return;
@@ -38,7 +96,13 @@ void WrenchEstimator::estimate(const Track& track, Sample& sample) const noexcep
   sample.displacement = track.displacement;
   sample.displacement_sigma = track.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   sample.wrench = tool_ * at_platform;
-  sample.wrench_sigma = moved.diagonal().cwiseMax(0).cwiseSqrt();
+  sample.wrench_sigma = variance.cwiseMax(0).cwiseSqrt();
+}
+
+Vector6 WrenchEstimator::noise(const Track& track) const noexcept {
+  const Matrix6 tangent = tool_ * model_.K;
+  const Matrix6 covariance = tangent * track.covariance * tangent.transpose();
+  return covariance.diagonal().cwiseMax(0).cwiseSqrt();
 }
 
 }  // namespace tagwrench

@@ -197,7 +197,7 @@ std::string bench(const char* title, const sim::Scenario& scenario, PixelFormat 
   Acquirer acquirer(clip.sensor.camera, clip.sensor.target);
   UsualWay usual_way(clip.sensor);
   Tracker tracker(clip.sensor.camera, clip.sensor.target, clip.sensor.rest);
-  const WrenchEstimator estimator(clip.sensor.wrench);
+  WrenchEstimator estimator(clip.sensor.wrench);
   const Shaping shaping(clip.sensor.shaping);
   const UniqueFd device(::open("/dev/null", O_WRONLY | O_CLOEXEC));
 

@@ -26,6 +26,47 @@ void Table::open(const std::string& name, const std::vector<std::string>& about)
   std::fflush(stdout);
 }
 
+void Table::columns(const std::string& what, const std::array<std::string, 6>& heads) {
+  heads_ = heads;
+  fmt::print("\n{:<44}", what);
+  for (const std::string& head : heads) fmt::print("{:>10}", head);
+  fmt::print("\n");
+}
+
+void Table::figures(const std::string& name, const std::array<double, 6>& value, int decimals) {
+  fmt::print("  {:<42}", name);
+  for (const double v : value)
+    fmt::print("{:>10}", std::isfinite(v) ? fmt::format("{:.{}f}", v, decimals) : "-");
+  fmt::print("\n");
+  std::fflush(stdout);
+}
+
+void Table::at_least(const std::string& what, const std::array<double, 6>& value,
+                     const std::array<double, 6>& limit, int decimals) {
+  verdicts(what, value, limit, decimals, true);
+}
+
+void Table::at_most(const std::string& what, const std::array<double, 6>& value,
+                    const std::array<double, 6>& limit, int decimals) {
+  verdicts(what, value, limit, decimals, false);
+}
+
+void Table::verdicts(const std::string& what, const std::array<double, 6>& value,
+                     const std::array<double, 6>& limit, int decimals, bool at_least) {
+  const char* const relation = at_least ? "at least" : "at most";
+  figures(std::string("target, ") + relation, limit, decimals);
+  std::string missed;
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    if (std::isnan(limit[i])) continue;
+    ++targets_;
+    if (at_least ? value[i] >= limit[i] : value[i] <= limit[i]) continue;  // NaN misses
+    missed += (missed.empty() ? "" : " ") + heads_[i];
+    misses_.push_back(fmt::format("{}: {}, {}: {:.{}f}, target {} {:.{}f}", case_, what, heads_[i],
+                                  value[i], decimals, relation, limit[i], decimals));
+  }
+  fmt::print("  {:<42}{}\n", what, missed.empty() ? "ok" : "misses " + missed);
+}
+
 void Table::columns(const std::string& what) {
   fmt::print("\n{:<44}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}\n", what, "x um", "y um", "z um", "rx mrad",
              "ry mrad", "rz mrad");

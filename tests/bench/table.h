@@ -1,6 +1,7 @@
 // Rows of figures, each beside its target and with its ratio to it.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,14 @@ class Table {
  public:
   /// A case begins: its name and what its frames are.
   void open(const std::string& name, const std::vector<std::string>& about);
+  /// A block of six columns with these heads.
+  void columns(const std::string& what, const std::array<std::string, 6>& heads);
+  void figures(const std::string& name, const std::array<double, 6>& value, int decimals);
+  /// Prints the limits, and says ok or what falls short of them; NaN has no limit.
+  void at_least(const std::string& what, const std::array<double, 6>& value,
+                const std::array<double, 6>& limit, int decimals);
+  void at_most(const std::string& what, const std::array<double, 6>& value,
+               const std::array<double, 6>& limit, int decimals);
   /// A block of six columns: x y z um, rx ry rz mrad.
   void columns(const std::string& what);
   void row(const std::string& name, const Vector6& value);  ///< m, rad
@@ -27,10 +36,13 @@ class Table {
   void close();
 
  private:
+  void verdicts(const std::string& what, const std::array<double, 6>& value,
+                const std::array<double, 6>& limit, int decimals, bool at_least);
   void verdict(const std::string& what, double value, double limit, bool ok, const char* relation,
                const std::string& unit);
 
   std::string case_;
+  std::array<std::string, 6> heads_;
   int targets_ = 0;
   std::vector<std::string> misses_;
 };

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "host/source/simulator/folder_export.h"
 #include "tests/bench/tracker_bound.h"
@@ -15,15 +14,6 @@ namespace {
 
 constexpr int kPoses = 6;
 constexpr int kFramesEach = 50;
-constexpr std::size_t kChunk = 50;  // frames in memory at a time
-
-using Methods = std::vector<std::unique_ptr<Method>>;
-
-double thread_time_us() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e6 * static_cast<double>(now.tv_sec) + 1e-3 * static_cast<double>(now.tv_nsec);
-}
 
 /// What the maker of the scenario knows and the owner of the sensor does not: where the tags are.
 /// The rest pose is learned all the same, from the 25 frames, as displacement counts from there.
@@ -201,25 +191,6 @@ Clip clip_of(const sim::Scenario& scenario, int moving_frames) {
   clip.scenario = scenario;
   clip.open = [scenario, moving_frames] { return moving_shots(scenario, moving_frames); };
   return clip;
-}
-
-Records run(ShotSource& source, const Methods& methods) {
-  Records records(methods.size());
-  std::vector<Shot> chunk(kChunk);
-  for (bool more = true; more;) {
-    std::size_t count = 0;
-    while (count < kChunk && (more = source.next(chunk[count]))) ++count;
-    for (std::size_t m = 0; m < methods.size(); ++m) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const Shot& shot = chunk[i];
-        const double begin = thread_time_us();
-        const Reading reading = methods[m]->track(shot);
-        const double end = thread_time_us();
-        records[m].push_back({shot.phase, shot.pose, shot.truth, reading, end - begin});
-      }
-    }
-  }
-  return records;
 }
 
 void bench_case(const Case& benched, Table& table) {

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "host/source/simulator/scenario.h"
-#include "tests/bench/tracker_scores.h"
 #include "tests/bench/table.h"
+#include "tests/bench/tracker_run.h"
 
 namespace tagwrench::bench {
 
@@ -49,12 +49,6 @@ Clip clip_of(const sim::Scenario& scenario, int moving_frames);
 
 /// The real picture, moved (tests/support/semi_real.h); empty without TAGWRENCH_DATA.
 std::optional<Clip> semi_real_clip(int moving_frames);
-
-using Records = std::vector<std::vector<Record>>;  ///< of each method
-
-/// Every method sees every frame. Frames come in chunks and each method works through a chunk on
-/// its own, as it would on a stream.
-Records run(ShotSource& source, const std::vector<std::unique_ptr<Method>>& methods);
 
 void bench_case(const Case& benched, Table& table);
 

@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <map>
+#include <cmath>
 #include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
 
@@ -83,6 +83,46 @@ class OneTag final : public Method {
   RestCorners rest_;
 };
 
+/// R = Rz(yaw) Ry(pitch) Rx(roll).
+Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& R) {
+  return {std::atan2(R(2, 1), R(2, 2)), -std::asin(std::clamp(R(2, 0), -1.0, 1.0)),
+          std::atan2(R(1, 0), R(0, 0))};
+}
+
+class MeanOfTags final : public Method {
+ public:
+  MeanOfTags(std::string name, const SensorConfig& sensor, Corners corners)
+      : Method(std::move(name)), lens_(sensor), detector_(sensor, corners), rest_(lens_) {}
+
+  Reading track(const Shot& shot) override {
+    const std::vector<TagCorners> found = detector_.find(shot);
+    if (shot.phase == Phase::rest) {
+      rest_.add(found);
+      return {};
+    }
+    Reading reading;
+    Vector6 sum = Vector6::Zero();
+    for (std::size_t t = 0; t < found.size(); ++t) {
+      if (found[t].empty() || !rest_.learned(t)) return reading;
+      sum += numbers(ippe_pose(lens_, found[t])) - numbers(rest_.camera_T_tag(t));
+    }
+    reading.ok = true;
+    reading.displacement = sum / static_cast<double>(found.size());
+    return reading;
+  }
+
+ private:
+  static Vector6 numbers(const Eigen::Isometry3d& pose) {
+    Vector6 result;
+    result << pose.translation(), roll_pitch_yaw(pose.linear());
+    return result;
+  }
+
+  Lens lens_;
+  OpenCvDetector detector_;
+  RestCorners rest_;
+};
+
 class AllTags final : public Method {
  public:
   AllTags(std::string name, const SensorConfig& sensor, Corners corners)
@@ -154,6 +194,11 @@ class Tagwrench final : public Method {
 std::unique_ptr<Method> opencv_one_tag(std::string name, const SensorConfig& sensor,
                                        Corners corners) {
   return std::make_unique<OneTag>(std::move(name), sensor, corners);
+}
+
+std::unique_ptr<Method> opencv_mean_of_tags(std::string name, const SensorConfig& sensor,
+                                            Corners corners) {
+  return std::make_unique<MeanOfTags>(std::move(name), sensor, corners);
 }
 
 std::unique_ptr<Method> opencv_all_tags(std::string name, const SensorConfig& sensor,

@@ -41,6 +41,11 @@ std::unique_ptr<Method> opencv_one_tag(std::string name, const SensorConfig& sen
 /// The body's geometry is that of the mean corners at rest. A frame without all tags is lost.
 std::unique_ptr<Method> opencv_all_tags(std::string name, const SensorConfig& sensor, Corners);
 
+/// The same detector; every tag's pose by IPPE, and of their translations and Euler angles (roll,
+/// pitch, yaw about the camera's x, y, z), counted from rest, the mean over the tags, as the paper
+/// has it. The angles stand in the place of the rotation vector. A frame without all tags is lost.
+std::unique_ptr<Method> opencv_mean_of_tags(std::string name, const SensorConfig& sensor, Corners);
+
 /// libapriltag 3, one thread, default parameters but full resolution (quad_decimate 1); the mean of
 /// the displacements that its own pose of each tag gives. A frame without all tags is lost.
 std::unique_ptr<Method> libapriltag(std::string name, const SensorConfig& sensor);

@@ -14,6 +14,7 @@ struct Record {
   Vector6 truth = Vector6::Zero();
   Reading reading;
   double us = 0;  ///< processor time of the thread
+  TimePoint time{};
 };
 
 struct MotionScore {

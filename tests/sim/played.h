@@ -112,7 +112,7 @@ class PipelineLoop : public testing::Test {
                 const RunLimits& limits = {}) {
     outputs_.push_back(std::move(recorder));
     Tracker tracker(sensor_.camera, sensor_.target, sensor_.rest);
-    const WrenchEstimator wrench(sensor_.wrench);
+    WrenchEstimator wrench(sensor_.wrench);
     const Shaping shaping(sensor_.shaping);
     DeadMan dead_man({});
     return Pipeline(source, tracker, wrench, shaping, outputs_, dead_man, stop_.get()).run(limits);

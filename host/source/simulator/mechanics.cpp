@@ -77,28 +77,52 @@ Matrix6 damping(const Mechanics& m) {
 }
 
 PlatformMotion::PlatformMotion(const Mechanics& mechanics, const TrajectoryPlayer& player,
-                               double start_time, double memory)
+                               double start_time, double memory, AppliedLoad* load)
     : mechanics_(mechanics),
       player_(player),
+      applied_(load),
       stiffness_(stiffness(mechanics)),
       inertia_(inertia(mechanics)),
       damping_(damping(mechanics)),
       inverse_inertia_(inertia_.inverse()),
       ring_(static_cast<std::size_t>(std::ceil(memory / kStep)) + 4),
       start_time_(start_time),
-      load_(load_at(start_time)) {}
+      load_(load_at(start_time, Vector6::Zero())),
+      friction_reach_(mechanics.friction_travel *
+                      Vector6::Map(mechanics.range.data()).cwiseQuotient(stiffness_.diagonal())) {
+  friction_spring_ =
+      mechanics.friction * Vector6::Map(mechanics.range.data()).cwiseQuotient(friction_reach_);
+}
 
-Vector6 PlatformMotion::load_at(double time) const noexcept {
-  Vector6 load = player_.applied_wrench(time);
-  const Eigen::Vector3d inertial = -mechanics_.mass * player_.base_acceleration(time);
+Vector6 PlatformMotion::load_at(double time, const Vector6& displacement) const noexcept {
+  Vector6 load = applied_ ? applied_->wrench(time, displacement) : player_.applied_wrench(time);
+  const Eigen::Vector3d inertial = mechanics_.mass * (applied_ ? applied_->gravity_change(time)
+                                                               : -player_.base_acceleration(time));
   load.head<3>() += inertial;
   load.tail<3>() += mechanics_.centre_of_mass.cross(inertial);
   return load;
 }
 
 Vector6 PlatformMotion::acceleration(const State& state, const Vector6& load) const noexcept {
-  const Vector6 rest = load - damping_ * state.rate - stiffness_ * state.displacement;
+  Vector6 rest = load - damping_ * state.rate - stiffness_ * state.displacement;
+  if (mechanics_.creep_share > 0) rest += stiffness_ * crept_;
+  if (mechanics_.friction > 0) {
+    const Vector6 stretch =
+        (state.displacement - slider_).cwiseMin(friction_reach_).cwiseMax(-friction_reach_);
+    rest -= friction_spring_.cwiseProduct(stretch);
+  }
   return inverse_inertia_ * rest;
+}
+
+/// Creep goes on and sliders are dragged along, by one step.
+void PlatformMotion::relax() noexcept {
+  const Vector6& now = ring_[static_cast<std::size_t>(newest_) % ring_.size()].displacement;
+  if (mechanics_.creep_share > 0) {
+    crept_ += kStep / mechanics_.creep_time * (mechanics_.creep_share * (now - crept_) - crept_);
+  }
+  if (mechanics_.friction > 0) {
+    slider_ = slider_.cwiseMax(now - friction_reach_).cwiseMin(now + friction_reach_);
+  }
 }
 
 void PlatformMotion::step() noexcept {
@@ -106,18 +130,18 @@ void PlatformMotion::step() noexcept {
   const double time = start_time_ + static_cast<double>(newest_) * kStep;
   const State& s = ring_[static_cast<std::size_t>(newest_) % ring_.size()];
   const Vector6 early = load_;
-  const Vector6 middle = load_at(time + 0.5 * kStep);
-  const Vector6 late = load_at(time + kStep);
   const auto moved = [&s](const Vector6& rate, const Vector6& accel, double dt) {
     return State{s.displacement + dt * rate, s.rate + dt * accel};
   };
   const Vector6 v1 = s.rate;
   const Vector6 a1 = acceleration(s, early);
   const State s2 = moved(v1, a1, 0.5 * kStep);
+  const Vector6 middle = load_at(time + 0.5 * kStep, s2.displacement);
   const Vector6 a2 = acceleration(s2, middle);
   const State s3 = moved(s2.rate, a2, 0.5 * kStep);
   const Vector6 a3 = acceleration(s3, middle);
   const State s4 = moved(s3.rate, a3, kStep);
+  const Vector6 late = load_at(time + kStep, s4.displacement);
   const Vector6 a4 = acceleration(s4, late);
   const State next =
       moved((v1 + 2 * s2.rate + 2 * s3.rate + s4.rate) / 6, (a1 + 2 * a2 + 2 * a3 + a4) / 6, kStep);
@@ -125,13 +149,20 @@ void PlatformMotion::step() noexcept {
   ++newest_;
   ring_[static_cast<std::size_t>(newest_) % ring_.size()] = next;
   oldest_ = std::max(oldest_, newest_ - static_cast<long long>(ring_.size()) + 1);
+  relax();
 }
 
 void PlatformMotion::restart(double time) noexcept {
   newest_ = static_cast<long long>((time - start_time_) / kStep);
   oldest_ = newest_;
-  load_ = load_at(start_time_ + static_cast<double>(newest_) * kStep);
-  const Vector6 displacement = stiffness_.ldlt().solve(load_);
+  const double instant = start_time_ + static_cast<double>(newest_) * kStep;
+  const Eigen::LDLT<Matrix6> springs(stiffness_);
+  Vector6 displacement = springs.solve(load_at(instant, Vector6::Zero()));
+  if (applied_) displacement = springs.solve(load_at(instant, displacement));
+  load_ = load_at(instant, displacement);
+  crept_ = mechanics_.creep_share * displacement;
+  displacement += crept_;
+  slider_ = displacement;
   ring_[static_cast<std::size_t>(newest_) % ring_.size()] = {displacement, Vector6::Zero()};
 }
 
@@ -157,6 +188,15 @@ State PlatformMotion::at(double time) const noexcept {
                        kStep * ((u3 - 2 * u2 + u) * a.rate + (u3 - u2) * b.rate);
   state.rate = (1 - u) * a.rate + u * b.rate;
   return state;
+}
+
+Vector6 PlatformMotion::seen(double time) const noexcept {
+  const Vector6 displacement = at(time).displacement;
+  return applied_ ? Vector6(displacement + applied_->rest_change(time)) : displacement;
+}
+
+Vector6 PlatformMotion::applied_wrench(double time) const noexcept {
+  return applied_ ? applied_->wrench(time, at(time).displacement) : player_.applied_wrench(time);
 }
 
 double PlatformMotion::energy(const State& state) const noexcept {

@@ -3,11 +3,15 @@
 //
 // The springs' law is linear in the displacement (translation and rotation vector), and wrenches
 // are taken about the platform origin at rest; so in equilibrium the applied wrench is K d exactly,
-// whatever the size of the motion.
+// whatever the size of the motion. Creep and friction, where the scenario has them, add
+//   K (d - c) in place of K d, with c' = (share (d - c) - c) / time, and
+//   a spring to a slider on each axis, which is dragged along where that spring would pull more
+//   than the friction holds.
 #pragma once
 
 #include <vector>
 
+#include "host/source/simulator/applied_load.h"
 #include "host/source/simulator/scenario.h"
 #include "host/source/simulator/trajectory.h"
 #include "host/types.h"
@@ -33,8 +37,9 @@ class PlatformMotion {
   static constexpr double kStep =
       2.0e-4;  ///< s; the stiffest mode (about 90 Hz) turns 0.1 rad in it
 
+  /// `load`, borrowed, acts in place of the player's wrench, if there is one.
   PlatformMotion(const Mechanics& mechanics, const TrajectoryPlayer& player, double start_time,
-                 double memory);
+                 double memory, AppliedLoad* load = nullptr);
 
   /// Integrates until `time` is inside the memory. After a gap of more than two seconds (a
   /// suspended machine) the platform restarts in equilibrium, so that the cost of one call is
@@ -44,6 +49,11 @@ class PlatformMotion {
   /// The state at a time within the memory; outside of it, at its nearest end.
   State at(double time) const noexcept;
 
+  /// The displacement there as it looks from the camera: with what no load made.
+  Vector6 seen(double time) const noexcept;
+  /// What the user applies there.
+  Vector6 applied_wrench(double time) const noexcept;
+
   /// Kinetic plus elastic energy, J.
   double energy(const State& state) const noexcept;
 
@@ -52,18 +62,24 @@ class PlatformMotion {
 
  private:
   Vector6 acceleration(const State& state, const Vector6& load) const noexcept;
-  Vector6 load_at(double time) const noexcept;
+  Vector6 load_at(double time, const Vector6& displacement) const noexcept;
+  void relax() noexcept;
   void step() noexcept;
   void restart(double time) noexcept;
 
   Mechanics mechanics_;
   TrajectoryPlayer player_;
+  AppliedLoad* applied_;
   Matrix6 stiffness_, inertia_, damping_, inverse_inertia_;
   std::vector<State> ring_;
   long long newest_ = 0;  ///< step number; its state is ring_[newest_ % size]
   long long oldest_ = 0;
   double start_time_;
-  Vector6 load_;  ///< at the newest step
+  Vector6 load_;                      ///< at the newest step
+  Vector6 crept_ = Vector6::Zero();   ///< c
+  Vector6 slider_ = Vector6::Zero();  ///< where it is held by friction
+  Vector6 friction_spring_;           ///< N/m, N m/rad
+  Vector6 friction_reach_;            ///< m, rad
 };
 
 }  // namespace tagwrench::sim

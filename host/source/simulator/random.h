@@ -81,6 +81,14 @@ enum Stream : std::uint64_t {
   kLostFrames,
   kDeliveryJitter,
   kStaleFrames,
+  kBenchMass,
+  kBenchPoint,
+  kBenchMounting,
+  kBenchAction,
+  kBenchStroke,
+  kBenchHand,
+  kLoadCell,
+  kSixAxis,
   kPrint = 100
 };
 

@@ -45,6 +45,7 @@ Renderer::Renderer(const Scenario& scenario)
       target_(scenario.target),
       seed_(scenario.seed),
       tags_(placed_tags(scenario)),
+      glued_(tags_),
       rays_(scenario.camera),
       disturbances_(scenario.disturbances, scenario.seed, scenario.camera.width_px,
                     static_cast<int>(scenario.target.tags.size())),
@@ -112,6 +113,14 @@ void Renderer::build_layers(const Scenario& scenario) {
   views_.resize(layers_.size());
 }
 
+void Renderer::slip_tag(std::size_t tag, const Eigen::Vector3d& slip) noexcept {
+  const RigidPose moved{rotation_matrix({0, 0, slip.z()}), {slip.x(), slip.y(), 0}};
+  tags_[tag].platform_T_tag = glued_[tag].platform_T_tag * moved;
+  for (Layer& layer : layers_) {
+    if (layer.fine && layer.tag == tag) layer.platform_T_plane = tags_[tag].platform_T_tag;
+  }
+}
+
 void Renderer::build_light() {
   gain_.resize(pixel_count(camera_));
   glare_.resize(pixel_count(camera_));
@@ -161,9 +170,7 @@ void Renderer::render(const PlatformMotion& motion, double middle_time, std::uin
     }
   }
   draw_occluders(middle_time);
-  const auto pose_at = [&](double time) {
-    return platform_pose(target_, motion.at(time).displacement);
-  };
+  const auto pose_at = [&](double time) { return platform_pose(target_, motion.seen(time)); };
   middle_pose_ = pose_at(middle_time);
   smear_px_ = farthest_px(pose_at(middle_time - 0.5 * exposure_.time),
                           pose_at(middle_time + 0.5 * exposure_.time));
@@ -219,7 +226,7 @@ void Renderer::view_band(const PlatformMotion& motion, double middle_time, int f
                          int last_row) noexcept {
   const double time = row_time(0.5 * (first_row + last_row - 1), middle_time);
   const auto pose_at = [&](double share) {
-    return platform_pose(target_, motion.at(time + share * exposure_.time).displacement);
+    return platform_pose(target_, motion.seen(time + share * exposure_.time));
   };
   instant_count_ = instants_for(pose_at(-0.5), pose_at(0), pose_at(0.5));
   for (int i = 0; i < instant_count_; ++i) {

@@ -42,7 +42,10 @@ class Renderer {
   void render(const PlatformMotion& motion, double middle_time, std::uint64_t sequence,
               std::uint8_t* pixels) noexcept;
 
+  /// Where the tags sit: as glued, or where they have slipped to.
   const std::vector<PlacedTag>& tags() const noexcept { return tags_; }
+  /// A tag's paper sits so far (m along its x and y, rad about its z) from where it was glued.
+  void slip_tag(std::size_t tag, const Eigen::Vector3d& slip) noexcept;
 
   /// Of the frame last rendered: what disturbed it, ...
   const Happening& happening() const noexcept { return happening_; }
@@ -129,6 +132,7 @@ class Renderer {
   Target target_;
   std::uint64_t seed_;
   std::vector<PlacedTag> tags_;
+  std::vector<PlacedTag> glued_;
   RayTable rays_;
   std::vector<Layer> layers_;
   std::vector<View> views_;

@@ -157,6 +157,8 @@ std::string problem(const Scenario& s) {
        outside({{"camera.fps", s.camera.frame_rate}}, 0.1, 2000),
        delivery_problem(s),
        outside({{"mechanics.damping_ratio", m.damping_ratio},
+                {"mechanics.creep_share", m.creep_share},
+                {"mechanics.friction", m.friction},
                 {"optics.vignetting", s.optics.vignetting},
                 {"light.unevenness", s.light.unevenness},
                 {"light.ambient", s.light.ambient},
@@ -183,7 +185,10 @@ std::string problem(const Scenario& s) {
                 {"target.rotation_error_rad", s.target.rotation_error}},
                0, 0.5),
        target_problem(s.target),
-       problem(s.disturbances, static_cast<int>(s.target.tags.size()))});
+       outside({{"mechanics.creep_s", m.creep_time}}, 0.1, 1e6),
+       outside({{"mechanics.friction_travel", m.friction_travel}}, 1e-3, 1),
+       problem(s.disturbances, static_cast<int>(s.target.tags.size())),
+       problem(s.bench, static_cast<int>(s.target.tags.size()))});
   if (found.empty() && window > true_period(s)) {
     found = "exposure: time and readout together are longer than a frame period of camera.fps";
   }

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "host/source/simulator/bench_settings.h"
 #include "host/source/simulator/disturbances.h"
 
 namespace tagwrench::sim {
@@ -38,6 +39,18 @@ struct Mechanics {
 
   std::array<double, 6> range{0.9,   0.9,   2.5,
                               0.016, 0.016, 0.009};  ///< usable range, N and N m, told to the user
+
+  // What real springs and glue add to Hooke's law; none of it by default.
+
+  /// Under a constant load the displacement grows by this share of what it was at first, as 1 -
+  /// exp(-t / creep_time).
+  double creep_share = 0;
+  double creep_time = 60;  ///< s
+  /// Dry friction beside the springs: on each axis up to this share of the range, which gives a
+  /// loop of twice that width between going and coming. It is reached after friction_travel of the
+  /// range's displacement; until then it is a spring (Jenkins element).
+  double friction = 0;
+  double friction_travel = 0.1;
 };
 
 struct Camera {
@@ -180,6 +193,7 @@ struct Scenario {
   Noise noise;
   Compression compression;
   Disturbances disturbances;
+  BenchSettings bench;  ///< of use where someone calibrates the simulated sensor
 };
 
 /// Time between the exposures of two frames, s.

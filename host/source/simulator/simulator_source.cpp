@@ -49,14 +49,16 @@ UniqueFd make_timer() {
 
 }  // namespace
 
-SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live, sim::LedLight* led)
+SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live, sim::LedLight* led,
+                                 sim::AppliedLoad* load)
     : scenario_(checked(scenario)),
       disturbances_(scenario.disturbances, scenario.seed, scenario.camera.width_px,
                     static_cast<int>(scenario.target.tags.size())),
-      player_(scenario.trajectory, scenario.seed),
+      load_(load),
       renderer_(scenario),
-      motion_(scenario.mechanics, player_, -renderer_.half_window() - kWarmUp,
-              2 * longest_half_window(scenario) + 4 * sim::PlatformMotion::kStep),
+      motion_(scenario.mechanics, sim::TrajectoryPlayer(scenario.trajectory, scenario.seed),
+              -renderer_.half_window() - kWarmUp,
+              2 * longest_half_window(scenario) + 4 * sim::PlatformMotion::kStep, load),
       jpeg_(scenario.camera.width_px, scenario.camera.height_px, scenario.compression.jpeg_quality),
       pixels_(static_cast<std::size_t>(scenario.camera.width_px) *
               static_cast<std::size_t>(scenario.camera.height_px)) {
@@ -162,24 +164,32 @@ ReadStatus SimulatorSource::read(Frame& frame) noexcept {
   return ReadStatus::frame;
 }
 
+void SimulatorSource::let_tags_slip(double time) noexcept {
+  for (std::size_t tag = 0; tag < truth_.tags.size(); ++tag) {
+    renderer_.slip_tag(tag, load_->slip(static_cast<int>(tag), time));
+    truth_.tags[tag] = renderer_.tags()[tag];
+  }
+}
+
 void SimulatorSource::render(std::uint64_t sequence) noexcept {
   truth_.sequence = sequence;
   truth_.stale = stale(sequence);
   if (truth_.stale) return;
   truth_.time = period_ * static_cast<std::int64_t>(sequence);
   const double time = std::chrono::duration<double>(truth_.time).count();
+  if (load_) let_tags_slip(time);
   motion_.advance_to(time + renderer_.half_window());
   renderer_.render(motion_, time, sequence, pixels_.data());
   rendered_ = true;
   jpeg_.apply(pixels_.data());
-  truth_.displacement = motion_.at(time).displacement;
+  truth_.displacement = motion_.seen(time);
   truth_.exposed_displacement.setZero();
   for (int i = 0; i < kExposureSteps; ++i) {
     const double share = (i + 0.5) / kExposureSteps - 0.5;
     truth_.exposed_displacement +=
-        motion_.at(time + share * renderer_.exposure()).displacement / kExposureSteps;
+        motion_.seen(time + share * renderer_.exposure()) / kExposureSteps;
   }
-  truth_.wrench = player_.applied_wrench(time);
+  truth_.wrench = motion_.applied_wrench(time);
   truth_.camera_T_platform = sim::platform_pose(scenario_.target, truth_.displacement);
   truth_.disturbances = renderer_.happening().kinds;
   std::copy(renderer_.visible().begin(), renderer_.visible().end(), truth_.visible.begin());

@@ -8,6 +8,7 @@
 #include "host/os/unique_fd.h"
 #include "host/source/camera_light.h"
 #include "host/source/frame_source.h"
+#include "host/source/simulator/applied_load.h"
 #include "host/source/simulator/image_file.h"
 #include "host/source/simulator/led_light.h"
 #include "host/source/simulator/mechanics.h"
@@ -22,7 +23,7 @@ struct Truth {
   std::uint64_t sequence = 0;
   Duration time{};                         ///< since the simulation began
   bool stale = false;                      ///< shows the picture before it, and so does the rest
-  Vector6 displacement = Vector6::Zero();  ///< of the platform from rest, m and rad
+  Vector6 displacement = Vector6::Zero();  ///< of the platform from rest, as it looks, m and rad
   Vector6 exposed_displacement =
       Vector6::Zero();  ///< mean of displacement over that exposure, which is what the picture
                         ///< shows; a ringing platform may be 20 um away from it in the middle
@@ -30,7 +31,7 @@ struct Truth {
   RigidPose camera_T_platform;       ///< at that instant
   Eigen::Vector3d rest_position =
       Eigen::Vector3d::Zero();  ///< of the platform in the camera frame, m
-  std::vector<PlacedTag> tags;  ///< as glued
+  std::vector<PlacedTag> tags;  ///< as glued, or where they have slipped to
   std::uint32_t disturbances =
       0;                        ///< bit() of each DisturbanceKind that is there; the motion is none
   std::vector<double> visible;  ///< per tag, share of the black square that can be seen, 0..1
@@ -50,12 +51,16 @@ class SimulatorSource final : public FrameSource, private CameraLight {
   static constexpr double kMostGain = 8;
 
   /// Throws ConfigError if the scenario cannot be simulated. `led`, borrowed, lights the scene in
-  /// place of the scenario's even light, if there is one.
-  SimulatorSource(const sim::Scenario& scenario, bool live, sim::LedLight* led = nullptr);
+  /// place of the scenario's even light, `load`, borrowed, loads the platform in place of the
+  /// scenario's trajectory, if there is one.
+  SimulatorSource(const sim::Scenario& scenario, bool live, sim::LedLight* led = nullptr,
+                  sim::AppliedLoad* load = nullptr);
 
   const SourceFormat& format() const noexcept override { return format_; }
   int poll_fd() const noexcept override { return timer_ ? timer_.get() : -1; }
   ReadStatus read(Frame& frame) noexcept override;
+  /// The rendered picture; the scenario's JPEG, if it asks for one, is gone through already.
+  RawFrame raw() const noexcept override { return {fourcc("GREY"), pixels_, format_.width}; }
   CameraLight* camera_light() noexcept override { return this; }
 
   const sim::Truth& truth() const noexcept { return truth_; }
@@ -74,6 +79,7 @@ class SimulatorSource final : public FrameSource, private CameraLight {
   std::uint64_t newest_delivered(TimePoint now) const noexcept;
   void arm() const noexcept;
   bool stale(std::uint64_t sequence) const noexcept;
+  void let_tags_slip(double time) noexcept;
   void render(std::uint64_t sequence) noexcept;
 
   sim::Scenario scenario_;
@@ -84,7 +90,7 @@ class SimulatorSource final : public FrameSource, private CameraLight {
   std::uint64_t next_sequence_ = 0;
   std::uint32_t lost_ = 0;  ///< frames since the last one that was delivered
   sim::DisturbancePlayer disturbances_;
-  sim::TrajectoryPlayer player_;
+  sim::AppliedLoad* load_;
   sim::Renderer renderer_;
   sim::PlatformMotion motion_;
   sim::JpegRoundTrip jpeg_;

@@ -219,6 +219,46 @@ INSTANTIATE_TEST_SUITE_P(
                 "sensor.yaml:8: rest.frames:", "1 to 1000"}),
     [](const auto& param) { return std::string(param.param.name); });
 
+TEST(SensorConfig, ReadsZeroAndReference) {
+  const SensorConfig plain = parse_sensor(kGood, "sensor.yaml");
+  EXPECT_TRUE(plain.zero.follow);
+  EXPECT_TRUE(plain.zero.set.isZero());
+  EXPECT_FALSE(plain.reference);
+  const SensorConfig s = parse_sensor(
+      std::string(kGood) +
+          "  zero_n: [0.01, -0.02, 0.03]\n  zero_nm: [0.001, 0, 0]\n  zero_date: '2026-05-02'\n"
+          "  zero_tracking: false\n  zero_band_percent: 1\n  zero_rate_percent_per_s: 0.05\n"
+          "  reference: {channel: 2, point_mm: [1, 2, 3], direction: [0, 0, -2]}\n",
+      "sensor.yaml");
+  EXPECT_FALSE(s.zero.follow);
+  EXPECT_DOUBLE_EQ(s.zero.set[2], 0.03);   // N
+  EXPECT_DOUBLE_EQ(s.zero.set[3], 0.001);  // N m
+  EXPECT_EQ(s.zero.date, "2026-05-02");
+  EXPECT_DOUBLE_EQ(s.zero.band, 0.01);
+  EXPECT_DOUBLE_EQ(s.zero.rate, 5e-4);  // of the range a second
+  ASSERT_TRUE(s.reference);
+  EXPECT_EQ(s.reference->channel, 2);
+  EXPECT_DOUBLE_EQ(s.reference->point.y(), 2e-3);  // m
+  EXPECT_EQ(s.reference->direction, Eigen::Vector3d(0, 0, -1));
+}
+
+TEST(SensorConfig, RefusesAZeroOrAReferenceThatCannotBe) {
+  const auto says = [](const std::string& lines, const std::string& part) {
+    const std::string said = complaint(std::string(kGood) + lines);
+    EXPECT_NE(said.find(part), std::string::npos) << said;
+  };
+  says("  zero_n: [0, 0, 0]\n", "wrench.zero_n: zero_n and zero_nm belong together");
+  says("  zero_n: [0, 0]\n  zero_nm: [0, 0, 0]\n", "wrench.zero_n");
+  says("  zero_n: [0, 0, .nan]\n  zero_nm: [0, 0, 0]\n", "wrench.zero_n");
+  says("  zero_date: yesterday\n", "'yesterday' is not YYYY-MM-DD");
+  says("  zero_tracking: 2\n", "wrench.zero_tracking");
+  says("  zero_band_percent: 11\n", "wrench.zero_band_percent");
+  says("  zero_rate_percent_per_s: -1\n", "wrench.zero_rate_percent_per_s");
+  says("  reference: {channel: 4, point_mm: [0, 0, 0], direction: [0, 0, 1]}\n",
+       "wrench.reference.channel");
+  says("  reference: {channel: 0, point_mm: [0, 0, 0], direction: [0, 0, 0]}\n", "has no length");
+}
+
 TEST(SensorConfig, RefusesALeftHandedMounting) {
   const std::string line =
       complaint(std::string(kGood) + "mounting: {right: +x, toward_user: +y, down: -z}\n");

@@ -12,6 +12,7 @@ inline tagwrench::Sample ok_sample() {
   s.sequence = 41;
   s.capture_time = tagwrench::TimePoint(std::chrono::nanoseconds(123456789));
   s.latency_origin = s.capture_time;
+  s.output_time = s.latency_origin + std::chrono::microseconds(812);
   s.status = tagwrench::Status::ok;
   s.displacement << 1e-6, -2e-6, 0.5, 0.125, 0, -1;
   s.displacement_sigma << 1e-7, 2e-7, 3e-7, 4e-5, 5e-5, 6e-5;

@@ -61,7 +61,7 @@ class Text : public ::testing::Test {
 };
 
 TEST_F(Text, JsonLineHasTheKeysInOrder) {
-  EXPECT_EQ(json_line(buffer_, test::ok_sample(), 812),
+  EXPECT_EQ(json_line(buffer_, test::ok_sample()),
             "{\"seq\":41,\"t_ns\":123456789,\"status\":\"ok\","
             "\"d_m\":[1e-06,-2e-06,0.5],\"d_rad\":[0.125,0,-1],"
             "\"d_sigma\":[1e-07,2e-07,3e-07,4e-05,5e-05,6e-05],"
@@ -71,10 +71,10 @@ TEST_F(Text, JsonLineHasTheKeysInOrder) {
 }
 
 TEST_F(Text, CsvLineHasTheColumnsOfTheHeader) {
-  EXPECT_EQ(csv_line(buffer_, test::ok_sample(), 812),
+  EXPECT_EQ(csv_line(buffer_, test::ok_sample()),
             "41,123456789,ok,1e-06,-2e-06,0.5,0.125,0,-1,1e-07,2e-07,3e-07,4e-05,5e-05,6e-05,"
             "0.1,-0.25,3,0.001,-0.002,0,0.01,0.02,0.03,0.0001,0.0002,0.0003,2,812\n");
-  const std::string_view row = csv_line(buffer_, test::ok_sample(), 812);
+  const std::string_view row = csv_line(buffer_, test::ok_sample());
   EXPECT_EQ(std::count(row.begin(), row.end(), ','),
             std::count(kCsvHeader.begin(), kCsvHeader.end(), ','));
 }
@@ -82,7 +82,7 @@ TEST_F(Text, CsvLineHasTheColumnsOfTheHeader) {
 TEST_F(Text, NumbersReadBackToTheSameBits) {
   Sample s = test::ok_sample();
   s.wrench << 1.0 / 3, -1e-300, 6.02214076e23, 0.1 + 0.2, -2.0 / 7, 5e-324;
-  const auto json = nlohmann::json::parse(json_line(buffer_, s, 0));
+  const auto json = nlohmann::json::parse(json_line(buffer_, s));
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(json["f_n"][static_cast<std::size_t>(i)].get<double>(), s.wrench[i]);
     EXPECT_EQ(json["m_nm"][static_cast<std::size_t>(i)].get<double>(), s.wrench[i + 3]);
@@ -98,16 +98,16 @@ TEST_F(Text, TheLongestSampleFits) {
   s.sequence = std::numeric_limits<std::uint64_t>::max();
   s.dropped = std::numeric_limits<std::uint32_t>::max();
   s.capture_time = TimePoint::min();
-  const auto latency = std::numeric_limits<std::int64_t>::min();
-  EXPECT_EQ(json_line(buffer_, s, latency).back(), '\n');
-  EXPECT_EQ(csv_line(buffer_, s, latency).back(), '\n');
+  s.output_time = TimePoint::max();
+  EXPECT_EQ(json_line(buffer_, s).back(), '\n');
+  EXPECT_EQ(csv_line(buffer_, s).back(), '\n');
 }
 
 TEST_F(Text, AStatusWithoutNumbersHasZerosEverywhere) {
   for (const Status status : {Status::acquiring, Status::lost, Status::doubtful}) {
     Sample s = test::ok_sample();
     s.status = status;
-    const auto json = nlohmann::json::parse(json_line(buffer_, s, 0));
+    const auto json = nlohmann::json::parse(json_line(buffer_, s));
     EXPECT_EQ(json["status"], name(status));
     for (const char* key : {"d_m", "d_rad", "d_sigma", "f_n", "m_nm", "w_sigma"}) {
       for (const auto& number : json[key]) EXPECT_EQ(number.get<double>(), 0) << key;
@@ -118,13 +118,15 @@ TEST_F(Text, AStatusWithoutNumbersHasZerosEverywhere) {
 TEST_F(Text, NanIsDoubtfulAndStaysJson) {
   Sample s = test::ok_sample();
   s.displacement_sigma[2] = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(nlohmann::json::parse(json_line(buffer_, s, 0))["status"], "doubtful");
+  EXPECT_EQ(nlohmann::json::parse(json_line(buffer_, s))["status"], "doubtful");
 }
 
 TEST_F(Text, LatencyCountsFromItsOriginAndIsNeverNegative) {
-  const Sample s = test::ok_sample();
-  EXPECT_EQ(latency_us(s, s.latency_origin + std::chrono::microseconds(812)), 812);
-  EXPECT_EQ(latency_us(s, s.latency_origin - std::chrono::microseconds(5)), 0);
+  Sample s = test::ok_sample();
+  s.output_time = s.latency_origin + std::chrono::microseconds(812);
+  EXPECT_EQ(latency_us(s), 812);
+  s.output_time = s.latency_origin - std::chrono::microseconds(5);
+  EXPECT_EQ(latency_us(s), 0);
 }
 
 TEST_F(Text, AFileIsCreatedAfresh) {

@@ -202,5 +202,63 @@ TEST(Mechanics, AfterALongGapThePlatformRestartsInEquilibrium) {
   EXPECT_LT((motion.at(1e7).displacement - expected).norm(), 1e-6 * expected.norm());
 }
 
+/// A load that is a function of time on one axis.
+class OnAxis final : public AppliedLoad {
+ public:
+  OnAxis(int axis, double (*size)(double)) : axis_(axis), size_(size) {}
+  Vector6 wrench(double time, const Vector6&) noexcept override {
+    return size_(time) * Vector6::Unit(axis_);
+  }
+
+ private:
+  int axis_;
+  double (*size_)(double);
+};
+
+TEST(Mechanics, CreepGrowsByItsShareAtItsPaceUnderAConstantLoadAndGoesBack) {
+  Mechanics mechanics;
+  mechanics.creep_share = 0.05;
+  mechanics.creep_time = 4;
+  // 1.4 N from 0.1 s to 20.1 s.
+  OnAxis load(2, [](double time) { return time > 0.1 && time < 20.1 ? 1.4 : 0.0; });
+  PlatformMotion motion(mechanics, TrajectoryPlayer(at_rest(), 1), 0, kRunMemory_s, &load);
+  const double elastic = 1.4 / 2800;
+  constexpr double kTolerance_m = 0.1e-6;  // of 25 um of creep
+  double at_release = 0;
+  for (double t = 0.5; t < 30; t += 0.5) {
+    motion.advance_to(t);
+    const double z = motion.at(t).displacement[2];
+    if (t >= 2 && t < 20.1) {  // the ringing is over
+      const double crept = at_release = 0.05 * elastic * (1 - std::exp(-(t - 0.1) / 4));
+      EXPECT_NEAR(z, elastic + crept, kTolerance_m) << t;
+    } else if (t > 22) {
+      EXPECT_NEAR(z, at_release * std::exp(-(t - 20.1) / 4), kTolerance_m) << t;
+    }
+  }
+}
+
+TEST(Mechanics, FrictionHoldsBackComingAndGoing) {
+  Mechanics mechanics;
+  mechanics.friction = 0.01;
+  // A slow triangle between +-1.25 N, half of the range.
+  OnAxis load(2, [](double time) {
+    const double phase = std::fmod(time, 20.0);
+    return phase < 10 ? -1.25 + 0.25 * phase : 3.75 - 0.25 * phase;
+  });
+  PlatformMotion motion(mechanics, TrajectoryPlayer(at_rest(), 1), 0, kRunMemory_s, &load);
+  const double held = 0.01 * mechanics.range[2];  // N
+  for (double t = 0.5; t < 45; t += 0.5) {
+    motion.advance_to(t);
+    const double phase = std::fmod(t, 20.0);
+    const double force = load.wrench(t, {})[2];
+    const double sprung = 2800 * motion.at(t).displacement[2];
+    EXPECT_LT(std::abs(sprung - force), held * 1.02) << t;
+    // In the middle of each stroke all of the friction is there: 1.25 N are five times its travel.
+    if (t > 20 && std::abs(force) < 0.5) {
+      EXPECT_NEAR(sprung - force, phase < 10 ? -held : held, 0.02 * held) << t;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tagwrench::sim

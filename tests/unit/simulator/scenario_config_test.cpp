@@ -99,6 +99,55 @@ TEST(ScenarioConfig, ImpossibleDisturbancesNameFileLineAndKey) {
   EXPECT_NE(complaint(head + "  lost_frames: {share: 0.9}\n"), "accepted");
 }
 
+TEST(ScenarioConfig, TheBenchIsReadAndCheckedSectionBySection) {
+  const sim::Scenario s = parse_scenario(
+      "mechanics: {creep_share: 0.02, creep_s: 30, friction: 0.01, friction_travel: 0.2}\n"
+      "bench:\n"
+      "  gravity: 9.81\n"
+      "  errors: {mass_percent: 0.5, point_mm: 0.3, gravity_rad: 0.01}\n"
+      "  times: {swing_decay_s: 2, string_mm: 200}\n"
+      "  faults: {wrong_mass: 3, wrong_mass_factor: 1.5, bump: 4, slip: 5, slip_tag: 1,\n"
+      "           slip_change: [1.0e-4, 0, 0.02], drift_per_hour: [1.0e-6, 0, 0, 0, 0, 0]}\n"
+      "  load_cell: {noise_mn: 1, lag_ms: 20, wrong_sign: true, silent_from_s: 5}\n"
+      "  six_axis: {ideal: true, origin_mm: [0, 0, -60], clock_ppm: 50}\n",
+      "s.yaml");
+  const sim::BenchSettings& bench = s.bench;
+  EXPECT_EQ(s.mechanics.creep_share, 0.02);
+  EXPECT_EQ(s.mechanics.friction_travel, 0.2);
+  EXPECT_FALSE(bench.perfect);
+  EXPECT_EQ(bench.gravity, 9.81);
+  EXPECT_DOUBLE_EQ(bench.errors.mass, 0.005);
+  EXPECT_DOUBLE_EQ(bench.errors.point, 0.3e-3);
+  EXPECT_DOUBLE_EQ(bench.times.string_length, 0.2);
+  EXPECT_EQ(bench.faults.wrong_mass, 3);
+  EXPECT_EQ(bench.faults.slip_tag, 1);
+  EXPECT_EQ(bench.faults.slip_change, Eigen::Vector3d(1e-4, 0, 0.02));
+  EXPECT_EQ(bench.faults.drift_per_hour[0], 1e-6);
+  EXPECT_DOUBLE_EQ(bench.load_cell.noise, 1e-3);
+  EXPECT_TRUE(bench.load_cell.faults.wrong_sign);
+  EXPECT_EQ(bench.load_cell.faults.silent_from, 5);
+  EXPECT_TRUE(bench.six_axis.ideal);
+  EXPECT_DOUBLE_EQ(bench.six_axis.origin.z(), -0.06);
+  EXPECT_EQ(bench.six_axis.faults.clock_ppm, 50);
+  EXPECT_EQ(parse_scenario("bench: {perfect: true}\n", "s.yaml").bench.perfect, true);
+
+  const auto begins = [](const std::string& bench_lines, const std::string& begin) {
+    const std::string text = complaint("seed: 1\nbench:\n" + bench_lines);
+    EXPECT_EQ(text.rfind("s.yaml:3: bench." + begin, 0), 0U) << text;
+  };
+  begins("  gravity: 0\n", "gravity");
+  begins("  errors: {mass_percent: -1}\n", "errors: bench.errors: mass_percent must lie");
+  begins("  errors: {masses: 1}\n", "errors.masses");
+  begins("  times: {load_s: 0}\n", "times: ");
+  begins("  faults: {slip_tag: 2}\n", "faults: ");
+  begins("  faults: {bump: -1}\n", "faults.bump");
+  begins("  load_cell: {rate_hz: 0}\n", "load_cell: ");
+  begins("  load_cell: {silent_from_s: 5, silent_to_s: 4}\n", "load_cell: ");
+  begins("  six_axis: {counts_per_unit: [1, 2, 3, 4, 5, 0]}\n", "six_axis: ");
+  begins("  six_axis: {range: [1, 2]}\n", "six_axis.range");
+  EXPECT_NE(complaint("mechanics: {creep_share: 2}\n"), "accepted");
+}
+
 TEST(ScenarioConfig, OneTagLiesOnASlopeThroughTheOrigin) {
   const sim::Scenario s = parse_scenario("target: {tags: [{id: 7}]}\n", "s.yaml");
   ASSERT_EQ(s.target.tags.size(), 1U);

@@ -1,0 +1,41 @@
+// `tagwrench analyze`: what data with a reference say about an instrument, on what it has not seen.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "host/study/analysis.h"
+#include "host/study/csv_mapping.h"
+
+namespace tagwrench {
+
+class AnalyzeCommand {
+ public:
+  explicit AnalyzeCommand(CLI::App& app);
+  bool parsed() const { return verb_->parsed(); }
+  int run() const;
+
+ private:
+  void add_mapping_options();
+  void add_analysis_options();
+  study::CsvMapping mapping() const;
+
+  CLI::App* verb_;
+  std::vector<std::filesystem::path> files_;
+  std::string json_;
+  bool series_ = false;
+  study::AnalysisOptions options_;
+
+  CLI::Option* readings_given_ = nullptr;
+  study::CsvMapping mapping_;
+  std::string separator_ = "auto";
+  std::string time_unit_ = "s";
+  std::string reference_time_unit_ = "s";
+  std::vector<std::string> features_;
+  std::vector<std::string> loads_;
+  std::string data_;  ///< where what was mapped goes as a data file
+};
+
+}  // namespace tagwrench

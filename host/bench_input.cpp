@@ -1,0 +1,27 @@
+#include "host/bench_input.h"
+
+#include "host/config/scenario_config.h"
+#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
+
+namespace tagwrench {
+
+BenchInput open_at_bench(const InputOptions& options) {
+  const Spec spec = split_spec(options.source);
+  BenchInput at;
+  if (spec.kind != "sim") {
+    at.input = open_input(options);
+    return at;
+  }
+  const sim::Scenario scenario =
+      spec.argument.empty() ? sim::Scenario{} : load_scenario(spec.argument);
+  at.bench = std::make_unique<sim::Bench>(scenario.bench, scenario.seed);
+  at.input.sensor = options.sensor.empty()
+                        ? parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor")
+                        : load_sensor(options.sensor, options.calibration);
+  at.input.source =
+      std::make_unique<SimulatorSource>(scenario, /*live=*/false, nullptr, at.bench.get());
+  return at;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,517 @@
+#include "host/calibrate/wrench_guide.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/calibrate/wrench_load.h"
+#include "host/calibrate/wrench_reference_check.h"
+
+namespace tagwrench {
+namespace {
+
+using Line = GuideLine::Kind;
+
+constexpr double kMoved = 0.02;  // of the range: more than this is somebody's doing
+constexpr double kBump = 0.01;   // of the range: a rest may differ by so much from the one before
+constexpr double kOtherClock = 1.0;  // s between what a reading says and when it came
+constexpr double kSilence = 1.0;     // s
+constexpr double kTimeToAct = 8.0;   // s that a person has before it is said, or taken as done
+constexpr double kKeep = 3.0;        // s of readings
+constexpr double kTouch = 0.1;       // of a push's force: it has begun
+constexpr double kFree = 0.05;       // of it: nobody pushes
+constexpr double kBegun = 0.05;      // of the range: a movement has begun
+constexpr double kExcited = 0.1;     // of the range, standard deviation over a movement
+constexpr double kLongest = 1.5;     // times its seconds: a movement ends, whatever it has shown
+constexpr int kMostBumps = 6;        // unattended
+constexpr double kOwnWeight = 0.03;  // of the range: less does not tell how the sensor lies
+
+/// Part of `felt` along `expected`, and the cosine between them.
+struct Likeness {
+  double ratio = 0;
+  double cosine = 0;
+};
+Likeness likeness(const Vector6& felt, const Vector6& expected) {
+  const double dot = felt.dot(expected);
+  const double norms = felt.norm() * expected.norm();
+  return {dot / expected.squaredNorm(), norms > 0 ? dot / norms : 0};
+}
+
+std::string axes_text(const Vector6& scaled) {
+  std::string out;
+  for (int i = 0; i < 6; ++i) {
+    if (std::abs(scaled[i]) > 0.3 * scaled.cwiseAbs().maxCoeff())
+      out += fmt::format("{}{} {:+.0f} %", out.empty() ? "" : ", ",
+                         kWrenchAxes[static_cast<std::size_t>(i)], 100 * scaled[i]);
+  }
+  return out;
+}
+
+std::string worst_text(const Vector6& scaled) {
+  int axis = 0;
+  const double worst = scaled.cwiseAbs().maxCoeff(&axis);
+  return fmt::format("{:.1f} % of full load in {}", 100 * worst,
+                     kWrenchAxes[static_cast<std::size_t>(axis)]);
+}
+
+}  // namespace
+
+WrenchGuide::WrenchGuide(const WrenchPlan& plan, const GuideOptions& options)
+    : plan_(plan),
+      options_(options),
+      hold_({.seconds = options.hold, .stiffness = options.stiffness, .range = options.range}),
+      coverage_(options.range) {
+  for (std::size_t i = 0; i < plan.steps.size(); ++i) todo_.push_back(static_cast<int>(i));
+  ask();
+}
+
+void WrenchGuide::say(GuideLine::Kind kind, std::string text) {
+  lines_.push_back({kind, std::move(text)});
+}
+
+bool WrenchGuide::next(GuideLine& line) {
+  if (lines_.empty()) return false;
+  line = std::move(lines_.front());
+  lines_.pop_front();
+  return true;
+}
+
+/// Says what is to be done now, to the person and to whoever watches asks().
+void WrenchGuide::ask() {
+  phase_ = Phase::waiting;
+  moved_ = let_go_ = repeated_ = false;
+  asked_at_.reset();
+  asked_time_.reset();
+  complaint_.clear();
+  taking_ = {};
+  reminded_ = now_;
+  if (todo_.empty()) return;
+  ++asks_;
+  const bool turn = step().mounting != mounting_;
+  mounting_ = step().mounting;
+  say(Line::task, instruction(plan_, todo_.front(), turn));
+}
+
+/// The present step once more, from the beginning.
+void WrenchGuide::again(const std::string& why) {
+  ++attempts_;
+  if (options_.attempts > 0 && attempts_ >= options_.attempts) {
+    leave_out(why);
+    return;
+  }
+  say(Line::warning, fmt::format("{}: {}; once more", describe(plan_, todo_.front()), why));
+  ask();
+  repeated_ = true;
+}
+
+void WrenchGuide::leave_out(const std::string& why) {
+  say(Line::warning, fmt::format("{} is left out: {}", describe(plan_, todo_.front()), why));
+  skip();
+}
+
+/// Said once; an unattended run that `counts` it tries again.
+void WrenchGuide::complain(const std::string& why, bool counts) {
+  if (why == complaint_) return;
+  if (counts && options_.attempts > 0) {
+    again(why);
+    return;
+  }
+  complaint_ = why;
+  say(Line::warning, fmt::format("{}: {}", describe(plan_, todo_.front()), why));
+}
+
+/// Another run's clock may have been another one: what it recorded comes before all of this one.
+void WrenchGuide::put_before(double time) {
+  constexpr double kBetween = 60;
+  double latest = 0;
+  for (const StepRecord& record : records_) latest = std::max(latest, record.frames.back().time);
+  const double shift = std::min(0.0, time - kBetween - latest);
+  for (StepRecord& record : records_) {
+    for (TrackedFrame& frame : record.frames) frame.time += shift;
+    for (ReferenceSample& sample : record.readings) sample.time += shift;
+  }
+}
+
+void WrenchGuide::frame(double time, const Track& track) {
+  if (resumed_) put_before(time);
+  resumed_ = false;
+  now_ = time;
+  if (!first_frame_) first_frame_ = time;
+  if (done()) return;
+  if (!asked_time_) asked_time_ = reminded_ = time;
+  while (!readings_.empty() && readings_.front().time < time - kKeep - options_.hold)
+    readings_.pop_front();
+  if (track.status != Status::ok) {
+    hold_.clear();
+    moved_ = true;  // what is not seen may have moved
+    watch_patience(time);
+    return;
+  }
+  hold_.add({time, track.displacement, track.covariance});
+  if (!asked_at_) asked_at_ = track.displacement;
+  switch (step().kind) {
+    case StepKind::rest:
+    case StepKind::mass:
+      watch_hold();
+      break;
+    case StepKind::push:
+      watch_push(time);
+      break;
+    case StepKind::six_axis:
+      watch_movement(time);
+      break;
+  }
+  if (!done()) watch_patience(time);
+}
+
+void WrenchGuide::reading(const ReferenceSample& sample) {
+  if (failed() || !first_frame_) return;
+  if (std::abs(sample.time - now_) > kOtherClock) {
+    // They may have waited while the camera started.
+    if (now_ - *first_frame_ < 2 * kOtherClock && sample.time < *first_frame_) return;
+    failure_ = fmt::format(
+        "the reference's times are {:.1f} s away from the frames': it is on another clock; give "
+        "both the same, or restart the reference",
+        sample.time - now_);
+    return;
+  }
+  last_reading_ = sample;
+  readings_.push_back(sample);
+  if (phase_ == Phase::taking) taking_.readings.push_back(sample);
+}
+
+// ---- Rests and masses ----
+
+/// Whether anything has happened to the platform since it was asked for.
+bool WrenchGuide::has_moved(const Hold& hold) {
+  const Vector6 way = hold_.scaled(hold_.frames().back().displacement - *asked_at_);
+  moved_ = moved_ || way.cwiseAbs().maxCoeff() > kMoved || hold.unrest > 3;
+  return moved_ || (repeated_ && now_ - *asked_time_ > kTimeToAct);  // it may be right as it hangs
+}
+
+void WrenchGuide::watch_hold() {
+  const Hold hold = hold_.look();
+  const bool of_cell = plan_.reference != ReferenceKind::masses;
+  if (of_cell && !(last_reading_ && now_ - last_reading_->time < kSilence)) {
+    if (now_ - *asked_time_ > 2 * kSilence)
+      complain("nothing comes from the reference; look at its plug and its power", false);
+    return;
+  }
+  const bool moved = has_moved(hold);
+  if (!hold.steady) return;
+  if (step().kind == StepKind::mass) {
+    if (moved) watch_mass(hold);
+    return;
+  }
+  // The first rest of a mounting comes after the sensor was turned, but for the very first one.
+  if (last_rest() != nullptr || moved || asks_ == 1) watch_rest(hold);
+}
+
+void WrenchGuide::watch_rest(const Hold& hold) {
+  const StepRecord* before = last_rest();
+  if (before == nullptr) {
+    if (check_mounting(hold)) accept_hold();
+    return;
+  }
+  const Vector6 by = hold_.scaled(hold.mean - mean_of(*before).displacement);
+  const StepRecord& latest = records_.back();
+  if (step_of(latest).kind == StepKind::mass) {
+    const KnownLoad load = expected_load(plan_, latest.step);
+    const Likeness mass = likeness(by, load.wrench.cwiseQuotient(options_.range));
+    if (mass.cosine > 0.8 && mass.ratio > 0.3) {
+      if (now_ - *asked_time_ < kTimeToAct) return;
+      complain("the weight still hangs there; take it off", false);
+      return;
+    }
+  }
+  if (by.cwiseAbs().maxCoeff() > kBump)
+    bumped(by);
+  else
+    accept_hold();
+}
+
+/// The platform's own weight tells how the sensor lies, once it is turned from how it lay first.
+bool WrenchGuide::check_mounting(const Hold& hold) {
+  if (records_.empty() || step_of(records_.front()).kind != StepKind::rest) return true;
+  const auto gravity = [&](int mounting) {
+    return plan_.mountings[static_cast<std::size_t>(mounting)].gravity;
+  };
+  const PlanStep& first = step_of(records_.front());
+  Vector6 expected = Vector6::Zero();
+  expected.head<3>() =
+      (gravity(step().mounting) - gravity(first.mounting)).cwiseQuotient(options_.range.head<3>());
+  Vector6 felt = hold_.scaled(hold.mean - mean_of(records_.front()).displacement);
+  felt.tail<3>().setZero();
+  if (expected.norm() < 1e-6 || felt.norm() < kOwnWeight) return true;
+  if (likeness(felt, expected).cosine > 0.6) return true;
+  complain(fmt::format("the platform's own weight pulls elsewhere than in this mounting ({}): the "
+                       "sensor lies otherwise than the plan says",
+                       axes_text(felt)),
+           true);
+  return false;
+}
+
+void WrenchGuide::watch_mass(const Hold& hold) {
+  const StepRecord* rest = last_rest();
+  if (rest == nullptr) {
+    leave_out("there is no rest to count it from");
+    return;
+  }
+  const Vector6 felt = hold_.scaled(hold.mean - mean_of(*rest).displacement);
+  const Vector6 expected = expected_load(plan_, todo_.front()).wrench.cwiseQuotient(options_.range);
+  const Likeness load = likeness(felt, expected);
+  if (felt.norm() < 0.2 * expected.norm()) return;  // nothing hangs yet
+  if (load.cosine < -0.5) {
+    complain(
+        fmt::format("it pulls the opposite way ({}): gravity or the point of the plan is other "
+                    "than how it hangs",
+                    axes_text(felt)),
+        true);
+  } else if (load.cosine < 0.6) {
+    complain(fmt::format("it pulls elsewhere ({}) than the plan says ({}): gravity or the point of "
+                         "the plan is other than how it hangs",
+                         axes_text(felt), axes_text(expected)),
+             true);
+  } else if (load.ratio < 0.3 || load.ratio > 3) {
+    complain(fmt::format("it pulls as {:.0f} g would: is it the weight that the plan says?",
+                         1e3 * step().mass * load.ratio),
+             true);
+  } else {
+    accept_hold();
+  }
+}
+
+void WrenchGuide::accept_hold() {
+  StepRecord record{todo_.front(), 0, hold_.frames(), {}};
+  for (const ReferenceSample& sample : readings_) {
+    if (sample.time >= record.frames.front().time && sample.time <= record.frames.back().time)
+      record.readings.push_back(sample);
+  }
+  accept(std::move(record));
+}
+
+/// The rest is not where it was: what was measured since counts from nowhere.
+void WrenchGuide::bumped(const Vector6& by) {
+  std::vector<int> lost;
+  const StepRecord* rest = last_rest();
+  while (&records_.back() != rest) {
+    lost.insert(lost.begin(), records_.back().step);
+    records_.pop_back();
+  }
+  ++bumps_;
+  const int here = todo_.front();
+  std::string text =
+      fmt::format("the rest is {} from where it was: the sensor was bumped, or a tag has slipped",
+                  worst_text(by));
+  if (options_.attempts > 0 && bumps_ > kMostBumps) {
+    failure_ = text + " again and again; fix it better";
+    return;
+  }
+  if (!lost.empty()) {
+    text += "; to be done again:";
+    for (const int s : lost)
+      text += fmt::format(" {}{}", describe(plan_, s), s == lost.back() ? "" : ",");
+  }
+  say(Line::warning, text);
+  if (!lost.empty()) {
+    std::vector<int> more = lost;
+    more.push_back(here);
+    todo_.insert(todo_.begin() + 1, more.begin(), more.end());
+  }
+  new_zero_ = true;
+  accept_hold();
+}
+
+// ---- Pushes and movements ----
+
+void WrenchGuide::watch_push(double time) {
+  const StepRecord* rest = last_rest();
+  if (rest == nullptr) {
+    leave_out("there is no rest to count it from");
+    return;
+  }
+  if (!last_reading_ || time - last_reading_->time > kSilence) {
+    phase_ = Phase::waiting;
+    complain("nothing comes from the reference; look at its plug and its power", false);
+    return;
+  }
+  const double force = std::abs(last_reading_->value[0] - mean_reading(*rest)[0]);
+  if (phase_ == Phase::waiting) {
+    let_go_ = let_go_ || force < kFree * step().force;
+    if (!let_go_ || force < kTouch * step().force) return;
+    begin_taking(time);
+  }
+  taking_.frames.push_back(hold_.frames().back());
+  if (time - begun_ >= step().seconds) finish_taking();
+}
+
+void WrenchGuide::watch_movement(double time) {
+  const StepRecord* rest = last_rest();
+  if (rest == nullptr) {
+    leave_out("there is no rest to count it from");
+    return;
+  }
+  if (!last_reading_ || time - last_reading_->time > kSilence) {
+    phase_ = Phase::waiting;
+    complain("nothing comes from the reference; look at its plug and its power", false);
+    return;
+  }
+  const Vector6 zero = mean_of(*rest).displacement;
+  const TrackedFrame& frame = hold_.frames().back();
+  if (phase_ == Phase::waiting) {
+    if (hold_.scaled(frame.displacement - zero).cwiseAbs().maxCoeff() < kBegun) return;
+    begin_taking(time);
+  }
+  taking_.frames.push_back(frame);
+  const double length = time - begun_;
+  if (length < step().seconds) return;
+  Vector6 squares = Vector6::Zero();
+  for (const TrackedFrame& f : taking_.frames)
+    squares += hold_.scaled(f.displacement - zero).cwiseAbs2();
+  const Vector6 deviation = (squares / static_cast<double>(taking_.frames.size())).cwiseSqrt();
+  int weakest = 0;
+  if (deviation.minCoeff(&weakest) > kExcited || length > kLongest * step().seconds) {
+    finish_taking();
+    return;
+  }
+  complain(fmt::format("go on, and more of {}: it was hardly moved",
+                       kWrenchAxes[static_cast<std::size_t>(weakest)]),
+           false);
+}
+
+void WrenchGuide::begin_taking(double time) {
+  phase_ = Phase::taking;
+  begun_ = time;
+  taking_ = {todo_.front(), 0, {}, {}};
+  for (const ReferenceSample& sample : readings_) {
+    if (sample.time > time - 0.5) taking_.readings.push_back(sample);
+  }
+}
+
+void WrenchGuide::finish_taking() {
+  const ReferenceFinding found =
+      check_reference(plan_, taking_, *last_rest(), options_.stiffness, options_.range);
+  switch (found.verdict) {
+    case ReferenceFinding::Verdict::fine:
+      accept(std::move(taking_));
+      break;
+    case ReferenceFinding::Verdict::again:
+      again(found.text);
+      break;
+    case ReferenceFinding::Verdict::hopeless:
+      failure_ = found.text;
+      break;
+  }
+}
+
+// ---- Going on ----
+
+/// Of this visit of the mounting; a stopped and resumed one too.
+const StepRecord* WrenchGuide::last_rest() const {
+  for (auto r = records_.rbegin(); r != records_.rend(); ++r) {
+    if (step_of(*r).visit != step().visit) return nullptr;
+    if (step_of(*r).kind == StepKind::rest) return &*r;
+  }
+  return nullptr;
+}
+
+void WrenchGuide::accept(StepRecord record) {
+  const StepRecord* rest = last_rest();
+  const bool new_zero = rest == nullptr || new_zero_;
+  record.zero = new_zero ? zeros_++ : rest->zero;
+  new_zero_ = false;
+  attempts_ = 0;
+  records_.push_back(std::move(record));
+  todo_.pop_front();
+  recount();
+  const StepRecord& latest = records_.back();
+  std::string text = "accepted: " + describe(plan_, latest.step);
+  if (step_of(latest).kind != StepKind::rest) {
+    text += "; " + coverage_bar(coverage_);
+    text += most_useful();
+  }
+  say(Line::note, text);
+  ask();
+}
+
+void WrenchGuide::recount() {
+  coverage_ = WrenchCoverage(options_.range);
+  const StepRecord* rest = nullptr;
+  for (const StepRecord& record : records_) {
+    if (step_of(record).kind == StepKind::rest) rest = &record;
+    if (step_of(record).kind != StepKind::six_axis) {
+      coverage_.add(expected_load(plan_, record.step));
+    } else if (rest != nullptr) {
+      const Eigen::MatrixXd w = reference_wrenches(plan_, record, *rest);
+      const Eigen::MatrixXd off = w.rowwise() - w.colwise().mean();
+      coverage_.add_movement(off.transpose() * off / static_cast<double>(w.rows()));
+    }
+  }
+}
+
+void WrenchGuide::skip() {
+  if (done()) return;
+  const bool first_rest = step().kind == StepKind::rest && last_rest() == nullptr;
+  const int visit = step().visit;
+  const std::string name = describe(plan_, todo_.front());
+  do {  // without a rest, the loads that follow count from nothing
+    skipped_.push_back(todo_.front());
+    todo_.pop_front();
+  } while (first_rest && !todo_.empty() && step().visit == visit && step().kind != StepKind::rest);
+  attempts_ = 0;
+  const std::string missing = still_missing();
+  say(missing.empty() ? Line::note : Line::warning,
+      fmt::format("skipped: {}{}", name, missing.empty() ? "" : "; then " + missing));
+  ask();
+}
+
+void WrenchGuide::redo() {
+  if (failed()) return;
+  if (records_.empty()) {
+    ask();
+    return;
+  }
+  todo_.push_front(records_.back().step);
+  records_.pop_back();
+  attempts_ = 0;
+  recount();
+  ask();
+  repeated_ = true;
+}
+
+void WrenchGuide::resume(std::vector<StepRecord> records, const std::vector<int>& skipped) {
+  records_ = std::move(records);
+  std::erase_if(records_, [](const StepRecord& record) { return record.frames.empty(); });
+  skipped_ = skipped;
+  resumed_ = true;
+  std::deque<int> left;
+  for (const int s : todo_) {
+    const bool recorded = std::any_of(records_.begin(), records_.end(),
+                                      [s](const StepRecord& r) { return r.step == s; });
+    if (!recorded && std::find(skipped.begin(), skipped.end(), s) == skipped.end())
+      left.push_back(s);
+  }
+  todo_ = left;
+  for (const StepRecord& record : records_) zeros_ = std::max(zeros_, record.zero + 1);
+  // The sensor may have been moved meanwhile: a rest shows it before anything else is loaded.
+  if (!todo_.empty() && !records_.empty() && step().kind != StepKind::rest &&
+      step_of(records_.back()).visit == step().visit)
+    todo_.push_front(last_rest()->step);
+  recount();
+  lines_.clear();
+  asks_ = 0;
+  ask();
+}
+
+void WrenchGuide::watch_patience(double time) {
+  if (phase_ == Phase::taking || time - reminded_ < options_.patience) return;
+  reminded_ = time;
+  if (options_.attempts > 0)
+    again("nothing came of it: " + waiting_for());
+  else
+    say(Line::note,
+        fmt::format("waiting: {} ({})", waiting_for(), instruction(plan_, todo_.front(), false)));
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,250 @@
+#include "host/calibrate/wrench_observations.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "host/calibrate/wrench_baseline.h"
+#include "host/calibrate/wrench_load.h"
+#include "host/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr double kLongestGap = 0.15;       // s between readings that are interpolated
+constexpr std::size_t kMostFrames = 1500;  // of pushes and movements in a fit
+constexpr double kNoRelation = 0.3;        // mean R^2
+constexpr const char* kFeatures[] = {"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
+
+/// Rows of a trial as they come.
+struct Rows {
+  std::vector<double> time;
+  std::vector<Vector6> value, sigma;
+  std::vector<int> step;
+
+  void add(double t, const Vector6& v, const Vector6& s, int of_step) {
+    if (!time.empty() && t <= time.back()) return;  // a rest that is both last and first
+    time.push_back(t);
+    value.push_back(v);
+    sigma.push_back(s);
+    step.push_back(of_step);
+  }
+  static Eigen::MatrixXd matrix(const std::vector<Vector6>& rows) {
+    Eigen::MatrixXd m(static_cast<Eigen::Index>(rows.size()), 6);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      m.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
+    return m;
+  }
+  static Eigen::VectorXd vector(const std::vector<double>& v) {
+    return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
+  }
+};
+
+class Collector {
+ public:
+  Collector(const WrenchPlan& plan, const std::vector<StepRecord>& records, double gain_sigma)
+      : plan_(plan), records_(records), gain_sigma_(gain_sigma) {
+    for (const StepRecord& record : records)
+      baselines_.try_emplace(record.zero, plan, records, record.zero);
+  }
+
+  WrenchData collect() {
+    find_lag();
+    const std::size_t stride = 1 + frames_of_movement() / kMostFrames;
+    for (const StepRecord& record : records_) {
+      const Baseline& baseline = baselines_.at(record.zero);
+      if (record.frames.empty() || baseline.empty()) continue;
+      for (const TrackedFrame& f : record.frames) data_.path.push_back({f.time, f.displacement});
+      if (is_hold(record))
+        add_hold(record, baseline);
+      else
+        add_movement(record, baseline, stride);
+    }
+    finish_trial();
+    const bool loads = std::any_of(data_.observations.begin(), data_.observations.end(),
+                                   [](const Observation& o) { return !o.wrench.isZero(); });
+    if (!loads) {
+      throw ConfigError(
+          "no step with a load was recorded, only rests; do the steps that were skipped");
+    }
+    data_.zero_in_use = records_.front().zero;
+    return std::move(data_);
+  }
+
+ private:
+  const PlanStep& step_of(const StepRecord& record) const {
+    return plan_.steps[static_cast<std::size_t>(record.step)];
+  }
+  bool is_hold(const StepRecord& record) const {
+    const StepKind kind = step_of(record).kind;
+    return kind == StepKind::rest || kind == StepKind::mass;
+  }
+  std::size_t frames_of_movement() const {
+    std::size_t n = 0;
+    for (const StepRecord& record : records_) n += is_hold(record) ? 0 : record.frames.size();
+    return n;
+  }
+
+  Observation begin(const StepRecord& record, double time) const {
+    Observation o;
+    o.time = time;
+    o.step = record.step;
+    o.zero = record.zero;
+    return o;
+  }
+
+  void add_hold(const StepRecord& record, const Baseline& baseline) {
+    const RecordMean mean = mean_of(record);
+    Observation o = begin(record, mean.time);
+    o.displacement = mean.displacement - baseline.drift(mean.time);
+    o.displacement_covariance = mean.covariance;
+    const bool mass = step_of(record).kind == StepKind::mass;
+    if (mass) {
+      o.displacement_covariance += baseline.drift_covariance(mean.time);
+      set_hanging(plan_, record.step, mean.displacement, o);
+    }
+    data_.observations.push_back(o);
+
+    for (const TrackedFrame& f : record.frames) add_reading(record.step, baseline, f);
+    if (plan_.reference != ReferenceKind::masses) {
+      for (const ReferenceSample& r : record.readings)
+        reference_.add(r.time, wrench_of(record, baseline, r), r.sigma, record.step);
+      return;
+    }
+    Vector6 sigma = Vector6::Zero();
+    if (mass) {
+      const KnownLoad known = expected_load(plan_, record.step);
+      sigma = known.covariance.diagonal().cwiseSqrt();
+    }
+    for (const TrackedFrame* f : {&record.frames.front(), &record.frames.back()})
+      reference_.add(f->time, o.wrench, sigma, record.step);
+  }
+
+  void add_movement(const StepRecord& record, const Baseline& baseline, std::size_t stride) {
+    std::size_t count = 0;
+    const Eigen::VectorXd times = reading_times(record);
+    Eigen::MatrixXd values(times.size(), 6);
+    for (Eigen::Index i = 0; i < times.size(); ++i) {
+      const ReferenceSample& r = record.readings[static_cast<std::size_t>(i)];
+      values.row(i) = (r.value - baseline.reading(r.time)).transpose();
+      reference_.add(r.time, wrench_of(record, baseline, r), r.sigma, record.step);
+    }
+    const Vector6 sigma =
+        record.readings.empty() ? Vector6(Vector6::Zero()) : record.readings.front().sigma;
+    for (const TrackedFrame& f : record.frames) {
+      add_reading(record.step, baseline, f);
+      if (count++ % stride != 0) continue;
+      const auto said = [&](double lag) {
+        return Vector6(study::reference_at(Eigen::VectorXd::Constant(1, f.time), lag, times, values,
+                                           kLongestGap)
+                           .row(0)
+                           .transpose());
+      };
+      const Vector6 value = said(data_.lag.value);
+      if (!value.allFinite()) continue;
+      // What the lag may be off shifts the value along its slope.
+      Vector6 slope = said(data_.lag.value - data_.lag.sigma) - value;
+      if (!slope.allFinite()) slope.setZero();
+      Observation o = begin(record, f.time);
+      o.displacement = f.displacement - baseline.drift(f.time);
+      o.displacement_covariance = f.covariance;
+      const Vector6 noise = (sigma.cwiseAbs2() + slope.cwiseAbs2()).cwiseSqrt();
+      if (plan_.reference == ReferenceKind::load_cell)
+        set_push(plan_, record.step, {value[0], noise[0], gain_sigma_}, f.displacement, o);
+      else
+        set_six_axis(plan_, value, noise, o);
+      data_.observations.push_back(o);
+    }
+  }
+
+  void add_reading(int step, const Baseline& baseline, const TrackedFrame& f) {
+    readings_.add(f.time, f.displacement - baseline.drift(f.time) - baseline.displacement(),
+                  f.covariance.diagonal().cwiseSqrt(), step);
+  }
+
+  /// What a reading stands for, about the platform origin at rest.
+  Vector6 wrench_of(const StepRecord& record, const Baseline& baseline,
+                    const ReferenceSample& r) const {
+    const Vector6 value = r.value - baseline.reading(r.time);
+    if (plan_.reference == ReferenceKind::six_axis) return six_axis_wrench(plan_, value);
+    if (step_of(record).kind != StepKind::push) return Vector6::Zero();
+    const auto frame =
+        std::lower_bound(record.frames.begin(), record.frames.end(), r.time + data_.lag.value,
+                         [](const TrackedFrame& f, double t) { return f.time < t; });
+    const TrackedFrame& at = frame == record.frames.end() ? record.frames.back() : *frame;
+    Observation o;
+    set_push(plan_, record.step, {value[0], 0, 0}, at.displacement, o);
+    return o.wrench;
+  }
+
+  static Eigen::VectorXd reading_times(const StepRecord& record) {
+    Eigen::VectorXd t(static_cast<Eigen::Index>(record.readings.size()));
+    for (Eigen::Index i = 0; i < t.size(); ++i)
+      t[i] = record.readings[static_cast<std::size_t>(i)].time;
+    return t;
+  }
+
+  void find_lag() {
+    std::vector<study::Stretch> stretches;
+    for (const StepRecord& record : records_) {
+      const Baseline& baseline = baselines_.at(record.zero);
+      if (is_hold(record) || record.frames.empty() || baseline.empty()) continue;
+      study::Stretch s;
+      const auto n = static_cast<Eigen::Index>(record.frames.size());
+      s.time.resize(n);
+      s.features.resize(n, 6);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        s.time[i] = record.frames[static_cast<std::size_t>(i)].time;
+        s.features.row(i) = record.frames[static_cast<std::size_t>(i)].displacement.transpose();
+      }
+      s.reference_time = reading_times(record);
+      s.reference.resize(s.reference_time.size(), 6);
+      for (Eigen::Index i = 0; i < s.reference_time.size(); ++i)
+        s.reference.row(i) =
+            wrench_of(record, baseline, record.readings[static_cast<std::size_t>(i)]).transpose();
+      stretches.push_back(std::move(s));
+    }
+    if (stretches.empty()) return;
+    data_.lag = study::estimate_lag(stretches);
+    if (data_.lag.known && data_.lag.explained >= kNoRelation) return;
+    throw ConfigError(
+        "what the reference said has nothing to do with how the platform moved, at no lag; is it "
+        "the "
+        "instrument that this sensor was pushed with, and on the same clock?");
+  }
+
+  void finish_trial() {
+    study::Trial& trial = data_.trial;
+    trial.name = plan_.name;
+    trial.time = Rows::vector(readings_.time);
+    trial.features = Rows::matrix(readings_.value);
+    trial.feature_sigma = Rows::matrix(readings_.sigma);
+    trial.feature_names.assign(std::begin(kFeatures), std::end(kFeatures));
+    trial.step = Eigen::Map<const Eigen::VectorXi>(
+        readings_.step.data(), static_cast<Eigen::Index>(readings_.step.size()));
+    trial.reference_time = Rows::vector(reference_.time);
+    trial.reference = Rows::matrix(reference_.value);
+    trial.reference_sigma = Rows::matrix(reference_.sigma);
+    trial.held = plan_.reference == ReferenceKind::masses;
+  }
+
+  const WrenchPlan& plan_;
+  const std::vector<StepRecord>& records_;
+  double gain_sigma_;
+  std::map<int, Baseline> baselines_;
+  Rows readings_;
+  Rows reference_;
+  WrenchData data_;
+};
+
+}  // namespace
+
+WrenchData collect(const WrenchPlan& plan, const std::vector<StepRecord>& records,
+                   double cell_gain_sigma) {
+  if (records.empty()) throw ConfigError("nothing was recorded; do at least one step with a load");
+  return Collector(plan, records, cell_gain_sigma).collect();
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,33 @@
+// What was recorded -> observations for the fit, and the same as a trial for analysis and
+// certificate.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/calibrate/wrench_plan.h"
+#include "host/calibrate/wrench_record.h"
+#include "host/study/lag.h"
+#include "host/study/trial.h"
+#include "host/wrench/fit.h"
+
+namespace tagwrench {
+
+struct WrenchData {
+  std::vector<Observation> observations;
+  std::vector<PathPoint> path;  ///< of the platform, where it was looked at
+  study::Trial trial;
+  study::Lag lag;  ///< of the camera behind the reference; not known of masses, which have none
+  int zero_in_use = 0;  ///< of the first mounting, in which the sensor is used
+};
+
+/// Rests and masses give one observation each, the mean over the hold; pushes and movements one for
+/// each frame (of long ones, for as many as are useful), with what the reference said `lag` before.
+/// What displacement and reference drift between two rests is taken out, linearly in time.
+/// `cell_gain_sigma`: relative, of the load cell's calibration. Throws ConfigError if nothing was
+/// recorded but rests, or a reference and the platform have nothing to do with each other at any
+/// lag.
+WrenchData collect(const WrenchPlan& plan, const std::vector<StepRecord>& records,
+                   double cell_gain_sigma);
+
+}  // namespace tagwrench

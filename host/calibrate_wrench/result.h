@@ -1,0 +1,36 @@
+// What a calibration has found: the fit, its files, and a table for people.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "host/calibrate/wrench_observations.h"
+#include "host/config/calibration_file.h"
+#include "host/config/sensor_config.h"
+#include "host/wrench/fit.h"
+
+namespace tagwrench {
+
+struct CalibrationFiles {
+  std::filesystem::path calibration;
+  std::filesystem::path data;      ///< beside it
+  std::filesystem::path progress;  ///< beside it
+  std::filesystem::path before;    ///< what was in `calibration` until now
+};
+
+/// calibration.json -> calibration.data.csv, calibration.json.partial, calibration.json.before.
+CalibrationFiles files_of(const std::filesystem::path& calibration);
+
+/// Writes data and calibration, and names it in sensor.yaml, whose text is `sensor_text`. An
+/// earlier calibration is kept as `before`. Throws ConfigError or std::runtime_error; then the old
+/// calibration is in force.
+void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
+                       const std::filesystem::path& sensor_file, const SensorConfig& sensor,
+                       const WrenchData& data, Calibration calibration);
+
+/// One line per axis and one for each thing to be said.
+std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,
+                                  const WrenchFit& fit, const Vector6& range);
+
+}  // namespace tagwrench

@@ -1,0 +1,89 @@
+#include "host/certificate_facts.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "host/certificate/quantity.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr std::size_t kHashShown = 16;  // hexadecimal digits
+
+void add(std::vector<Fact>& facts, const char* name, const std::string& value) {
+  if (!value.empty()) facts.push_back({name, value});
+}
+
+std::string model_text(const Calibration& calibration) {
+  const std::string kind(name(calibration.model.features.kind));
+  const std::size_t tried = calibration.record.trials.size();
+  return tried > 1 ? fmt::format("{}, the best of {} on data held out", kind, tried)
+                   : kind + ", 6 x 6 with offset";
+}
+
+/// Of the fit's own cross-validation, which knows masses and lines of action.
+std::string rmse_text(const std::array<AxisFit, 6>& axes) {
+  std::vector<std::string> parts;
+  for (int i = 0; i < 6; ++i) {
+    const AxisFit& axis = axes[static_cast<std::size_t>(i)];
+    if (axis.state == AxisState::calibrated)
+      parts.push_back(fmt::format("{} {}", study::kAxisNames[static_cast<std::size_t>(i)],
+                                  load_text(axis.held_out_rmse, i)));
+  }
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+}  // namespace
+
+std::vector<Fact> sensor_facts(const SensorIdentity& sensor) {
+  std::vector<Fact> facts;
+  add(facts, "Tags",
+      fmt::format("{} {} of {:g} mm", sensor.family, fmt::join(sensor.tag_ids, ", "),
+                  sensor.tag_size_mm));
+  add(facts, "Camera", fmt::format("{} x {} px", sensor.image_px[0], sensor.image_px[1]));
+  if (sensor.lens_px) {
+    const auto& lens = *sensor.lens_px;
+    add(facts, "Lens",
+        fmt::format("focal length {:.1f}, {:.1f} px; centre {:.1f}, {:.1f} px", lens[0], lens[1],
+                    lens[2], lens[3]));
+  }
+  add(facts, "Target as learned",
+      sensor.target_sha256.empty() ? "not recorded"
+                                   : "SHA-256 " + sensor.target_sha256.substr(0, kHashShown) + "…");
+  add(facts, "Wrench", "applied to the platform, about its origin at rest, camera axes");
+  return facts;
+}
+
+std::vector<Fact> procedure_facts(const Calibration& calibration) {
+  const CalibrationRecord& record = calibration.record;
+  std::vector<Fact> facts;
+  add(facts, "Date", record.date);
+  add(facts, "Plan", record.plan);
+  add(facts, "Reference", record.reference);
+  add(facts, "Model", model_text(calibration));
+  if (record.axis) add(facts, "Its own RMSE held out", rmse_text(*record.axis));
+  add(facts, "Software", record.software);
+  add(facts, "Environment", record.notes.empty() ? "not noted" : record.notes);
+  return facts;
+}
+
+void add_calibration(const CalibrationRecord& record, study::Analysis& analysis) {
+  for (std::size_t i = 0; i < 6; ++i) {
+    study::AxisReport& report = analysis.axis[i];
+    if (record.inside_95) report.coverage = (*record.inside_95)[i];
+    if (!record.axis || (*record.axis)[i].state == AxisState::calibrated) continue;
+    const AxisFit& axis = (*record.axis)[i];
+    report.calibrated = false;
+    report.reason = axis.reason.empty() ? name(axis.state)
+                                        : fmt::format("{}: {}", name(axis.state), axis.reason);
+  }
+  for (const std::string& warning : record.warnings) {
+    if (std::find(analysis.warnings.begin(), analysis.warnings.end(), warning) ==
+        analysis.warnings.end())
+      analysis.warnings.push_back(warning);
+  }
+}
+
+}  // namespace tagwrench

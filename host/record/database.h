@@ -1,0 +1,85 @@
+// SQLite with an owner: connections and statements that close themselves. What a file holds is not
+// trusted.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace tagwrench::record {
+
+/// What SQLite or the disk said.
+class DatabaseError : public std::runtime_error {
+ public:
+  DatabaseError(const std::string& what, int code) : std::runtime_error(what), code_(code) {}
+  /// SQLite's extended result code.
+  int code() const noexcept { return code_; }
+
+ private:
+  int code_;
+};
+
+class Database {
+ public:
+  enum class Mode : std::uint8_t { read, write };
+
+  /// Opens a file that exists. Throws DatabaseError.
+  Database(const std::filesystem::path& path, Mode mode);
+
+  /// Throw DatabaseError.
+  void run(const char* sql);
+  std::int64_t number(const char* sql);
+  /// Whether it went well.
+  bool try_run(const char* sql) noexcept;
+
+  sqlite3* get() const noexcept { return handle_.get(); }
+  [[noreturn]] void fail(int code) const;
+
+ private:
+  struct Close {
+    void operator()(sqlite3* handle) const noexcept;
+  };
+  std::unique_ptr<sqlite3, Close> handle_;
+};
+
+/// Columns count from 0, parameters from 1. A text or blob that is bound must live until step() has
+/// returned; what a column gives, until the next step().
+class Statement {
+ public:
+  /// Throws DatabaseError if it is not SQL for this database.
+  Statement(Database& database, const std::string& sql);
+
+  void bind(int at, std::int64_t value) noexcept;
+  void bind(int at, double value) noexcept;  ///< NaN becomes NULL
+  void bind(int at, std::string_view text) noexcept;
+  void bind(int at, std::span<const std::uint8_t> blob) noexcept;
+  void bind_null(int at) noexcept;
+
+  /// Runs a statement that gives no rows, and makes it ready for the next time. Throws
+  /// DatabaseError.
+  void execute();
+  /// The next row; false after the last. Throws DatabaseError.
+  bool step();
+
+  bool is_null(int column) const noexcept;
+  std::int64_t integer(int column) const noexcept;
+  double real(int column) const noexcept;  ///< NULL is NaN
+  std::string_view text(int column) const noexcept;
+  std::span<const std::uint8_t> blob(int column) const noexcept;
+
+ private:
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const noexcept;
+  };
+  Database& database_;
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+};
+
+}  // namespace tagwrench::record

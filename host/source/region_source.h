@@ -1,0 +1,58 @@
+// A source around another one that delivers no more than was asked for: then a recording that keeps
+// only this replays to the same result.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "host/source/frame_source.h"
+
+namespace tagwrench {
+
+class RegionSource final : public FrameSource {
+ public:
+  explicit RegionSource(std::unique_ptr<FrameSource> inner) : inner_(std::move(inner)) {}
+
+  const SourceFormat& format() const noexcept override { return inner_->format(); }
+  int poll_fd() const noexcept override { return inner_->poll_fd(); }
+  CameraLight* camera_light() noexcept override { return inner_->camera_light(); }
+  std::string unusable() const override { return inner_->unusable(); }
+  std::string detail() const override { return inner_->detail(); }
+  RawFrame raw() const noexcept override { return inner_->raw(); }
+
+  ReadStatus read(Frame& frame) noexcept override {
+    const ReadStatus status = inner_->read(frame);
+    if (status == ReadStatus::frame) {
+      shown_ = frame.readable();
+      frame.decoded = common(shown_, wanted_.clipped(frame.image.width, frame.image.height));
+    }
+    return status;
+  }
+  void want(const Region& region) noexcept override {
+    wanted_ = region;
+    inner_->want(region);
+  }
+  bool complete(Frame& frame) noexcept override {
+    const Region part = std::exchange(frame.decoded, shown_);
+    if (inner_->complete(frame)) return true;
+    frame.decoded = part;
+    return false;
+  }
+
+ private:
+  /// All of `shown` where the two have nothing in common.
+  static Region common(const Region& shown, const Region& wanted) noexcept {
+    const int left = std::max(shown.x, wanted.x);
+    const int top = std::max(shown.y, wanted.y);
+    const Region both{left, top, std::min(shown.x + shown.width, wanted.x + wanted.width) - left,
+                      std::min(shown.y + shown.height, wanted.y + wanted.height) - top};
+    return both.empty() ? shown : both;
+  }
+
+  std::unique_ptr<FrameSource> inner_;
+  Region wanted_;
+  Region shown_;  ///< of the last frame, by the inner source
+};
+
+}  // namespace tagwrench

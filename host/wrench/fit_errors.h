@@ -1,0 +1,22 @@
+// What a fit leaves unexplained: outlier steps, the model's own error, residuals that hang
+// together. Internal to the fit.
+#pragma once
+
+#include <vector>
+
+#include "host/wrench/fit_solve.h"
+
+namespace tagwrench::fit {
+
+/// A solution with weights, error model and rejections that agree with its hold-out residuals.
+struct Judged {
+  Solution solution;
+  Weighting weighting;
+  std::vector<std::vector<Prediction>> held_out;  ///< by block
+  std::vector<double> chi2;        ///< of each block's held-out residual, per degree of freedom
+  bool too_many_outliers = false;  ///< so many steps disagree that none was rejected
+};
+
+Judged judge(const Problem& problem);
+
+}  // namespace tagwrench::fit

@@ -1,0 +1,115 @@
+#include "host/wrench/zero.h"
+
+#include <cmath>
+
+namespace tagwrench {
+namespace {
+
+/// Scatter that counts as noise whatever is said of the noise, and that never does, of the range.
+constexpr double kLeastScatter = 1e-4;
+constexpr double kMostScatter = 3e-3;
+
+bool known(double range) { return range > 0 && range < kUnknownRange; }
+
+Vector6 known_part(Vector6 range) {
+  for (int i = 0; i < 6; ++i) {
+    if (!known(range[i])) range[i] = 0;
+  }
+  return range;
+}
+
+StillMeter::Options scatter(const Vector6& range) {
+  StillMeter::Options options;
+  options.least = range * kLeastScatter;
+  options.most = range * kMostScatter;
+  for (int i = 0; i < 6; ++i) {
+    if (range[i] == 0) options.least[i] = options.most[i] = 1e150;  // not looked at
+  }
+  return options;
+}
+
+double seconds(Duration time) { return std::chrono::duration<double>(time).count(); }
+
+}  // namespace
+
+void StillMeter::add(TimePoint time, const Vector6& value, const Vector6& sigma) noexcept {
+  if (!started_ || time <= last_ || time - last_ > options_.longest_gap) {
+    started_ = true;
+    moves_ = false;
+    last_ = calm_since_ = time;
+    mean_ = value;
+    variance_.setZero();
+    return;
+  }
+  // West, "Updating mean and variance estimates", CACM 22(9), 1979, with a forgetting weight.
+  const double weight = 1 - std::exp(-seconds(time - last_) / seconds(options_.memory));
+  const Vector6 from_mean = value - mean_;
+  mean_ += weight * from_mean;
+  variance_ = (1 - weight) * (variance_ + weight * from_mean.cwiseAbs2());
+  last_ = time;
+  const Vector6 limit = (options_.sigmas * sigma).cwiseMax(options_.least).cwiseMin(options_.most);
+  moves_ = !(variance_.array() <= limit.array().square()).all();
+  if (moves_) calm_since_ = time;
+}
+
+ZeroTracking::ZeroTracking(const ZeroOptions& options)
+    : options_(options),
+      range_(known_part(options.range)),
+      follow_(options.follow && range_.maxCoeff() > 0),
+      meter_(scatter(range_)) {}
+
+bool ZeroTracking::within(const Vector6& wrench, double part) const noexcept {
+  for (int i = 0; i < 6; ++i) {
+    if (range_[i] > 0 && !(std::abs(wrench[i]) <= part * range_[i])) return false;
+  }
+  return true;
+}
+
+ZeroState ZeroTracking::judge(const Sample& sample, const Vector6& noise) noexcept {
+  if (!follow_) return ZeroState::off;
+  if (!carries_numbers(sample.status)) {
+    meter_.reset();
+    return ZeroState::touched;
+  }
+  meter_.add(sample.capture_time, sample.wrench, noise);
+  if (sample.touched || sample.status == Status::saturated) meter_.reset();
+  const bool hand = sample.touched || meter_.moves();
+  const Vector6 reading = meter_.mean() - options_.set - moved_;
+  felt_ = felt_ || hand || !within(reading, options_.band);
+  if (hand || !meter_.still()) return ZeroState::touched;
+  return within(reading, felt_ ? options_.capture : options_.band) ? ZeroState::following
+                                                                   : ZeroState::far;
+}
+
+void ZeroTracking::follow(Sample& sample, const Vector6& noise) noexcept {
+  sample.zero_state = judge(sample, noise);
+  if (sample.zero_state == ZeroState::following) {
+    const double dt = seconds(sample.capture_time - last_);
+    const double weight = 1 - std::exp(-dt / options_.time_constant);
+    const Vector6 step = options_.rate * dt * range_;
+    const Vector6 limit = options_.band * range_;
+    const Vector6 reading = meter_.mean() - options_.set - moved_;
+    moved_ += (weight * reading).cwiseMin(step).cwiseMax(-step);
+    moved_ = moved_.cwiseMin(limit).cwiseMax(-limit).eval();
+  }
+  last_ = sample.capture_time;
+  sample.zero = options_.set + moved_;
+  if (carries_numbers(sample.status)) sample.wrench -= sample.zero;
+}
+
+Vector6 range_through(const Matrix6& tool, const Vector6& range) {
+  Vector6 felt = Vector6::Zero();
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      if (std::abs(tool(i, j)) < 1e-12) continue;
+      if (!known(range[j])) {
+        felt[i] = 0;
+        break;
+      }
+      felt[i] += std::abs(tool(i, j)) * range[j];
+    }
+  }
+  return felt;
+}
+
+}  // namespace tagwrench

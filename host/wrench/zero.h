@@ -1,0 +1,99 @@
+// What the sensor reads while nobody touches it: springs creep, glue and plastic warm up, and the
+// wrench at rest wanders. It is taken off, by hand (`tagwrench zero`) and, slowly, by itself.
+#pragma once
+
+#include "host/types.h"
+
+namespace tagwrench {
+
+/// Whether six numbers stand still: their running standard deviation is no more than noise, and
+/// has been for a while.
+class StillMeter {
+ public:
+  struct Options {
+    /// Scatter up to `sigmas` standard deviations of a reading is noise; never less than `least`,
+    /// nor more than `most`.
+    double sigmas = 2;
+    Vector6 least = Vector6::Zero();
+    Vector6 most = Vector6::Constant(1e300);
+    Duration memory = std::chrono::milliseconds(500);
+    Duration settled = std::chrono::seconds(1);
+    Duration longest_gap = std::chrono::milliseconds(500);  ///< a longer one starts it again
+  };
+  explicit StillMeter(const Options& options) : options_(options) {}
+
+  /// Times grow; one that does not starts it again.
+  void add(TimePoint time, const Vector6& value, const Vector6& sigma) noexcept;
+  void reset() noexcept { started_ = false; }
+
+  bool still() const noexcept {
+    return started_ && !moves_ && last_ - calm_since_ >= options_.settled;
+  }
+  /// It moves, more than noise would.
+  bool moves() const noexcept { return started_ && moves_; }
+  /// Of the last `memory`, exponentially weighted.
+  const Vector6& mean() const noexcept { return mean_; }
+
+ private:
+  Options options_;
+  bool started_ = false;
+  bool moves_ = false;
+  TimePoint last_{};
+  TimePoint calm_since_{};
+  Vector6 mean_ = Vector6::Zero();
+  Vector6 variance_ = Vector6::Zero();
+};
+
+/// Limits in the manner of a weighing instrument's zero-tracking device (OIML R 76-1, 2006, 4.5.1
+/// and 4.5.7: only near zero and in stable equilibrium, by no more than 0.5 scale intervals a
+/// second, and 4 % of the maximum in all).
+struct ZeroOptions {
+  bool follow = true;
+  /// N and N m, as samples have them: about wrench_origin, along wrench_frame. An axis whose range
+  /// is not known (0, or beyond kUnknownRange) is not followed.
+  Vector6 range = Vector6::Zero();
+  Vector6 set = Vector6::Zero();  ///< what reads as nothing from the start
+  double band = 0.02;             ///< of the range: farther from `set` the zero never goes
+  /// Of the range: once somebody has been felt, nothing farther from zero is taken for it. Before,
+  /// it is the whole band.
+  double capture = 0.005;
+  double rate = 0.5 / 3000;   ///< of the range a second: half an interval, where 3000 are the range
+  double time_constant = 10;  ///< s, of following where the rate allows it
+};
+
+/// Ranges of a sensor whose range nobody has told are larger than this, N and N m.
+inline constexpr double kUnknownRange = 1e8;
+
+/// Takes the zero off samples and, if asked to, lets it follow while nobody touches the sensor: the
+/// wrench stands still, to its noise, for a second, is near zero, and no button is pressed.
+/// Depends on samples and their times alone, so that a replay gives the same. No heap.
+class ZeroTracking {
+ public:
+  explicit ZeroTracking(const ZeroOptions& options);
+
+  /// Fills sample.zero and zero_state, and takes zero off sample.wrench. `noise`: one standard
+  /// deviation of what scatters from frame to frame, N and N m; see WrenchEstimator::noise.
+  void follow(Sample& sample, const Vector6& noise) noexcept;
+
+  bool follows() const noexcept { return follow_; }
+  /// How far it has moved from the one that was set, N and N m.
+  const Vector6& moved() const noexcept { return moved_; }
+
+ private:
+  ZeroState judge(const Sample& sample, const Vector6& noise) noexcept;
+  bool within(const Vector6& wrench, double part) const noexcept;
+
+  ZeroOptions options_;
+  Vector6 range_;  ///< 0 for axes that are not followed
+  bool follow_;
+  StillMeter meter_;
+  bool felt_ = false;  ///< somebody, since the start
+  TimePoint last_{};
+  Vector6 moved_ = Vector6::Zero();
+};
+
+/// The range, N and N m, along the axes and about the origin that `tool` leads to. An axis that
+/// mixes in one whose range is not known has none either.
+Vector6 range_through(const Matrix6& tool, const Vector6& range);
+
+}  // namespace tagwrench

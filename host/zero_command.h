@@ -1,0 +1,36 @@
+// `tagwrench zero`: what the sensor reads with hands off becomes its zero, in sensor.yaml.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "host/config/sensor_config.h"
+#include "host/config/sensor_edit.h"
+
+namespace tagwrench {
+
+struct ZeroCommandOptions {
+  std::string sensor;  ///< path
+  std::string source;  ///< SRC
+};
+
+/// Entries of `wrench:` that void a zero, for those who measure rest or wrench anew; empty where
+/// none was set.
+std::vector<YamlEntry> without_zero(const SensorConfig& sensor);
+
+/// Declares itself on the command line; must outlive the parsing.
+class ZeroCommand {
+ public:
+  explicit ZeroCommand(CLI::App& app);
+
+  bool parsed() const { return verb_->parsed(); }
+  /// 0: written; 1: refused, nothing was written. Throws ConfigError if it cannot start.
+  int run() const;
+
+ private:
+  CLI::App* verb_;
+  ZeroCommandOptions options_;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,115 @@
+// `tagwrench analyze` as its users run it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/cli/bridge.h"
+
+namespace tagwrench::test {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+class Analyze : public ::testing::Test {
+ protected:
+  Analyze() {
+    std::string name = fs::temp_directory_path() / "tagwrench-analyze-XXXXXX";
+    folder_ = ::mkdtemp(name.data());
+  }
+  ~Analyze() override { fs::remove_all(folder_); }
+
+  /// Two columns of readings that are twice the loads Fx and Mz, in mm and degrees, semicolons.
+  fs::path readings(int rows = 400) const {
+    const fs::path file = folder_ / "other.csv";
+    std::ofstream out(file);
+    out << "t;x;turn;fx;mz\n";
+    for (int i = 0; i < rows; ++i) {
+      const double t = 0.02 * i;
+      const double fx = std::sin(3.1 * t) + 0.4 * std::cos(7.7 * t);
+      const double mz = 20 * std::sin(4.3 * t + 1);
+      // A reading that wavers by its own rule, not by chance.
+      out << 1000 * t << ';' << 2 * fx + 1e-3 * std::sin(1e4 * t) << ';' << 0.05 * mz << ';' << fx
+          << ';' << mz << '\n';
+    }
+    return file;
+  }
+  std::vector<std::string> mapped(const fs::path& file) const {
+    return {"analyze",     "--readings", file,         "--reading-time", "t",
+            "--time-unit", "ms",         "--features", "x:mm",           "--features",
+            "turn:deg",    "--load",     "fx:N",       "--load",         "mz:mNm:axes=Mz"};
+  }
+  static Outcome run(std::vector<std::string> arguments,
+                     const std::vector<std::string>& more = {}) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return Bridge(arguments).finish();
+  }
+
+  fs::path folder_;
+};
+
+void expect_refused(const Outcome& outcome, const std::string& part) {
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+}
+
+TEST_F(Analyze, OtherPeoplesFileGivesATableAndJson) {
+  const fs::path file = readings();
+  const Outcome text = run(mapped(file));
+  EXPECT_EQ(text.status, 0) << text.err;
+  EXPECT_NE(text.out.find("each of 5 blocks in time"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("warning: Fz: not calibrated: never loaded"), std::string::npos);
+
+  const Outcome structured = run(mapped(file), {"--json", "-", "--series"});
+  ASSERT_EQ(structured.status, 0) << structured.err;
+  const json root = json::parse(structured.out);
+  EXPECT_EQ(root["format"], "tagwrench-analysis-1");
+  EXPECT_GT(root["axes"][0]["r2"].get<double>(), 0.999);
+  EXPECT_TRUE(root["axes"][0]["calibrated"].get<bool>());
+  EXPECT_FALSE(root["axes"][1]["calibrated"].get<bool>());
+  EXPECT_NEAR(root["matrix"][0][0].get<double>(), 500, 1) << "N/m: 1 N is 2 mm";
+  EXPECT_EQ(root["held_out"]["t_s"].size(), root["readings"].get<std::size_t>());
+}
+
+TEST_F(Analyze, WhatWasMappedCanBeKeptAndAnalyzedAgain) {
+  const fs::path kept = folder_ / "kept.data.csv";
+  const Outcome first = run(mapped(readings()), {"--data", kept, "--json", "-"});
+  ASSERT_EQ(first.status, 0) << first.err;
+  const fs::path file = folder_ / "again.json";
+  const Outcome second = run({"analyze", kept, "--json", file});
+  ASSERT_EQ(second.status, 0) << second.err;
+  EXPECT_NE(second.out.find("axis"), std::string::npos);
+  std::ifstream in(file);
+  EXPECT_EQ(json::parse(in)["axes"], json::parse(first.out)["axes"]);
+}
+
+TEST_F(Analyze, WrongUseIsRefusedInOneLine) {
+  const fs::path file = readings();
+  expect_refused(run({"analyze"}), "name a data file");
+  expect_refused(run({"analyze", file}), "tagwrench-data-1");
+  expect_refused(run({"analyze", folder_ / "none.data.csv"}), "cannot be read");
+  expect_refused(run({"analyze", "--readings", file}), "--features");
+  expect_refused(run(mapped(file), {"--features", "nothing"}), "no column 'nothing'");
+  expect_refused(run(mapped(file), {"--separator", ","}), "--separator");
+  expect_refused(run(mapped(file), {"--hold-out", "2"}), "--hold-out");
+  expect_refused(run(mapped(file), {"--json", folder_ / "no" / "such.json"}), "such.json");
+  expect_refused(run(mapped(readings(3))), "record more");
+}
+
+TEST_F(Analyze, ABrokenRowIsNamed) {
+  const fs::path file = readings();
+  std::ofstream(file, std::ios::app) << "8000;1;NaN;1;1\n";
+  expect_refused(run(mapped(file)), "other.csv:402: column 3 (turn) is 'NaN'");
+}
+
+}  // namespace
+}  // namespace tagwrench::test

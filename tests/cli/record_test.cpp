@@ -1,0 +1,243 @@
+// Recording as users do it: record, replay, export; and what is left when the program is killed.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+#include <thread>
+
+#include "host/record/database.h"
+#include "host/record/reader.h"
+#include "tests/cli/bridge.h"
+
+namespace tagwrench::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Small pictures: this is about files.
+constexpr const char* kSmall =
+    "camera: {width: 320, height: 240, fx: 402.5, fy: 402.5, cx: 159.75, cy: 119.75}\n"
+    "trajectory: {motion: compound, rest_s: 1.1}\n";
+
+class Record : public testing::Test {
+ protected:
+  Record() { write_file(folder_ / "small.yaml", kSmall); }
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  std::string small() const { return "sim:" + file("small.yaml"); }
+  Outcome record(const std::string& source, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{"record",   "--out",    file("r.twr"), "--source", source,
+                                       "--output", "jsonl:" + file("live.jsonl"), "--fast"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_bridge(arguments);
+  }
+  Outcome replay(const std::vector<std::string>& more = {"--fast"}) {
+    std::vector<std::string> arguments{"run", "--source", "recording:" + file("r.twr"), "--output",
+                                       "jsonl:" + file("replay.jsonl")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_bridge(arguments);
+  }
+  void expect_replay_is_the_same(std::size_t frames) {
+    const Outcome ran = replay();
+    EXPECT_EQ(ran.status, 0) << ran.err;
+    const std::string live = read_file(file("live.jsonl"));
+    EXPECT_EQ(lines_in(live), frames);
+    EXPECT_NE(live.find("\"status\":\"ok\""), std::string::npos) << "the target was never held";
+    EXPECT_TRUE(live == read_file(file("replay.jsonl"))) << "not the same bytes";
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Record, AReplayPrintsTheSameBytes) {
+  for (const char* keep : {"raw", "region"}) {
+    fs::remove(file("r.twr"));
+    const Outcome made = record(small(), {"--frames", "60", "--keep", keep});
+    ASSERT_EQ(made.status, 0) << made.err;
+    EXPECT_NE(made.err.find("60 frames"), std::string::npos) << made.err;
+    expect_replay_is_the_same(60);
+    if (std::string(keep) == "region") continue;
+    const Outcome paced = replay({"--frames", "12"});
+    EXPECT_EQ(paced.status, 0) << paced.err;
+  }
+}
+
+TEST_F(Record, AReplayOfALiveSourcePrintsTheSameBytes) {
+  const Outcome made = run_bridge({"record", "--out", file("r.twr"), "--source", small(),
+                                   "--output", "jsonl:" + file("live.jsonl"), "--frames", "30"});
+  ASSERT_EQ(made.status, 0) << made.err;
+  expect_replay_is_the_same(lines_in(read_file(file("live.jsonl"))));
+}
+
+TEST_F(Record, JpegFilesAreKeptAsTheyAreAndReplayedToTheSameBytes) {
+  write_file(folder_ / "jpeg.yaml", std::string(kSmall) + "compression: {file: jpeg, jpeg_quality: 85}\n");
+  const Outcome sim =
+      run_bridge({"sim", "--scenario", file("jpeg.yaml"), "--out", file("frames"), "--frames", "40"});
+  ASSERT_EQ(sim.status, 0) << sim.err;
+  ASSERT_EQ(record("images:" + file("frames")).status, 0);
+  expect_replay_is_the_same(40);
+  const Outcome exported = run_bridge({"export", file("r.twr"), "--frames", file("out")});
+  ASSERT_EQ(exported.status, 0) << exported.err;
+  for (const char* name : {"000000.jpg", "000039.jpg", "frames.csv", "sensor.yaml"})
+    EXPECT_EQ(read_file(folder_ / "out" / name), read_file(folder_ / "frames" / name)) << name;
+}
+
+/// Without the latency, which is that of the run.
+std::string without_latency(const std::string& jsonl) {
+  std::string out;
+  std::istringstream lines(jsonl);
+  for (std::string line; std::getline(lines, line);) out += line.substr(0, line.find("\"dropped\""));
+  return out;
+}
+
+TEST_F(Record, ExportedFramesAreAFolderThatRunsTheSame) {
+  ASSERT_EQ(record(small(), {"--frames", "40"}).status, 0);
+  ASSERT_EQ(run_bridge({"export", file("r.twr"), "--frames", file("out/")}).status, 0);
+  const Outcome ran = run_bridge(
+      {"run", "--source", "images:" + file("out"), "--fast", "--output", "jsonl:-"});
+  EXPECT_EQ(without_latency(ran.out), without_latency(read_file(file("live.jsonl"))));
+  const Outcome again = run_bridge({"export", file("r.twr"), "--frames", file("out")});
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.err.find("exists"), std::string::npos);
+}
+
+TEST_F(Record, ExportedSamplesAreTheBytesOfTheCsvOutput) {
+  ASSERT_EQ(record(small(), {"--frames", "40", "--output", "csv:" + file("live.csv"), "--keep",
+                             "none"})
+                .status,
+            0);
+  ASSERT_EQ(run_bridge({"export", file("r.twr"), "--csv", file("out.csv"), "--events",
+                        file("events.csv"), "--references", file("references.csv")})
+                .status,
+            0);
+  EXPECT_EQ(read_file(file("out.csv")), read_file(file("live.csv")));
+  EXPECT_NE(read_file(file("events.csv")).find("rest pose learned"), std::string::npos);
+  EXPECT_EQ(lines_in(read_file(file("references.csv"))), 1U) << "no reference was there";
+  const Outcome again = run_bridge({"export", file("r.twr"), "--csv", file("out.csv")});
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.err.find("--force"), std::string::npos);
+  const Outcome refused = replay();
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("--keep none"), std::string::npos);
+}
+
+TEST_F(Record, ThePapersColumnsHoldTheMotionOfBothTags) {
+  ASSERT_EQ(record(small(), {"--frames", "60"}).status, 0);
+  const Outcome exported = run_bridge({"export", file("r.twr"), "--paper", file("p")});
+  ASSERT_EQ(exported.status, 0) << exported.err;
+  EXPECT_FALSE(fs::exists(file("p_optoforceData.csv"))) << "there was no reference";
+  // The mean position of both tags is that of the platform's origin but for its turning, which
+  // moves the two in opposite directions.
+  record::RecordingReader reader(file("r.twr"));
+  std::vector<Vector6> moved;
+  for (record::TrackRecord r; reader.next(r);) {
+    if (r.track.status == Status::ok) moved.push_back(r.track.displacement);
+  }
+  std::ifstream in(file("p_arucotagData.csv"));
+  std::size_t rows = 0;
+  for (std::string line; std::getline(in, line); ++rows) {
+    std::vector<std::string> fields;
+    std::istringstream text(line);
+    for (std::string field; std::getline(text, field, ';');) fields.push_back(field);
+    ASSERT_EQ(fields.size(), 21U) << line;
+    EXPECT_EQ(std::stod(fields[20]), 0.2);
+    ASSERT_LT(rows, moved.size());
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(std::stod(fields[static_cast<std::size_t>(14 + i)]) + 0.05,
+                  moved[rows][i] - moved[0][i], 20e-6)
+          << "m, row " << rows;
+    }
+  }
+  EXPECT_EQ(rows, moved.size());
+  EXPECT_GT(rows, 20U);
+}
+
+TEST_F(Record, ARecordingIsNotOverwrittenAndNonsenseIsRefused) {
+  write_file(folder_ / "r.twr", "somebody's");
+  const Outcome refused = record(small(), {"--frames", "3"});
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("choose another name"), std::string::npos) << refused.err;
+  EXPECT_FALSE(fs::exists(file("live.jsonl"))) << "refused before anything else is made";
+  const Outcome replayed = replay();
+  EXPECT_EQ(replayed.status, 2);
+  EXPECT_NE(replayed.err.find("is not a recording"), std::string::npos) << replayed.err;
+  EXPECT_EQ(lines_in(replayed.err), 1U) << replayed.err;
+  EXPECT_EQ(run_bridge({"export", file("r.twr")}).status, 2);
+}
+
+TEST_F(Record, AFullDiskEndsItWithOneAndTheRestIsReadable) {
+  // The shell's limit stands in for the disk.
+  const std::string command = std::string("ulimit -f 2000; exec ") + TAGWRENCH_PROGRAM +
+                              " record --fast --source " + small() + " --out " + file("r.twr");
+  const Outcome ended = Bridge({"-c", command}, "/dev/null", "/bin/bash").finish();
+  EXPECT_EQ(ended.status, 1) << ended.err;
+  EXPECT_NE(ended.err.find("what was recorded until then is kept"), std::string::npos) << ended.err;
+  const Outcome ran = replay();
+  EXPECT_EQ(ran.status, 0) << ran.err;
+  EXPECT_GT(lines_in(read_file(file("replay.jsonl"))), 5U);
+}
+
+/// In memory where that is possible: a kill is about the program, not about the disk.
+fs::path roomy() { return ::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : fs::temp_directory_path(); }
+
+struct Killed {
+  fs::path file;
+  TimePoint at{};
+};
+
+TEST_F(Record, KilledAHundredTimesItLosesAtMostTheLastSecond) {
+  constexpr int kAtOnce = 10;
+  constexpr int kRounds = 10;
+  const fs::path folder = roomy() / fs::path(folder_.path()).filename();
+  fs::create_directories(folder);
+  std::minstd_rand random(20200531);
+  int long_lived = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::unique_ptr<Bridge>> bridges;
+    std::vector<Killed> killed;
+    std::vector<std::pair<int, std::size_t>> order;  // ms after the start, number
+    for (std::size_t i = 0; i < kAtOnce; ++i) {
+      killed.push_back({folder / (std::to_string(round) + "-" + std::to_string(i)), {}});
+      bridges.push_back(std::make_unique<Bridge>(
+          std::vector<std::string>{"record", "--source", small(), "--keep", "region", "--out",
+                                   killed.back().file, "--output", "jsonl:-"}));
+      order.emplace_back(static_cast<int>(random() % 1800), i);
+    }
+    // From when they all run, so that the first to go has something to lose.
+    for (const auto& bridge : bridges) ASSERT_TRUE(bridge->wait_for_lines(1)) << bridge->err();
+    const auto start = std::chrono::steady_clock::now();
+    std::sort(order.begin(), order.end());
+    for (const auto& [ms, i] : order) {
+      std::this_thread::sleep_until(start + std::chrono::milliseconds(ms));
+      killed[i].at = std::chrono::steady_clock::now();
+      bridges[i]->signal(SIGKILL);
+    }
+    for (const auto& bridge : bridges) EXPECT_EQ(bridge->finish().status, 128 + SIGKILL);
+    for (std::size_t i = 0; i < kAtOnce; ++i) {
+      // What the program said before the second that may be lost.
+      record::RecordingReader reader(killed[i].file);
+      EXPECT_FALSE(reader.head().closed);
+      TimePoint last{};
+      for (Sample sample; reader.next(sample);) last = sample.output_time;
+      if (killed[i].at - start > std::chrono::seconds(1)) {
+        ++long_lived;
+        EXPECT_GT(last, killed[i].at - std::chrono::seconds(1)) << killed[i].file;
+      }
+      record::Database database(killed[i].file, record::Database::Mode::read);
+      record::Statement check(database, "PRAGMA integrity_check");
+      ASSERT_TRUE(check.step());
+      EXPECT_EQ(check.text(0), "ok");
+      const auto count = [&](const char* sql) { return database.number(sql); };
+      const auto frames = count("SELECT count(*) FROM frames");
+      EXPECT_EQ(count("SELECT count(*) FROM tracks"), frames);
+      EXPECT_EQ(count("SELECT count(*) FROM samples WHERE id IN (SELECT id FROM frames)"), frames);
+      EXPECT_EQ(count("SELECT count(*) FROM frames WHERE bytes IS NULL"), 0);
+    }
+  }
+  EXPECT_GT(long_lived, 20) << "else nothing was shown";
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace tagwrench::test
