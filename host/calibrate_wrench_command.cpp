@@ -55,14 +55,15 @@ Matrix6 known_stiffness(const SensorConfig& sensor, const std::string& file) {
 
 /// Refuses a plan that leaves something open, or says what will be completed.
 void check_plan(const WrenchPlan& plan, const Vector6& range, bool require_all) {
-  const std::vector<std::string> missing = coverage_of(plan, range).missing();
-  for (const std::string& line : missing) {
-    if (require_all) throw ConfigError(fmt::format("--plan {}: {}; add a step", plan.name, line));
-    tell(
-        fmt::format("--plan {}: {}; it stays as the spring model has it and is marked so "
-                    "(--require-all refuses)",
-                    plan.name, line));
-  }
+  std::string missing;
+  for (const std::string& line : coverage_of(plan, range).missing())
+    missing += (missing.empty() ? "" : "; ") + line;
+  if (missing.empty()) return;
+  if (require_all) throw ConfigError(fmt::format("--plan {}: {}; add steps", plan.name, missing));
+  tell(
+      fmt::format("--plan {}: {}; that stays as the spring model has it and is marked so "
+                  "(--require-all refuses)",
+                  plan.name, missing));
 }
 
 /// What is in the way of the files to be written.

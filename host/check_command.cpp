@@ -6,10 +6,8 @@
 #include <iostream>
 #include <numbers>
 
-#include "host/bench_input.h"
 #include "host/check_text.h"
 #include "host/config_error.h"
-#include "host/hands_off.h"
 #include "host/link/cell_calibration.h"
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
@@ -20,6 +18,9 @@ namespace {
 constexpr int kOff = 1;
 constexpr Duration kPatience = std::chrono::seconds(20);
 constexpr Duration kPatienceForMass = std::chrono::seconds(60);
+constexpr Duration kLeastPush = std::chrono::seconds(8);
+constexpr double kKnownScale = 0.004;  // standard deviation at which pushing may end
+constexpr double kShortest = 1e-9;     // of a direction
 
 Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
 
@@ -91,39 +92,68 @@ CheckCommand::CheckCommand(CLI::App& app)
       ->add_option("--source", options_.source,
                    "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
       ->required();
+  add_load_options();
+}
+
+void CheckCommand::add_load_options() {
+  const auto vector = [&](const char* name, std::vector<double>& value, const char* help) {
+    return verb_->add_option(name, value, help)->delimiter(',')->expected(3)->check(finite());
+  };
   auto* mass = verb_->add_option("--mass-g", options_.mass_g, "a known mass to hang on, g")
                    ->check(CLI::Range(0.1, 1e5));
-  auto* at = verb_
-                 ->add_option("--at", options_.at_mm,
-                              "x,y,z: where it takes hold, mm, platform frame (origin between the "
-                              "tags, axes as the camera's)")
-                 ->delimiter(',')
-                 ->expected(3)
-                 ->check(finite());
-  mass->needs(at);
-  at->needs(mass);
-  verb_
-      ->add_option("--gravity", options_.gravity,
-                   "x,y,z: which way masses pull, camera axes; 0,0,-1 when the camera looks up")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(finite());
+  auto* at = vector("--at", options_.at_mm,
+                    "x,y,z: where a load takes hold, mm, platform frame (origin between the tags, "
+                    "axes as the camera's)");
+  vector("--gravity", options_.gravity,
+         "x,y,z: which way masses pull, camera axes; 0,0,-1 when the camera looks up");
   verb_
       ->add_option("--mass-sigma-percent", options_.mass_sigma_percent,
                    "how well the mass is known, 1 standard deviation")
       ->check(CLI::Range(0.0, 50.0));
   verb_->add_option("--at-sigma-mm", options_.at_sigma_mm, "how well the point is known")
       ->check(CLI::Range(0.0, 50.0));
+  auto* board = verb_->add_option("--board", options_.board,
+                                  "a load cell of this board to push with: its port, or auto");
+  auto* direction = vector("--direction", options_.direction,
+                           "x,y,z: of the force on the platform when the cell is pushed");
+  verb_
+      ->add_option("--cells", options_.cells,
+                   "calibration file of its load cells; without it the one kept for this board")
+      ->needs(board);
+  verb_->add_option("--channel", options_.channel, "of the load cell")
+      ->check(CLI::Range(0, 3))
+      ->needs(board);
+  mass->needs(at);
+  board->needs(at);
+  board->needs(direction);
+  direction->needs(board);
+  mass->excludes(board);
 }
 
 int CheckCommand::run() const {
-  if (!(vector3(options_.gravity).norm() > 1e-9))
+  if (!(vector3(options_.gravity).norm() > kShortest))
     throw ConfigError("--gravity: has no length; give a direction such as 0,0,-1");
-  BenchInput at = open_at_bench({options_.sensor, options_.source, true});
+  if (!options_.direction.empty() && !(vector3(options_.direction).norm() > kShortest))
+    throw ConfigError("--direction: has no length; give a direction such as 0,0,-1");
+  std::unique_ptr<RunBoard> board;
+  if (!options_.board.empty()) {
+    BoardOptions board_options;
+    board_options.port = options_.board == "auto" ? "" : options_.board;
+    board_options.cells_file = options_.cells;
+    board = std::make_unique<RunBoard>(board_options);
+    if (!board->connected()) return stopped();
+  }
+  BenchInput at;
+  if (board) {
+    at.input = open_input({options_.sensor, options_.source, false});  // a board has its own time
+  } else {
+    at = open_at_bench({options_.sensor, options_.source, true});
+  }
   Input& input = at.input;
   check_size(input);
   check_calibrated_rest(input.sensor, "check");
   const UniqueFd stop = signals_as_fd();
+  if (board && !board->settle_light(input, stop)) return stopped();
   HandsOff hands_off(input.sensor, std::chrono::seconds(2),
                      options_.mass_g ? kPatienceForMass : kPatience);
   tell("source: " + input.source->format().description);
@@ -135,18 +165,21 @@ int CheckCommand::run() const {
     return kOff;
   }
   bool fine = print(judge(hands_off.result()));
-  if (!options_.mass_g) return fine ? 0 : kOff;
+  if (options_.mass_g) fine = by_mass(at, stop, hands_off) && fine;
+  if (board) fine = by_cell(input, stop, *board) && fine;
+  if (signalled(stop)) return stopped();
+  return fine ? 0 : kOff;
+}
 
+bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off) const {
   KnownLoad load;
-  load.range = input.sensor.wrench.range;
+  load.range = at.input.sensor.wrench.range;
   const Vector6 before = hands_off.result().wrench;
-  load.measured_covariance = Matrix6::Zero();
   hands_off.wait_for_change(least_change(options_, load.range));
   tell(fmt::format("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest",
                    *options_.mass_g, options_.at_mm[0], options_.at_mm[1], options_.at_mm[2]));
   if (at.bench) at.bench->hang(*options_.mass_g * 1e-3, vector3(options_.at_mm) * 1e-3);
-  const Seen loaded = watch(*input.source, stop, hands_off);
-  if (loaded == Seen::stopped) return stopped();
+  const Seen loaded = watch(*at.input.source, stop, hands_off);
   InSituFinding scale{.subject = Subject::scale, .fault = Fault::not_known};
   if (loaded == Seen::enough && hands_off.result().held) {
     load.measured = hands_off.result().wrench - before;
@@ -154,8 +187,36 @@ int CheckCommand::run() const {
     set_known(options_, hands_off.displacement(), load);
     scale = judge(load);
   }
-  fine = print({scale}) && fine;
-  return fine ? 0 : kOff;
+  return loaded != Seen::stopped && print({scale});
+}
+
+/// Until the scale is known well, or patience is lost.
+bool CheckCommand::by_cell(Input& input, const UniqueFd& stop, RunBoard& board) const {
+  SensorConfig& sensor = input.sensor;
+  sensor.reference = ReferenceLine{options_.channel, vector3(options_.at_mm) * 1e-3,
+                                   vector3(options_.direction).normalized()};
+  const std::unique_ptr<Output> cell = board.output(sensor, "");
+  Tracker tracker(sensor.camera, sensor.target, sensor.rest);
+  WrenchEstimator wrench(sensor.wrench);
+  tell("now push with the load cell, slowly, on and off, for some seconds");
+  std::optional<TimePoint> begin;
+  while (true) {
+    Frame frame;
+    const Next next = next_frame(*input.source, stop, frame);
+    if (next == Next::stopped) return false;
+    if (next == Next::end) break;
+    if (const std::string_view news = cell->service(); !news.empty()) tell(news);
+    if (next != Next::frame) continue;
+    if (!begin) begin = frame.capture_time;
+    Sample sample{.capture_time = frame.capture_time, .latency_origin = frame.latency_origin};
+    const Track track = tracker.track(frame);
+    wrench.estimate(track, sample);
+    cell->send(sample);
+    const Duration pushed = frame.capture_time - *begin;
+    const bool known = board.monitor().scale_sigma() < kKnownScale;
+    if (pushed >= kPatience || (known && pushed >= kLeastPush)) break;
+  }
+  return print({judge(board.monitor())});
 }
 
 }  // namespace tagwrench

@@ -7,6 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "host/bench_input.h"
+#include "host/board/run_board.h"
+#include "host/hands_off.h"
+
 namespace tagwrench {
 
 struct CheckOptions {
@@ -18,6 +22,10 @@ struct CheckOptions {
   double at_sigma_mm = 0.3;
   std::vector<double> gravity{0, 0, -1};  ///< along which masses pull, camera axes
   double direction_sigma_deg = 1;         ///< of gravity
+  std::string board;                      ///< port of the board whose load cell tells the force
+  std::string cells;                      ///< calibration of its load cells
+  int channel = 0;
+  std::vector<double> direction;  ///< of the force on the platform, camera axes
 };
 
 /// Declares itself on the command line; must outlive the parsing.
@@ -31,6 +39,10 @@ class CheckCommand {
   int run() const;
 
  private:
+  void add_load_options();
+  bool by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off) const;
+  bool by_cell(Input& input, const UniqueFd& stop, RunBoard& board) const;
+
   CLI::App* verb_;
   CheckOptions options_;
 };

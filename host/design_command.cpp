@@ -65,6 +65,23 @@ Eigen::Isometry3d on_roof(std::size_t index, std::size_t count, double size, dou
   return pose;
 }
 
+/// Of the rectangle around all papers, px.
+Eigen::Vector2d size_in_picture(const study::Instrument& instrument) {
+  Eigen::AlignedBox2d around;
+  for (const study::SeenTag& tag : instrument.tags) {
+    const double half = 0.5 * tag.size + tag.border;
+    for (const double x : {-half, half}) {
+      for (const double y : {-half, half}) {
+        const Eigen::Vector3d p = tag.camera_T_tag * Eigen::Vector3d(x, y, 0);
+        around.extend(
+            Eigen::Vector2d(instrument.picture.fx_px * p.x(), instrument.picture.fy_px * p.y()) /
+            p.z());
+      }
+    }
+  }
+  return around.sizes();
+}
+
 }  // namespace
 
 DesignCommand::DesignCommand(CLI::App& app)
@@ -192,16 +209,16 @@ void DesignCommand::place_tags(study::Instrument& instrument) const {
   picture.fx_px = picture.fy_px = tag_px_ / tag_with_border_mm_ * lens_distance_mm_;
 }
 
-/// The published estimate takes its numbers from the pinhole: a tag as if it faced the lens, and
-/// the rectangle around the papers.
 void DesignCommand::take_sensor(study::Instrument& instrument) const {
-  for (const CLI::Option* option :
-       {tag_px_given_, distance_given_, size_given_, paper_given_, camera_given_, image_given_}) {
+  const SensorConfig sensor = load_sensor(sensor_);
+  std::vector<const CLI::Option*> said{tag_px_given_, size_given_, paper_given_, camera_given_,
+                                       image_given_};
+  if (sensor.rest.camera_T_platform) said.push_back(distance_given_);
+  for (const CLI::Option* option : said) {
     if (option->count() > 0)
       throw ConfigError(fmt::format("{}: {} says that already; leave one of them out",
                                     option->get_name(), sensor_));
   }
-  const SensorConfig sensor = load_sensor(sensor_);
   // A calibrated matrix is symmetric but for its errors.
   instrument.stiffness = 0.5 * (sensor.wrench.K + sensor.wrench.K.transpose());
   if (Eigen::LLT<Matrix6>(instrument.stiffness).info() != Eigen::Success) {
@@ -217,37 +234,38 @@ void DesignCommand::take_sensor(study::Instrument& instrument) const {
   picture.fy_px = camera.fy_px;
   picture.cx_px = camera.cx_px;
   picture.cy_px = camera.cy_px;
-  const TargetDescription& target = sensor.target;
   Eigen::Isometry3d rest = Eigen::Isometry3d::Identity();
   rest.translation() = Eigen::Vector3d(0, 0, lens_distance_mm_ * kMm);
-  if (sensor.rest.camera_T_platform) rest = *sensor.rest.camera_T_platform;
+  take_target(sensor.target, sensor.rest.camera_T_platform.value_or(rest), instrument);
+}
+
+void DesignCommand::take_target(const TargetDescription& target, const Eigen::Isometry3d& rest,
+                                study::Instrument& instrument) const {
   instrument.origin = rest.translation();
-  Eigen::AlignedBox2d around;
   for (std::size_t i = 0; i < target.tags.size(); ++i) {
     const Tag& tag = target.tags[i];
-    if (!tag.platform_T_tag && target.tags.size() > 2)
+    if (!tag.platform_T_tag && target.tags.size() > 2) {
       throw ConfigError(fmt::format(
           "{}: does not say where its tags are; run `tagwrench calibrate target`", sensor_));
+    }
     const Eigen::Isometry3d pose =
         rest *
         tag.platform_T_tag.value_or(on_roof(i, target.tags.size(), target.tag_size, target.border));
-    instrument.tags.push_back(seen_tag(target, tag, pose));
-    const double half = 0.5 * target.tag_size + target.border;
-    for (const double x : {-half, half}) {
-      for (const double y : {-half, half}) {
-        const Eigen::Vector3d p = pose * Eigen::Vector3d(x, y, 0);
-        around.extend(Eigen::Vector2d(camera.fx_px * p.x(), camera.fy_px * p.y()) / p.z());
-      }
+    if (pose.translation().z() < target.tag_size) {
+      throw ConfigError(
+          fmt::format("{}: tag {} would touch the lens; check rest and tags", sensor_, tag.id));
     }
+    instrument.tags.push_back(seen_tag(target, tag, pose));
   }
+  const Eigen::Vector2d around = size_in_picture(instrument);
   study::CountedPixels& counted = instrument.counted;
-  counted.frame_width_px = camera.width_px;
-  counted.frame_height_px = camera.height_px;
-  counted.image_width_px = around.sizes().x();
-  counted.image_height_px = around.sizes().y();
+  counted.frame_width_px = instrument.picture.width_px;
+  counted.frame_height_px = instrument.picture.height_px;
+  counted.image_width_px = around.x();
+  counted.image_height_px = around.y();
   counted.tag_with_border = target.tag_size + 2 * target.border;
   counted.lens_distance = instrument.origin.z();
-  counted.tag_px = camera.fx_px * counted.tag_with_border / counted.lens_distance;
+  counted.tag_px = instrument.picture.fx_px * counted.tag_with_border / counted.lens_distance;
 }
 
 void DesignCommand::mount_springs(study::Instrument& instrument) const {

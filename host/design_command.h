@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host/study/design.h"
+#include "host/tracker/target.h"
 
 namespace tagwrench {
 
@@ -23,6 +24,9 @@ class DesignCommand {
   void add_tag_options();
   void add_spring_options();
   void take_sensor(study::Instrument& instrument) const;
+  /// A tag counts as wide as if it faced the lens, the image as the rectangle around the papers.
+  void take_target(const TargetDescription& target, const Eigen::Isometry3d& rest,
+                   study::Instrument& instrument) const;
   void place_tags(study::Instrument& instrument) const;
   void mount_springs(study::Instrument& instrument) const;
   study::Instrument instrument() const;

@@ -40,6 +40,7 @@ class BoardOutput final : public Output {
 
   /// Compares every sample with this cell from now on, and says once what is wrong of each kind.
   void compare(const ReferenceComparison& comparison) { comparison_ = comparison; }
+  const ReferenceMonitor& monitor() const { return monitor_; }
 
   /// A row waits until the cells have spoken about its time, half a second at most.
   SendStatus send(const Sample& sample) noexcept override;

@@ -31,6 +31,9 @@ class RunBoard {
   /// Serves the link from the run's loop; see BoardOutput. Must not outlive this.
   std::unique_ptr<Output> output(const SensorConfig& sensor, const std::string& path);
 
+  /// What that output has found of the load cell in wrench.reference, as long as it is there.
+  const ReferenceMonitor& monitor() const { return output_->monitor(); }
+
   /// What the board says goes there too, as long as that output is there. Borrowed.
   void record_to(record::RecordingWriter& writer);
 

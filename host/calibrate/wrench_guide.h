@@ -73,6 +73,7 @@ class WrenchGuide {
   void ask();
   void again(const std::string& why);
   void complain(const std::string& why, bool counts);
+  void complain_of_silence();
   void watch_hold();
   void watch_rest(const Hold& hold);
   void watch_mass(const Hold& hold);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,7 +16,10 @@ namespace {
 
 constexpr double kLongestGap = 0.15;       // s between readings that are interpolated
 constexpr std::size_t kMostFrames = 1500;  // of pushes and movements in a fit
-constexpr double kNoRelation = 0.3;        // mean R^2
+// A hand leans and sways at half a hertz or so: frames closer together than this are off alike, and
+// would be taken for more than they are.
+constexpr double kPushEvery = 1.0;   // s
+constexpr double kNoRelation = 0.3;  // mean R^2
 constexpr const char* kFeatures[] = {"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
 
 /// Rows of a trial as they come.
@@ -122,40 +126,87 @@ class Collector {
       reference_.add(f->time, o.wrench, sigma, record.step);
   }
 
-  void add_movement(const StepRecord& record, const Baseline& baseline, std::size_t stride) {
-    std::size_t count = 0;
+  /// A frame of a push or a movement, and what the reference said.
+  struct Said {
+    const TrackedFrame* frame;
+    Vector6 value;  ///< counted from the rests
+    Vector6 noise;
+  };
+
+  std::vector<Said> said_during(const StepRecord& record, const Baseline& baseline,
+                                std::size_t stride) const {
     const Eigen::VectorXd times = reading_times(record);
     Eigen::MatrixXd values(times.size(), 6);
     for (Eigen::Index i = 0; i < times.size(); ++i) {
       const ReferenceSample& r = record.readings[static_cast<std::size_t>(i)];
       values.row(i) = (r.value - baseline.reading(r.time)).transpose();
-      reference_.add(r.time, wrench_of(record, baseline, r), r.sigma, record.step);
     }
-    const Vector6 sigma =
-        record.readings.empty() ? Vector6(Vector6::Zero()) : record.readings.front().sigma;
-    for (const TrackedFrame& f : record.frames) {
-      add_reading(record.step, baseline, f);
-      if (count++ % stride != 0) continue;
-      const auto said = [&](double lag) {
-        return Vector6(study::reference_at(Eigen::VectorXd::Constant(1, f.time), lag, times, values,
-                                           kLongestGap)
-                           .row(0)
-                           .transpose());
-      };
-      const Vector6 value = said(data_.lag.value);
+    const auto at = [&](double time, double lag) {
+      return Vector6(
+          study::reference_at(Eigen::VectorXd::Constant(1, time), lag, times, values, kLongestGap)
+              .row(0)
+              .transpose());
+    };
+    std::vector<Said> out;
+    const bool push = step_of(record).kind == StepKind::push;
+    double next = 0;
+    for (std::size_t i = 0; i < record.frames.size(); i += stride) {
+      const TrackedFrame& f = record.frames[i];
+      if (push && f.time < next) continue;
+      next = f.time + kPushEvery;
+      const Vector6 value = at(f.time, data_.lag.value);
       if (!value.allFinite()) continue;
       // What the lag may be off shifts the value along its slope.
-      Vector6 slope = said(data_.lag.value - data_.lag.sigma) - value;
+      Vector6 slope = at(f.time, data_.lag.value - data_.lag.sigma) - value;
       if (!slope.allFinite()) slope.setZero();
-      Observation o = begin(record, f.time);
-      o.displacement = f.displacement - baseline.drift(f.time);
-      o.displacement_covariance = f.covariance;
-      const Vector6 noise = (sigma.cwiseAbs2() + slope.cwiseAbs2()).cwiseSqrt();
-      if (plan_.reference == ReferenceKind::load_cell)
-        set_push(plan_, record.step, {value[0], noise[0], gain_sigma_}, f.displacement, o);
-      else
-        set_six_axis(plan_, value, noise, o);
-      data_.observations.push_back(o);
+      const Vector6 noise =
+          (record.readings.front().sigma.cwiseAbs2() + slope.cwiseAbs2()).cwiseSqrt();
+      out.push_back({&f, value, noise});
+    }
+    return out;
+  }
+
+  /// What the platform's own displacement says of the values: without noise and what is faster than
+  /// the springs follow, which an error that many observations share would otherwise explain.
+  static Eigen::MatrixXd smooth(const std::vector<Said>& said) {
+    const auto n = static_cast<Eigen::Index>(said.size());
+    Eigen::MatrixXd X(n, 7);
+    Eigen::MatrixXd V(n, 6);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Said& s = said[static_cast<std::size_t>(i)];
+      X.row(i) << s.frame->displacement.transpose(), 1;
+      V.row(i) = s.value.transpose();
+    }
+    for (Eigen::Index c = 0; c < 6; ++c) X.col(c) /= std::max(X.col(c).norm(), 1e-12);
+    return X * X.colPivHouseholderQr().solve(V);
+  }
+
+  void set_load(int step, const Vector6& value, const Vector6& noise, const Vector6& displacement,
+                Observation& o) const {
+    if (plan_.reference == ReferenceKind::load_cell)
+      set_push(plan_, step, {value[0], noise[0], gain_sigma_}, displacement, o);
+    else
+      set_six_axis(plan_, value, noise, o);
+  }
+
+  void add_movement(const StepRecord& record, const Baseline& baseline, std::size_t stride) {
+    for (const ReferenceSample& r : record.readings)
+      reference_.add(r.time, wrench_of(record, baseline, r), r.sigma, record.step);
+    for (const TrackedFrame& f : record.frames) add_reading(record.step, baseline, f);
+    const std::vector<Said> said = said_during(record, baseline, stride);
+    const Eigen::MatrixXd smoothed = smooth(said);
+    for (std::size_t i = 0; i < said.size(); ++i) {
+      const auto& [f, value, noise] = said[i];
+      Observation o = begin(record, f->time);
+      o.displacement = f->displacement - baseline.drift(f->time);
+      o.displacement_covariance = f->covariance;
+      set_load(record.step, value, noise, f->displacement, o);
+      Observation shared;
+      set_load(record.step, smoothed.row(static_cast<Eigen::Index>(i)).transpose(), noise,
+               f->displacement, shared);
+      o.common = std::move(shared.common);
+      o.products = std::move(shared.products);
+      data_.observations.push_back(std::move(o));
     }
   }
 

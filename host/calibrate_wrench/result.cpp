@@ -72,11 +72,15 @@ std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data
     lines.push_back(axis_line(i, fit.axis[axis], range[i], fit.inside_95[axis]));
   }
   for (const ModelTrial& trial : fit.trials) {
+    const bool best = std::none_of(fit.trials.begin(), fit.trials.end(), [&](const ModelTrial& t) {
+      return t.features.kind == trial.features.kind && t.score < trial.score;
+    });
+    if (!best) continue;  // of its kind
     lines.push_back(
-        fmt::format("model {}: held-out squared error {:.3f} +- {:.3f} of the linear "
-                    "one's{}",
+        fmt::format("model {}: held-out squared error {:.3g} +- {:.2g} of the linear "
+                    "one's; {}",
                     name(trial.features.kind), trial.score, trial.score_sigma,
-                    trial.adopted ? "; adopted" : "; not adopted"));
+                    trial.adopted ? "adopted" : "not adopted"));
   }
   for (const BlockFit& block : fit.blocks) {
     if (block.rejected) lines.push_back("left out: " + block.remark);

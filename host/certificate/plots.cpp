@@ -159,13 +159,14 @@ std::string trace_data(const Analysis& a, const Eigen::VectorXd& time,
 
 std::string trace_panel(const Analysis& a, const Eigen::VectorXd& time, int axis) {
   const Span s = span(a, axis);
+  const bool moving = a.reference_rate > 0;
   return fmt::format(
       "$felt << END\n{}END\n$ours << END\n{}END\n"
       "set yrange [{:.6g}:{:.6g}]\nset ytics nomirror scale 0.4 {:.6g} offset 0.7,0\n"
-      "plot $felt using 1:2 with lines linecolor '#000000' linewidth 2, "
-      "$ours using 1:2 with lines linecolor '#d62728' linewidth 0.9\n",
+      "plot $felt using 1:2 with lines linecolor '#000000' linewidth {}, "
+      "$ours using 1:2 with lines linecolor '#d62728' linewidth {}\n",
       trace_data(a, time, a.felt, axis), trace_data(a, time, a.predicted, axis), s.low, s.high,
-      tick(s, 5));
+      tick(s, 5), moving ? 2.0 : 5.0, moving ? 0.9 : 1.6);
 }
 
 std::string time_axis(const Eigen::VectorXd& time) {

@@ -225,4 +225,16 @@ InSituFinding judge(const KnownLoad& load, const InSituLimits& limits) {
   return finding;
 }
 
+InSituFinding judge(const ReferenceMonitor& monitor, const InSituLimits& limits) {
+  InSituFinding finding{
+      .subject = Subject::scale, .amount = monitor.scale(), .sigma = monitor.scale_sigma()};
+  const double off = std::abs(finding.amount - 1);
+  if (!(finding.sigma < limits.scale / limits.sigmas)) {
+    finding.fault = Fault::not_known;
+  } else if (off > limits.scale && off > limits.sigmas * finding.sigma) {
+    finding.fault = Fault::scale_wrong;
+  }
+  return finding;
+}
+
 }  // namespace tagwrench

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "host/check/reference_monitor.h"
 #include "host/types.h"
 
 namespace tagwrench {
@@ -85,7 +86,7 @@ struct InSituLimits {
   double sigmas = 3;
   double slip = 5e-6;        ///< m; what light and print do to a tag that has not moved
   double slip_angle = 2e-3;  ///< rad
-  double blur_px2 = 0.3;     ///< either way
+  double blur_px2 = 0.15;    ///< either way
   double residual_part = 0.05;
   double darkest = 50;      ///< white, counts
   double dimmed = 0.5;      ///< white over that at rest
@@ -101,5 +102,8 @@ std::vector<InSituFinding> judge(const AtRest& rest, const InSituLimits& limits 
 
 /// Measured over known, by least squares over the six axes, each as well as it is known.
 InSituFinding judge(const KnownLoad& load, const InSituLimits& limits = {});
+
+/// The same by a load cell through which somebody has pushed.
+InSituFinding judge(const ReferenceMonitor& monitor, const InSituLimits& limits = {});
 
 }  // namespace tagwrench

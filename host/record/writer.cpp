@@ -24,6 +24,8 @@ constexpr std::size_t kMostBuffer = 512UL << 20;
 /// Of the buffer, kept for what is small, so that a disk that cannot follow costs pixels first.
 constexpr std::size_t kSpare = 2UL << 20;
 constexpr std::size_t kLongestText = 4000;
+/// Bytes, after which a commit does not wait for its time.
+constexpr std::size_t kMostUncommitted = 8UL << 20;
 /// What must be left on the disk so that the log can be moved into the file.
 constexpr std::uint64_t kDiskReserve = 4ULL << 20;
 
@@ -265,12 +267,13 @@ void RecordingWriter::drain(Transaction& transaction, bool all) {
     if (failed_) continue;  // emptied all the same: somebody may wait for room
     const Item& item = *reinterpret_cast<const Item*>(record.data());
     if (item.kind == ItemKind::frame && transaction.open &&
-        transaction.age() >= options_.commit_period)
+        (transaction.age() >= options_.commit_period || transaction.bytes >= kMostUncommitted))
       commit(transaction);
     if (!transaction.open) {
       sink_->begin();
       transaction = {.open = true, .began = std::chrono::steady_clock::now()};
     }
+    transaction.bytes += record.size();
     transaction.within_frame = item.kind == ItemKind::frame || item.kind == ItemKind::track;
     take(item);
   }

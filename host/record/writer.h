@@ -78,6 +78,7 @@ class RecordingWriter {
   struct Transaction {
     bool open = false;
     TimePoint began{};
+    std::size_t bytes = 0;
     bool within_frame = false;  ///< its track or sample may still come
 
     Duration age() const noexcept {

@@ -106,12 +106,19 @@ Analysis analyze(const std::vector<Trial>& trials, const AnalysisOptions& option
   for (std::size_t k = 0; k < 6; ++k)
     analysis.axis[k].r2_in_sample = in_sample[static_cast<Eigen::Index>(k)];
 
-  const FoldPlans plans = plan_folds(clean, options);
-  analysis.validation = plans.description;
-  keep_held_out(cross_validate(clean, plans, options), analysis);
+  if (brings_predictions(clean)) {
+    analysis.validation = "each step, by the calibration's own fit without it";
+    keep_held_out(brought_predictions(rows), analysis);
+  } else {
+    const FoldPlans plans = plan_folds(clean, options);
+    analysis.validation = plans.description + ", predicted from the rest";
+    keep_held_out(cross_validate(clean, plans, options), analysis);
+  }
   if (analysis.time.size() == 0)
     throw ConfigError(fmt::format("{}: nothing could be held out; record more", trials[0].name));
-  measure_axes(analysis, 1 / analysis.reading_rate, trials.size() == 1);
+  measure_held_out(analysis);
+  measure_rest({rows.time, model.predict(rows.features), rows.felt, rows.stretch},
+               1 / analysis.reading_rate, trials.size() == 1, analysis);
   add_warnings(clean, all, options, analysis);
   return analysis;
 }

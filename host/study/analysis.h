@@ -37,12 +37,13 @@ struct AxisReport {
   double range_low = 0, range_high = 0;  ///< N or N m, of the reference
   double full_scale = 0;                 ///< the larger of the two, by magnitude
   double r2_in_sample = 0;
-  double r2 = 0;                    ///< held out
-  double rmse = 0;                  ///< held out, N or N m
-  double rmse_percent = 0;          ///< of full scale
-  double nonlinearity_percent = 0;  ///< largest deviation of the binned held-out mean from the line
-  double hysteresis_percent = 0;    ///< largest gap between rising and falling binned means
-  std::optional<double> noise;      ///< at rest, standard deviation, N or N m
+  double r2 = 0;                         ///< held out
+  double rmse = 0;                       ///< held out, N or N m
+  double rmse_percent = 0;               ///< of full scale
+  double nonlinearity_percent = 0;       ///< largest deviation of the binned held-out mean from the
+                                         ///< line; NaN: too few data, as for the next
+  double hysteresis_percent = 0;         ///< largest gap between rising and falling binned means
+  std::optional<double> noise;           ///< at rest, standard deviation, N or N m
   std::optional<double> noise_density;   ///< per root Hz
   std::optional<double> resolution;      ///< smallest step told from noise at 95 %
   std::optional<double> drift_per_hour;  ///< of the rest

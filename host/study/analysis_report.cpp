@@ -16,6 +16,10 @@ std::string figure(const std::optional<double>& value, const char* unit = "") {
   return value ? fmt::format("{:.3g}{}", *value, unit) : "-";
 }
 
+std::string percent(double value) {
+  return std::isfinite(value) ? fmt::format("{:.2f}", value) : "-";
+}
+
 void add_head(Out out, const Analysis& a) {
   fmt::format_to(out, "{}\n", fmt::join(a.names, ", "));
   fmt::format_to(out, "{} readings at {:.1f} Hz, {} of the reference", a.readings, a.reading_rate,
@@ -32,7 +36,7 @@ void add_head(Out out, const Analysis& a) {
       fmt::format_to(out, "lag not known; taken as 0\n");
     }
   }
-  fmt::format_to(out, "held out: {}, predicted from the rest\n\n", a.validation);
+  fmt::format_to(out, "held out: {}\n\n", a.validation);
 }
 
 void add_scores(Out out, const Analysis& a) {
@@ -47,9 +51,9 @@ void add_scores(Out out, const Analysis& a) {
       fmt::format_to(out, "  not calibrated\n");
       continue;
     }
-    fmt::format_to(out, "{:>8.4f}{:>8.4f}{:>11.3g}{:>7.2f}{:>8.2f}{:>7.2f}{:>9.3g}{:>8.3g}{}\n",
-                   x.r2_in_sample, x.r2, x.rmse, x.rmse_percent, x.nonlinearity_percent,
-                   x.hysteresis_percent, x.excitation, x.independent,
+    fmt::format_to(out, "{:>8.4f}{:>8.4f}{:>11.3g}{:>7.2f}{:>8}{:>7}{:>9.3g}{:>8.3g}{}\n",
+                   x.r2_in_sample, x.r2, x.rmse, x.rmse_percent, percent(x.nonlinearity_percent),
+                   percent(x.hysteresis_percent), x.excitation, x.independent,
                    x.calibrated ? "" : "  not calibrated");
   }
   fmt::format_to(out,
@@ -91,6 +95,7 @@ void add_cross_talk(Out out, const Analysis& a) {
 }
 
 void add_folds(Out out, const Analysis& a) {
+  if (a.folds.empty()) return;
   fmt::format_to(out, "{:<22}{:>9}", "held out, s", "lag, ms");
   for (const char* name : kAxisNames) fmt::format_to(out, "{:>9}", fmt::format("R2 {}", name));
   fmt::format_to(out, "\n");

@@ -89,8 +89,8 @@ void warn_of_channels(const std::vector<CleanTrial>& trials, const AnalysisOptio
     if (!axis.calibrated) continue;
     const Stretch one =
         stretch_of(trial, 0, trial.time.size(), static_cast<int>(k), options.smooth);
-    const Lag lag =
-        estimate_lag({&one, 1}, {options.lag_from, options.lag_to, std::max(1e-6, options.ridge)});
+    const Lag lag = estimate_lag({&one, 1}, {options.lag_from, options.lag_to,
+                                             std::max(1e-6, options.ridge), !options.smooth});
     const double difference = lag.value - analysis.lag.value;
     if (lag.known && lag.explained > kGoodAxis &&
         std::abs(difference) > kApart * std::hypot(lag.sigma, analysis.lag.sigma) &&
@@ -110,7 +110,8 @@ void warn_of_clocks(const std::vector<CleanTrial>& trials, const AnalysisOptions
     const CleanTrial& trial = trials[t];
     const Eigen::Index third = trial.time.size() / 3;
     if (trial.held || trial.step.size() > 0 || trial.time.size() < kLeastToSplit) continue;
-    const LagSearch search{options.lag_from, options.lag_to, std::max(1e-6, options.ridge)};
+    const LagSearch search{options.lag_from, options.lag_to, std::max(1e-6, options.ridge),
+                           !options.smooth};
     const Stretch begin = stretch_of(trial, 0, third, -1, options.smooth);
     const Stretch end = stretch_of(trial, trial.time.size() - third, third, -1, options.smooth);
     const Lag first = estimate_lag({&begin, 1}, search);

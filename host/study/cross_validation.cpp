@@ -13,7 +13,6 @@
 namespace tagwrench::study {
 namespace {
 
-constexpr std::size_t kMostStepGroups = 10;
 constexpr double kGapsOfMedian = 5;  // between readings, that end a stretch
 
 bool usable(const CleanTrial& trial, Eigen::Index i) {
@@ -93,22 +92,17 @@ FoldPlans time_blocks(const CleanTrial& trial, const AnalysisOptions& options) {
   return plans;
 }
 
-FoldPlans step_groups(const CleanTrial& trial) {
+FoldPlans each_step(const CleanTrial& trial) {
   const std::vector<Range> ranges = ranges_of(trial, 0);
   std::set<int> steps;
   for (const Range& range : ranges) steps.insert(trial.step[range.first]);
-  const std::size_t groups = std::min(steps.size(), kMostStepGroups);
   FoldPlans plans;
-  plans.folds.resize(groups);
-  for (const Range& range : ranges) {
-    const auto place =
-        static_cast<std::size_t>(std::distance(steps.begin(), steps.find(trial.step[range.first])));
-    for (std::size_t g = 0; g < groups; ++g)
-      (place % groups == g ? plans.folds[g].held_out : plans.folds[g].learned).push_back(range);
+  for (const int step : steps) {
+    FoldPlan& plan = plans.folds.emplace_back();
+    for (const Range& range : ranges)
+      (trial.step[range.first] == step ? plan.held_out : plan.learned).push_back(range);
   }
-  plans.description = groups == steps.size()
-                          ? fmt::format("each of {} steps", groups)
-                          : fmt::format("{} steps in {} groups, each group", steps.size(), groups);
+  plans.description = fmt::format("each of {} steps", steps.size());
   return plans;
 }
 
@@ -155,7 +149,7 @@ FoldPlans plan_folds(const std::vector<CleanTrial>& trials, const AnalysisOption
     const CleanTrial& trial = trials[0];
     const bool several_steps =
         trial.step.size() > 0 && trial.step.maxCoeff() > 0 && options.hold_out <= 0;
-    return several_steps ? step_groups(trial) : time_blocks(trial, options);
+    return several_steps ? each_step(trial) : time_blocks(trial, options);
   }
   FoldPlans plans;
   plans.folds.resize(trials.size());
@@ -177,6 +171,9 @@ Rows rows_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ra
   rows.features.resize(most, trials[0].features.cols());
   rows.felt.resize(most, 6);
   rows.stretch.resize(most);
+  const bool predictions = brings_predictions(trials);
+  rows.predicted.resize(predictions ? most : 0, 6);
+  rows.sigma.resize(predictions ? most : 0, 6);
   Eigen::Index used = 0;
   for (std::size_t r = 0; r < ranges.size(); ++r) {
     const Range& range = ranges[r];
@@ -191,6 +188,10 @@ Rows rows_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ra
       rows.features.row(used) = features.row(i);
       rows.felt.row(used) = felt.row(i);
       rows.stretch[used] = static_cast<int>(r);
+      if (predictions) {
+        rows.predicted.row(used) = trial.predicted.row(range.first + i);
+        rows.sigma.row(used) = trial.predicted_sigma.row(range.first + i);
+      }
       ++used;
     }
   }
@@ -198,6 +199,10 @@ Rows rows_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ra
   rows.features.conservativeResize(used, Eigen::NoChange);
   rows.felt.conservativeResize(used, Eigen::NoChange);
   rows.stretch.conservativeResize(used);
+  if (predictions) {
+    rows.predicted.conservativeResize(used, Eigen::NoChange);
+    rows.sigma.conservativeResize(used, Eigen::NoChange);
+  }
   return rows;
 }
 
@@ -224,7 +229,27 @@ Lag lag_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& rang
   search.from = options.lag_from;
   search.to = options.lag_to;
   search.ridge = std::max(search.ridge, options.ridge);
+  search.smooth = !options.smooth;
   return estimate_lag(stretches, search);
+}
+
+bool brings_predictions(const std::vector<CleanTrial>& trials) {
+  return std::all_of(trials.begin(), trials.end(),
+                     [](const CleanTrial& trial) { return trial.predicted.size() > 0; });
+}
+
+HeldOut brought_predictions(const Rows& rows) {
+  std::vector<Eigen::Index> there;
+  for (Eigen::Index i = 0; i < rows.time.size(); ++i) {
+    if (rows.predicted.row(i).allFinite() && rows.sigma.row(i).allFinite()) there.push_back(i);
+  }
+  HeldOut result;
+  result.time = rows.time(there);
+  result.predicted = rows.predicted(there, Eigen::all);
+  result.sigma = rows.sigma(there, Eigen::all);
+  result.felt = rows.felt(there, Eigen::all);
+  result.stretch = rows.stretch(there);
+  return result;
 }
 
 HeldOut cross_validate(const std::vector<CleanTrial>& trials, const FoldPlans& plans,

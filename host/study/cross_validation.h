@@ -15,9 +15,11 @@ namespace tagwrench::study {
 
 /// A trial that has been checked, its reference filtered as its readings will be.
 struct CleanTrial {
-  Eigen::VectorXd time;      ///< n
-  Eigen::MatrixXd features;  ///< n x p, not yet smoothed
-  Eigen::VectorXi step;      ///< n, or empty
+  Eigen::VectorXd time;       ///< n
+  Eigen::MatrixXd features;   ///< n x p, not yet smoothed
+  Eigen::VectorXi step;       ///< n, or empty
+  Eigen::MatrixXd predicted;  ///< n x 6, of the trial itself, and their sigmas; or empty
+  Eigen::MatrixXd predicted_sigma;
   Eigen::VectorXd reference_time;
   Eigen::MatrixXd reference;
   Eigen::VectorXd noise;    ///< 6, standard deviation of the reference before it was filtered
@@ -46,16 +48,17 @@ struct FoldPlans {
 /// All readings that count: those of steps, where there are steps.
 std::vector<Range> usable_ranges(const std::vector<CleanTrial>& trials);
 
-/// Several trials: each is held out once. One with steps: groups of steps, each group spread over
-/// the plan. Else blocks in time, or the end.
+/// Several trials: each is held out once. One with steps: each step. Else blocks in time, or the
+/// end.
 FoldPlans plan_folds(const std::vector<CleanTrial>& trials, const AnalysisOptions& options);
 
 /// Readings of some ranges and what the reference felt then.
 struct Rows {
-  Eigen::VectorXd time;      ///< k
-  Eigen::MatrixXd features;  ///< k x p
-  Eigen::MatrixXd felt;      ///< k x 6
-  Eigen::VectorXi stretch;   ///< k: index of the range
+  Eigen::VectorXd time;              ///< k
+  Eigen::MatrixXd features;          ///< k x p
+  Eigen::MatrixXd felt;              ///< k x 6
+  Eigen::VectorXi stretch;           ///< k: index of the range
+  Eigen::MatrixXd predicted, sigma;  ///< k x 6, that the trials brought; NaN where none
 };
 
 /// How readings are smoothed.
@@ -74,11 +77,15 @@ Lag lag_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& rang
            const AnalysisOptions& options);
 
 struct HeldOut {
-  std::vector<Fold> folds;
+  std::vector<Fold> folds;  ///< empty where the trials brought their predictions
   Eigen::VectorXd time;
   Eigen::MatrixXd predicted, sigma, felt;
   Eigen::VectorXi stretch;
 };
+
+/// What the trials brought; only where all of them did.
+bool brings_predictions(const std::vector<CleanTrial>& trials);
+HeldOut brought_predictions(const Rows& rows);
 
 /// Throws ConfigError if a fold leaves too little to learn from.
 HeldOut cross_validate(const std::vector<CleanTrial>& trials, const FoldPlans& plans,

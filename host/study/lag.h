@@ -39,6 +39,7 @@ struct LagSearch {
   double from = -0.2;  ///< s
   double to = 0.5;
   double ridge = 1e-6;  ///< of standardised features
+  bool smooth = true;   ///< both, alike, for the search; false: they are already
 };
 
 /// Constant axes and features do not count. All stretches have the same p and q. `known` is false

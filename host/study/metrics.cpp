@@ -23,6 +23,7 @@ constexpr double kUnknownNoise = 1e-9;  // of the range, where the reference has
 constexpr double kMostExcitation = 1e6;
 constexpr int kBins = 10;
 constexpr int kLeastInBin = 5;
+constexpr Eigen::Index kFewRows = 100;  // means of holds: each is a point of its own
 constexpr double kQuietSeconds = 1;
 constexpr Eigen::Index kLeastQuietRows = 10;
 constexpr double kQuietShare = 0.005;  // of full scale
@@ -55,6 +56,15 @@ struct Series {
   Eigen::VectorXd error;  ///< predicted - felt
 };
 
+/// The largest magnitude of those that are known; NaN if none is.
+double largest(const Eigen::VectorXd& values) {
+  double most = std::numeric_limits<double>::quiet_NaN();
+  for (const double value : values) {
+    if (std::isfinite(value) && !(std::abs(value) <= most)) most = std::abs(value);
+  }
+  return most;
+}
+
 /// Means of the error in bins of the load; NaN where there are too few.
 Eigen::VectorXd binned(const Series& s, const std::vector<Eigen::Index>& rows, double low,
                        double high) {
@@ -66,8 +76,9 @@ Eigen::VectorXd binned(const Series& s, const std::vector<Eigen::Index>& rows, d
     sum[bin] += s.error[i];
     ++count[bin];
   }
+  const int least = s.felt.size() < kFewRows ? 1 : kLeastInBin;
   for (Eigen::Index b = 0; b < kBins; ++b)
-    sum[b] = count[b] >= kLeastInBin ? sum[b] / count[b] : std::numeric_limits<double>::quiet_NaN();
+    sum[b] = count[b] >= least ? sum[b] / count[b] : std::numeric_limits<double>::quiet_NaN();
   return sum;
 }
 
@@ -78,11 +89,7 @@ double nonlinearity(const Series& s, double low, double high, double full_scale)
   const double gain = slope(s.felt, s.error);
   Series about_line = s;
   about_line.error.array() -= s.error.mean() + gain * (s.felt.array() - s.felt.mean());
-  double most = 0;
-  for (const double mean : binned(about_line, all, low, high)) {
-    if (std::isfinite(mean)) most = std::max(most, std::abs(mean));
-  }
-  return 100 * most / full_scale;
+  return 100 * largest(binned(about_line, all, low, high)) / full_scale;
 }
 
 double hysteresis(const Series& s, const Eigen::VectorXi& stretch, double low, double high,
@@ -97,24 +104,45 @@ double hysteresis(const Series& s, const Eigen::VectorXi& stretch, double low, d
     (change > 0 ? rising : falling).push_back(i);
   }
   const Eigen::VectorXd gap = binned(s, rising, low, high) - binned(s, falling, low, high);
-  double most = 0;
-  for (const double g : gap) {
-    if (std::isfinite(g)) most = std::max(most, std::abs(g));
+  return 100 * largest(gap) / full_scale;
+}
+
+/// Rows of a course in which the load stands still.
+struct Window {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
+std::vector<Window> quiet_windows(const Course& course, const Analysis& analysis, double period) {
+  const auto rows =
+      std::max(kLeastQuietRows, static_cast<Eigen::Index>(std::lround(kQuietSeconds / period)));
+  std::vector<Window> windows;
+  for (Eigen::Index first = 0; first + rows <= course.time.size();) {
+    bool quiet = course.stretch[first] == course.stretch[first + rows - 1];
+    for (std::size_t k = 0; k < 6 && quiet; ++k) {
+      const AxisReport& axis = analysis.axis[k];
+      const Eigen::VectorXd load =
+          course.felt.col(static_cast<Eigen::Index>(k)).segment(first, rows);
+      quiet = load.maxCoeff() - load.minCoeff() <=
+              std::max(6 * axis.reference_noise, kQuietShare * axis.full_scale);
+    }
+    if (quiet) windows.push_back({first, rows});
+    first += quiet ? rows : std::max<Eigen::Index>(1, rows / 4);
   }
-  return 100 * most / full_scale;
+  return windows;
 }
 
 /// White noise from neighbours' differences, which drift does not reach: density per root Hz is
 /// sqrt(2 period) times the Allan deviation at one period (IEEE Std 952, annex C).
-void measure_noise(const Analysis& analysis, const std::vector<Window>& windows, Eigen::Index k,
+void measure_noise(const Course& course, const std::vector<Window>& windows, Eigen::Index k,
                    double period, AxisReport& axis) {
   double squares = 0;
   double freedom = 0;
   double differences = 0;
   double pairs = 0;
   for (const Window& w : windows) {
-    const Eigen::VectorXd t = analysis.time.segment(w.first, w.count);
-    const Eigen::VectorXd p = analysis.predicted.col(k).segment(w.first, w.count);
+    const Eigen::VectorXd t = course.time.segment(w.first, w.count);
+    const Eigen::VectorXd p = course.predicted.col(k).segment(w.first, w.count);
     const Eigen::ArrayXd left = p.array() - p.mean() - slope(t, p) * (t.array() - t.mean());
     squares += left.square().sum();
     freedom += static_cast<double>(w.count - 2);
@@ -128,20 +156,20 @@ void measure_noise(const Analysis& analysis, const std::vector<Window>& windows,
   axis.resolution = kTwoSided95 * std::numbers::sqrt2 * *axis.noise;
 }
 
-void measure_drift(const Analysis& analysis, const std::vector<Window>& windows, Eigen::Index k,
-                   AxisReport& axis) {
+void measure_drift(const Course& course, const Analysis& analysis,
+                   const std::vector<Window>& windows, Eigen::Index k, AxisReport& axis) {
   std::vector<double> times;
   std::vector<double> errors;
   for (const Window& w : windows) {
     bool rest = true;
     for (Eigen::Index j = 0; j < 6; ++j) {
-      const double load = analysis.felt.col(j).segment(w.first, w.count).mean();
+      const double load = course.felt.col(j).segment(w.first, w.count).mean();
       rest = rest &&
              std::abs(load) <= kRestShare * analysis.axis[static_cast<std::size_t>(j)].full_scale;
     }
     if (!rest) continue;
-    times.push_back(analysis.time.segment(w.first, w.count).mean());
-    errors.push_back((analysis.predicted - analysis.felt).col(k).segment(w.first, w.count).mean());
+    times.push_back(course.time.segment(w.first, w.count).mean());
+    errors.push_back((course.predicted - course.felt).col(k).segment(w.first, w.count).mean());
   }
   if (times.size() < 3 || times.back() - times.front() < kDriftSeconds) return;
   const auto n = static_cast<Eigen::Index>(times.size());
@@ -149,20 +177,20 @@ void measure_drift(const Analysis& analysis, const std::vector<Window>& windows,
                                      Eigen::Map<const Eigen::VectorXd>(errors.data(), n));
 }
 
-void measure_creep(const Analysis& analysis, const std::vector<Window>& windows, Eigen::Index k,
+void measure_creep(const Course& course, const std::vector<Window>& windows, Eigen::Index k,
                    AxisReport& axis) {
   std::vector<double> creep;
   for (std::size_t i = 0; i < windows.size();) {
     Window hold = windows[i++];
     while (i < windows.size() && windows[i].first == hold.first + hold.count &&
-           analysis.stretch[windows[i].first] == analysis.stretch[hold.first])
+           course.stretch[windows[i].first] == course.stretch[hold.first])
       hold.count += windows[i++].count;
-    const Eigen::VectorXd t = analysis.time.segment(hold.first, hold.count);
+    const Eigen::VectorXd t = course.time.segment(hold.first, hold.count);
     const double seconds = t[hold.count - 1] - t[0];
-    const double load = analysis.felt.col(k).segment(hold.first, hold.count).mean();
+    const double load = course.felt.col(k).segment(hold.first, hold.count).mean();
     if (seconds < kCreepSeconds || std::abs(load) < kCreepShare * axis.full_scale) continue;
     const Eigen::VectorXd error =
-        (analysis.predicted - analysis.felt).col(k).segment(hold.first, hold.count);
+        (course.predicted - course.felt).col(k).segment(hold.first, hold.count);
     creep.push_back(100 * slope(t, error) * seconds / load);
   }
   if (creep.size() >= 2) axis.creep_percent = median(creep);
@@ -259,31 +287,11 @@ void judge_excitation(const Eigen::MatrixXd& felt, const Eigen::VectorXd& noise,
   find_weakest(felt, changing, analysis);
 }
 
-std::vector<Window> quiet_windows(const Analysis& analysis, double period) {
-  const auto rows =
-      std::max(kLeastQuietRows, static_cast<Eigen::Index>(std::lround(kQuietSeconds / period)));
-  std::vector<Window> windows;
-  for (Eigen::Index first = 0; first + rows <= analysis.time.size();) {
-    bool quiet = analysis.stretch[first] == analysis.stretch[first + rows - 1];
-    for (std::size_t k = 0; k < 6 && quiet; ++k) {
-      const AxisReport& axis = analysis.axis[k];
-      const Eigen::VectorXd load =
-          analysis.felt.col(static_cast<Eigen::Index>(k)).segment(first, rows);
-      quiet = load.maxCoeff() - load.minCoeff() <=
-              std::max(6 * axis.reference_noise, kQuietShare * axis.full_scale);
-    }
-    if (quiet) windows.push_back({first, rows});
-    first += quiet ? rows : std::max<Eigen::Index>(1, rows / 4);
-  }
-  return windows;
-}
-
-void measure_axes(Analysis& analysis, double period, bool one_clock) {
+void measure_held_out(Analysis& analysis) {
   const Eigen::Index n = analysis.time.size();
   const Eigen::VectorXd r2 = r_squared(analysis.predicted, analysis.felt);
   const Eigen::VectorXd rmse = rms_error(analysis.predicted, analysis.felt);
   const Eigen::MatrixXd error = analysis.predicted - analysis.felt;
-  const std::vector<Window> windows = quiet_windows(analysis, period);
   for (std::size_t k = 0; k < 6; ++k) {
     AxisReport& axis = analysis.axis[k];
     const auto at = static_cast<Eigen::Index>(k);
@@ -296,15 +304,24 @@ void measure_axes(Analysis& analysis, double period, bool one_clock) {
         nonlinearity(series, axis.range_low, axis.range_high, axis.full_scale);
     axis.hysteresis_percent = hysteresis(series, analysis.stretch, axis.range_low, axis.range_high,
                                          axis.reference_noise, axis.full_scale);
-    measure_noise(analysis, windows, at, period, axis);
-    if (one_clock) measure_drift(analysis, windows, at, axis);
-    measure_creep(analysis, windows, at, axis);
     const auto within =
         (error.col(at).array().abs() <= kTwoSided95 * analysis.predicted_sigma.col(at).array())
             .count();
     axis.coverage = static_cast<double>(within) / static_cast<double>(n);
   }
   measure_cross_talk(analysis, error);
+}
+
+void measure_rest(const Course& course, double period, bool one_clock, Analysis& analysis) {
+  const std::vector<Window> windows = quiet_windows(course, analysis, period);
+  for (std::size_t k = 0; k < 6; ++k) {
+    AxisReport& axis = analysis.axis[k];
+    const auto at = static_cast<Eigen::Index>(k);
+    if (axis.full_scale == 0) continue;
+    measure_noise(course, windows, at, period, axis);
+    if (one_clock) measure_drift(course, analysis, windows, at, axis);
+    measure_creep(course, windows, at, axis);
+  }
 }
 
 }  // namespace tagwrench::study

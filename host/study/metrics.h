@@ -14,15 +14,19 @@ namespace tagwrench::study {
 void judge_excitation(const Eigen::MatrixXd& felt, const Eigen::VectorXd& noise,
                       Analysis& analysis);
 
-/// From Analysis' held-out series and ranges: the scores and characteristics of AxisReport, and
-/// cross_talk.
-void measure_axes(Analysis& analysis, double period, bool one_clock);
+/// From Analysis' held-out series and ranges: scores, non-linearity, hysteresis (NaN where the data
+/// are too few), coverage and cross_talk.
+void measure_held_out(Analysis& analysis);
 
-/// Windows in which the load stands still, as rows of the held-out series: first and count.
-struct Window {
-  Eigen::Index first = 0;
-  Eigen::Index count = 0;
+/// All readings, by the fit to all of them.
+struct Course {
+  Eigen::VectorXd time;       ///< k
+  Eigen::MatrixXd predicted;  ///< k x 6
+  Eigen::MatrixXd felt;       ///< k x 6
+  Eigen::VectorXi stretch;    ///< k: rows of one number follow each other without a gap
 };
-std::vector<Window> quiet_windows(const Analysis& analysis, double period);
+
+/// Noise, drift and creep where the load stands still; `one_clock`: times of all stretches go on.
+void measure_rest(const Course& course, double period, bool one_clock, Analysis& analysis);
 
 }  // namespace tagwrench::study

@@ -34,7 +34,10 @@ void check_shapes(const Trial& trial) {
   const Eigen::Index n = trial.time.size();
   const Eigen::Index m = trial.reference_time.size();
   if (trial.features.rows() != n || trial.features.cols() == 0 || trial.reference.rows() != m ||
-      trial.reference.cols() != 6 || (trial.step.size() > 0 && trial.step.size() != n)) {
+      trial.reference.cols() != 6 || (trial.step.size() > 0 && trial.step.size() != n) ||
+      (trial.predicted.size() > 0 &&
+       (trial.predicted.rows() != n || trial.predicted.cols() != 6 ||
+        trial.predicted_sigma.rows() != n || trial.predicted_sigma.cols() != 6))) {
     throw ConfigError(
         fmt::format("{}: columns of different lengths, or none; write it anew", trial.name));
   }
@@ -234,6 +237,10 @@ CleanTrial check_trial(const Trial& trial, const AnalysisOptions& options,
   clean.time = trial.time.tail(n);
   clean.features = trial.features.bottomRows(n);
   if (trial.step.size() > 0) clean.step = trial.step.tail(n);
+  if (trial.predicted.size() > 0) {
+    clean.predicted = trial.predicted.bottomRows(n);
+    clean.predicted_sigma = trial.predicted_sigma.bottomRows(n);
+  }
   clean.reference_time = trial.reference_time.tail(m);
   clean.reference = trial.reference.bottomRows(m);
   clean.longest_gap = trial.held ? std::numeric_limits<double>::infinity()

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <stdexcept>
 
 #include "host/config_error.h"
@@ -18,6 +20,7 @@ namespace {
 constexpr std::string_view kFormat = "tagwrench-data-1";
 constexpr std::array<const char*, 6> kLoads{"Fx_N", "Fy_N", "Fz_N", "Mx_Nm", "My_Nm", "Mz_Nm"};
 constexpr std::string_view kSigma = "sigma_";
+constexpr std::string_view kPredicted = "predicted_";
 
 void check_shapes(const Trial& trial) {
   const auto n = trial.time.size();
@@ -29,7 +32,9 @@ void check_shapes(const Trial& trial) {
   if (!fits(trial.features, n, p) || !fits(trial.reference, m, 6) ||
       (trial.feature_sigma.size() > 0 && !fits(trial.feature_sigma, n, p)) ||
       (trial.reference_sigma.size() > 0 && !fits(trial.reference_sigma, m, 6)) ||
-      (trial.step.size() > 0 && trial.step.size() != n))
+      (trial.step.size() > 0 && trial.step.size() != n) ||
+      (trial.predicted.size() > 0 &&
+       (!fits(trial.predicted, n, 6) || !fits(trial.predicted_sigma, n, 6))))
     throw std::invalid_argument("a trial whose columns are not of one length");
   for (const std::string& name : trial.feature_names) {
     if (name.empty() || name.find_first_of(",;\t\r\n#") != std::string::npos)
@@ -46,8 +51,15 @@ std::string one_line(std::string text) {
 
 using Out = std::back_insert_iterator<std::string>;
 
+/// Numbers that are not finite are left empty.
 void add_row(Out out, const Eigen::MatrixXd& matrix, Eigen::Index row) {
-  for (Eigen::Index i = 0; i < matrix.cols(); ++i) fmt::format_to(out, ",{}", matrix(row, i));
+  for (Eigen::Index i = 0; i < matrix.cols(); ++i) {
+    if (std::isfinite(matrix(row, i))) {
+      fmt::format_to(out, ",{}", matrix(row, i));
+    } else {
+      fmt::format_to(out, ",");
+    }
+  }
 }
 
 /// The columns of one kind of row; which columns of the file hold them.
@@ -58,16 +70,9 @@ struct Columns {
 
 class TrialReader {
  public:
-  explicit TrialReader(const std::filesystem::path& file) : text_(file, ',') {
-    const auto& comments = text_.comments();
-    if (comments.empty() || comments[0] != kFormat) {
-      throw ConfigError(
-          fmt::format("{}: does not begin with '# {}'; for files of others name their "
-                      "columns, see `tagwrench analyze --help`",
-                      text_.name(), kFormat));
-    }
+  explicit TrialReader(const std::filesystem::path& file) : text_(ours(file), ',') {
     trial_.name = file.stem().stem().string();
-    for (const std::string& comment : comments) {
+    for (const std::string& comment : text_.comments()) {
       if (comment.starts_with("name: ")) trial_.name = comment.substr(6);
       if (comment == "held: true") trial_.held = true;
     }
@@ -89,6 +94,10 @@ class TrialReader {
     trial_.reference_time = times(references);
     trial_.features = numbers(readings, features_.values);
     trial_.feature_sigma = sigmas(readings, features_.sigmas);
+    if (!predictions_.values.empty()) {
+      trial_.predicted = optional_numbers(readings, predictions_.values);
+      trial_.predicted_sigma = optional_numbers(readings, predictions_.sigmas);
+    }
     trial_.reference = numbers(references, loads_.values);
     trial_.reference_sigma = sigmas(references, loads_.sigmas);
     if (step_ > 0) {
@@ -100,17 +109,33 @@ class TrialReader {
   }
 
  private:
+  static const std::filesystem::path& ours(const std::filesystem::path& file) {
+    std::error_code error;
+    if (std::filesystem::is_regular_file(file, error) && !is_trial_file(file)) {
+      throw ConfigError(fmt::format(
+          "{}: does not begin with '# {}'; for files of others name their columns, see `tagwrench "
+          "analyze --help`",
+          file.string(), kFormat));
+    }
+    return file;
+  }
+
   void find_columns() {
     const std::vector<std::string>& header = text_.header();
     if (header.size() < 2 || header[0] != "kind" || header[1] != "t_s") {
       throw ConfigError(fmt::format("{}: the header must begin with kind,t_s", text_.name()));
     }
     for (std::size_t i = 2; i < header.size(); ++i) {
-      const bool sigma = header[i].starts_with(kSigma);
-      const std::string name = sigma ? header[i].substr(kSigma.size()) : header[i];
+      std::string name = header[i];
+      const bool predicted = name.starts_with(kPredicted);
+      if (predicted) name.erase(0, kPredicted.size());
+      const bool sigma = name.starts_with(kSigma);
+      if (sigma) name.erase(0, kSigma.size());
       const bool load = std::find(kLoads.begin(), kLoads.end(), name) != kLoads.end();
       if (name == "step") {
         step_ = i;
+      } else if (predicted) {
+        (sigma ? predictions_.sigmas : predictions_.values).push_back(i);
       } else if (sigma) {
         (load ? loads_ : features_).sigmas.push_back(i);
       } else {
@@ -121,8 +146,12 @@ class TrialReader {
     const auto whole = [](const Columns& c) {
       return c.sigmas.empty() || c.sigmas.size() == c.values.size();
     };
-    if (loads_.values.size() != kLoads.size() || features_.values.empty() || !whole(loads_) ||
-        !whole(features_)) {
+    const bool predictions_whole =
+        predictions_.values.empty()
+            ? predictions_.sigmas.empty()
+            : predictions_.values.size() == 6 && predictions_.sigmas.size() == 6;
+    if (!predictions_whole || loads_.values.size() != kLoads.size() || features_.values.empty() ||
+        !whole(loads_) || !whole(features_)) {
       throw ConfigError(
           fmt::format("{}: the header must name features, the six of {}, and all of "
                       "their sigmas or none",
@@ -175,6 +204,21 @@ class TrialReader {
     return matrix;
   }
 
+  /// NaN where a field is empty.
+  Eigen::MatrixXd optional_numbers(const std::vector<std::size_t>& rows,
+                                   const std::vector<std::size_t>& columns) const {
+    Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()),
+                           static_cast<Eigen::Index>(columns.size()));
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      for (std::size_t j = 0; j < columns.size(); ++j) {
+        const bool empty = text_.field(rows[i], columns[j]).empty();
+        matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+            empty ? std::numeric_limits<double>::quiet_NaN() : text_.number(rows[i], columns[j]);
+      }
+    }
+    return matrix;
+  }
+
   int step(std::size_t row) const {
     const std::string_view field = text_.field(row, step_);
     int value = -1;
@@ -190,6 +234,7 @@ class TrialReader {
   DelimitedText text_;
   Columns features_;
   Columns loads_;
+  Columns predictions_;
   std::size_t step_ = 0;
   Trial trial_;
 };
@@ -197,7 +242,7 @@ class TrialReader {
 }  // namespace
 
 std::vector<std::string> displacement_names() {
-  return {"dx_m", "dy_m", "dz_m", "drx_rad", "dry_rad", "drz_rad"};
+  return {"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
 }
 
 std::string trial_to_csv(const Trial& trial) {
@@ -212,6 +257,11 @@ std::string trial_to_csv(const Trial& trial) {
   for (const std::string& name : trial.feature_names) text += "," + name;
   if (feature_sigmas)
     for (const std::string& name : trial.feature_names) text += fmt::format(",{}{}", kSigma, name);
+  const bool predictions = trial.predicted.size() > 0;
+  if (predictions) {
+    for (const char* name : kLoads) text += fmt::format(",{}{}", kPredicted, name);
+    for (const char* name : kLoads) text += fmt::format(",{}{}{}", kPredicted, kSigma, name);
+  }
   for (const char* name : kLoads) text += fmt::format(",{}", name);
   if (load_sigmas)
     for (const char* name : kLoads) text += fmt::format(",{}{}", kSigma, name);
@@ -219,7 +269,8 @@ std::string trial_to_csv(const Trial& trial) {
 
   const auto out = std::back_inserter(text);
   const auto p = trial.feature_names.size();
-  const std::string no_features((steps ? 1 : 0) + p * (feature_sigmas ? 2 : 1), ',');
+  const std::string no_features(
+      (steps ? 1 : 0) + p * (feature_sigmas ? 2 : 1) + (predictions ? 12 : 0), ',');
   const std::string no_loads(load_sigmas ? 12 : 6, ',');
   Eigen::Index reading = 0;
   Eigen::Index reference = 0;
@@ -232,6 +283,10 @@ std::string trial_to_csv(const Trial& trial) {
       if (steps) fmt::format_to(out, ",{}", trial.step[reading]);
       add_row(out, trial.features, reading);
       if (feature_sigmas) add_row(out, trial.feature_sigma, reading);
+      if (predictions) {
+        add_row(out, trial.predicted, reading);
+        add_row(out, trial.predicted_sigma, reading);
+      }
       text += no_loads;
       ++reading;
     } else {

@@ -3,11 +3,13 @@
 //   # tagwrench-data-1
 //   # name: the trial's name
 //   # held: true                     only where the reference is what hangs there
-//   kind,t_s,step,dx_m,...,drz_rad,sigma_dx_m,...,Fx_N,...,Mz_Nm,sigma_Fx_N,...,sigma_Mz_Nm
+//   kind,t_s,step,x_m,...,rz_rad,sigma_x_m,...,predicted_Fx_N,...,predicted_sigma_Fx_N,...,
+//        Fx_N,...,Mz_Nm,sigma_Fx_N,...,sigma_Mz_Nm
 //   reading,0.04,0,1.2e-05,...       features; the reference's fields are empty
 //   reference,0.05,,,...,0.21,...    the reverse
 //
-// Rows are in order of time. Columns of what is not known (step, sigmas) are left out as a whole.
+// Rows are in order of time. Columns of what is not known (step, sigmas, predictions) are left out
+// as a whole; the predictions of one reading may be empty.
 #pragma once
 
 #include <filesystem>

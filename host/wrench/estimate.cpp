@@ -1,5 +1,6 @@
 #include "host/wrench/estimate.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tagwrench {
@@ -35,8 +36,10 @@ void WrenchEstimator::set_parameter_variances() {
     for (Eigen::Index l = 0; l < n; ++l) {
       const Matrix6 moved =
           tool_ * model_.parameter_covariance.block<6, 6>(6 * k, 6 * l) * tool_.transpose();
+      // The lower triangle stands for both.
       for (int axis = 0; axis < 6; ++axis)
-        parameter_variance_[static_cast<std::size_t>(axis)](k, l) = moved(axis, axis);
+        parameter_variance_[static_cast<std::size_t>(axis)](std::max(k, l), std::min(k, l)) +=
+            moved(axis, axis);
     }
   }
 }
@@ -48,8 +51,8 @@ Vector6 WrenchEstimator::parameter_variance(const FeatureVector& features) const
     const Quadratic& q = parameter_variance_[static_cast<std::size_t>(axis)];
     double sum = q(n, n);
     for (Eigen::Index l = 0; l < n; ++l) {
-      double column = q(n, l) + q(l, n);
-      for (Eigen::Index k = 0; k < n; ++k) column += q(k, l) * features[k];
+      double column = q(n, l);
+      for (Eigen::Index k = l; k < n; ++k) column += q(k, l) * features[k];
       sum += column * features[l];
     }
     out[axis] = sum;

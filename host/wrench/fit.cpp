@@ -17,11 +17,50 @@ namespace {
 using fit::Judged;
 using fit::Problem;
 
+constexpr std::array<const char*, 6> kAxes{"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 constexpr double kInside95 = 1.96;
 constexpr double kCommonOff = 3;  // standard deviations: said
 
 Matrix6 stiffness_of(const Eigen::VectorXd& unknowns) {
   return Eigen::Map<const Matrix6>(unknowns.data());
+}
+
+/// Assumes reciprocity, in the units of the springs' stiffness or, without springs, of the one that
+/// the data give by themselves.
+void assume_reciprocity(Problem& problem, const FitOptions& options) {
+  if (!(options.reciprocity > 0)) return;
+  Matrix6 stiffness;
+  if (options.prior) {
+    stiffness = *options.prior;
+  } else {
+    const fit::Weighting equal{.error = {},
+                               .block = std::vector<double>(problem.blocks.size(), 1.0)};
+    stiffness = stiffness_of(fit::solve(problem, equal, {}).unknowns);
+    if ((stiffness.diagonal().array() <= 0).any()) return;
+  }
+  problem.reciprocity = fit::prior_sigma_of(stiffness, options.reciprocity);
+}
+
+/// The pair of axes that breaks it most, and by how many standard deviations; empty if none does.
+std::string broken_reciprocity(const Problem& problem, const Matrix6& K) {
+  constexpr double kBroken = 3;
+  double most = kBroken;
+  std::string out;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const auto row = static_cast<int>(i), column = static_cast<int>(j);
+      if (problem.reciprocity(row, column) == 0) continue;
+      const double off =
+          std::abs(K(row, column) - K(column, row)) / problem.reciprocity(row, column);
+      if (off <= most) continue;
+      most = off;
+      out = fmt::format(
+          "K is not symmetric by {:.0f} standard deviations ({} and {}), as springs' is; fitted "
+          "without that assumption: check points and directions of the plan, and that nothing rubs",
+          off, kAxes[j], kAxes[i]);
+    }
+  }
+  return out;
 }
 
 /// Of the offset that the sensor will be used with.
@@ -187,10 +226,9 @@ void set_common(const Problem& problem, const Judged& judged, WrenchFit& out) {
 
 void require_all(const WrenchFit& fitted) {
   std::vector<std::string> lacking;
-  constexpr std::array<const char*, 6> kNames{"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
   for (std::size_t i = 0; i < 6; ++i) {
     if (fitted.axis[i].state != AxisState::calibrated)
-      lacking.push_back(fmt::format("{} is not calibrated ({})", kNames[i], fitted.axis[i].reason));
+      lacking.push_back(fmt::format("{} is not calibrated ({})", kAxes[i], fitted.axis[i].reason));
   }
   if (lacking.empty()) return;
   throw ConfigError(
@@ -203,8 +241,15 @@ void require_all(const WrenchFit& fitted) {
 WrenchFit fit_wrench(std::span<const Observation> observations, std::span<const PathPoint> path,
                      const FitOptions& options) {
   Problem problem = fit::make_problem(observations, path, {}, options.prior, options.prior_width);
+  assume_reciprocity(problem, options);
   Judged judged = fit::judge(problem);
   WrenchFit out;
+  const std::string broken = broken_reciprocity(problem, stiffness_of(judged.solution.unknowns));
+  if (!broken.empty()) {
+    out.warnings.push_back(broken);
+    problem.reciprocity.setZero();
+    judged = fit::judge(problem);
+  }
   if (options.try_richer) {
     out.trials = fit::try_richer(problem, judged, observations, path);
     for (const ModelTrial& trial : out.trials) {

@@ -59,8 +59,13 @@ struct FitOptions {
   std::optional<Matrix6> prior = {};  ///< stiffness of the spring model
   double prior_width = 0.3;           ///< of each entry, relative to the geometric mean of the
                                       ///< stiffnesses of its two axes
-  bool require_all = false;           ///< refuse unless every axis is calibrated
-  bool try_richer = true;             ///< quadratic; creep and hysteresis too where there is a path
+  /// Springs are conservative, so that K = K^T about any point (Maxwell, Phil. Mag. 27, 294, 1864;
+  /// Betti, 1872); the tracker's errors of scale and axes, some 0.1 % each, break it a little. One
+  /// standard deviation of K_ij - K_ji, relative as prior_width; 0: not assumed. It lets a push
+  /// along a soft axis tell what one along a stiff axis, half a degree off its line, cannot.
+  double reciprocity = 0.005;
+  bool require_all = false;  ///< refuse unless every axis is calibrated
+  bool try_richer = true;    ///< quadratic; creep and hysteresis too where there is a path
   std::optional<int> zero_in_use = {};  ///< the Observation::zero whose offset becomes the model's
                                         ///< B; default: the first observation's
 };

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 
 namespace tagwrench::fit {
@@ -15,47 +17,48 @@ constexpr double kReachedError = 0.10;  // of full load, in all six numbers toge
 constexpr double kMissing = 0.02;       // singular value over the largest
 constexpr double kTakesPart = 0.3;      // in a combination
 
-/// Motion that a load of one natural scale along each axis makes; columns of directions that the
-/// stiffness does not resist are zero.
-Matrix6 motions(const Problem& problem, const Matrix6& K, Vector6& resolved) {
-  const Matrix6 scaled =
-      problem.scale.cwiseInverse().asDiagonal() * K * problem.motion_scale.asDiagonal();
-  Eigen::JacobiSVD<Matrix6> svd(scaled, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  svd.setThreshold(1e-3);
-  const Matrix6 inverse = svd.solve(Matrix6::Identity());
-  const Matrix6 missed = Matrix6::Identity() - scaled * inverse;
-  resolved = missed.colwise().norm().transpose();
-  return problem.motion_scale.asDiagonal() * inverse;
-}
-
-/// Variances of the six answers to one motion.
-Vector6 answer_variance(const Vector6& motion, const Eigen::MatrixXd& covariance) {
-  Matrix6 sum = Matrix6::Zero();
+/// Sum over the six answers to a motion d of their variances, in natural scales, is d^T A d.
+Matrix6 answer_variance(const Problem& problem, const Eigen::MatrixXd& covariance) {
+  Matrix6 A = Matrix6::Zero();
   for (int k = 0; k < 6; ++k) {
-    for (int l = 0; l < 6; ++l) sum += motion[k] * motion[l] * covariance.block<6, 6>(6 * k, 6 * l);
+    for (int l = 0; l < 6; ++l) {
+      for (int i = 0; i < 6; ++i)
+        A(k, l) += covariance(6 * k + i, 6 * l + i) / (problem.scale[i] * problem.scale[i]);
+    }
   }
-  return sum.diagonal().cwiseMax(0);
+  return A;
 }
 
 }  // namespace
 
 std::array<AxisKnowledge, 6> axis_knowledge(const Problem& problem, const Matrix6& K,
                                             const Eigen::MatrixXd& covariance) {
-  Vector6 unresolved;
-  const Matrix6 motion = motions(problem, K, unresolved);
+  // The motion that answers a load best: what it misses of the load, and what is not known of its
+  // answer, are least together. (K^-1 would also use motions that no load has ever made.)
   const Vector6 per_scale = problem.scale.cwiseAbs2().cwiseInverse();
+  const Matrix6 A = answer_variance(problem, covariance);
+  const Matrix6 weighed = K.transpose() * per_scale.asDiagonal();
+  const Matrix6 unit = problem.motion_scale.asDiagonal();
+  const Eigen::LDLT<Matrix6> least(unit * (weighed * K + A) * unit + 1e-12 * Matrix6::Identity());
   std::array<AxisKnowledge, 6> out;
   for (int axis = 0; axis < 6; ++axis) {
-    if (unresolved[axis] > 0.1) continue;
-    const Vector6 after = answer_variance(motion.col(axis), covariance);
-    const Vector6 before =
-        problem.prior_sigma.leftCols<6>().cwiseAbs2() * motion.col(axis).cwiseAbs2();
-    const double error = std::sqrt(after.dot(per_scale));
-    const double ratio = error / std::sqrt(before.dot(per_scale));
+    const Vector6 load = problem.scale[axis] * Vector6::Unit(axis);
+    const Vector6 motion = unit * least.solve(unit * (weighed * load));
+    const double missed = (K * motion - load).cwiseQuotient(problem.scale).squaredNorm();
+    const double after = motion.dot(A * motion);
+    const double before =
+        per_scale.dot(problem.prior_sigma.leftCols<6>().cwiseAbs2() * motion.cwiseAbs2());
+    const double error = std::sqrt(missed + after);
+    const double ratio = before > 0 ? std::min(1.0, std::sqrt(after / before)) : 1;
+    double own = 0;
+    for (int k = 0; k < 6; ++k) {
+      for (int l = 0; l < 6; ++l)
+        own += motion[k] * motion[l] * covariance(6 * k + axis, 6 * l + axis);
+    }
     out[static_cast<std::size_t>(axis)] = {
         .reached = error <= kReachedError && (ratio <= kReachedRatio || !problem.has_prior),
-        .coverage = std::clamp(1 - ratio, 0.0, 1.0),
-        .gain_sigma = std::sqrt(after[axis]) / problem.scale[axis]};
+        .coverage = missed > kReachedError ? 0 : 1 - ratio,
+        .gain_sigma = std::sqrt(missed + std::max(0.0, own) * per_scale[axis])};
   }
   return out;
 }

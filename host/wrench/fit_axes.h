@@ -15,8 +15,8 @@ struct AxisKnowledge {
   double gain_sigma = 0;  ///< relative
 };
 
-/// Loads along each axis, taken as K^-1 of it: how well the answers to them are known. `K`: the
-/// fitted stiffness; `covariance`: of all unknowns.
+/// How well the answers to loads along each axis are known. `K`: the fitted stiffness;
+/// `covariance`: of all unknowns.
 std::array<AxisKnowledge, 6> axis_knowledge(const Problem& problem, const Matrix6& K,
                                             const Eigen::MatrixXd& covariance);
 

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kMedianChi2 = 5.348 / 6;   // of chi^2 with 6 degrees of freedom, over them
 constexpr double kOutlierChi2 = 27.86 / 6;  // exceeded once in 10,000
+constexpr double kWorthRejecting = 0.015;   // of full load: less is what model errors are for
 constexpr double kMostRejected = 0.25;      // of the blocks
 constexpr double kStudent = 4;              // degrees of freedom of the robust weights
 constexpr int kRobustRounds = 5;
@@ -152,12 +153,22 @@ double dispersion(const Problem& problem, const Solution& solution, const Weight
   return std::max(1.0, weighting.dispersion * found / expected);
 }
 
+/// RMS over a block, of the axis that is off most, of full load.
+double largest_error(const Problem& problem, const std::vector<Prediction>& block) {
+  Vector6 squares = Vector6::Zero();
+  for (const Prediction& p : block) squares += p.error.cwiseQuotient(problem.scale).cwiseAbs2();
+  return std::sqrt(squares.maxCoeff() / static_cast<double>(block.size()));
+}
+
 /// False if so many blocks disagree that it is not they that are wrong.
-bool reject(const Problem& problem, const std::vector<double>& chi2, std::vector<double>& weight) {
+bool reject(const Problem& problem, const std::vector<std::vector<Prediction>>& held_out,
+            const std::vector<double>& chi2, std::vector<double>& weight) {
   std::size_t rejected = 0;
   for (std::size_t b = 0; b < chi2.size(); ++b) {
-    weight[b] = chi2[b] > kOutlierChi2 ? 0.0 : 1.0;
-    if (weight[b] == 0) ++rejected;
+    const bool off =
+        chi2[b] > kOutlierChi2 && largest_error(problem, held_out[b]) > kWorthRejecting;
+    weight[b] = off ? 0.0 : 1.0;
+    if (off) ++rejected;
   }
   const auto most =
       static_cast<std::size_t>(kMostRejected * static_cast<double>(problem.blocks.size()));
@@ -188,7 +199,7 @@ Judged judge(const Problem& problem) {
       weight[b] = (kStudent + 6) / (kStudent + 6 * out.chi2[b]);
   }
   for (int round = 0; round < kRounds; ++round) {
-    out.too_many_outliers = !reject(problem, out.chi2, weight);
+    out.too_many_outliers = !reject(problem, out.held_out, out.chi2, weight);
     solve_again();
     out.weighting.error = likely_error(problem, out.held_out, weight);
     out.weighting.dispersion = dispersion(problem, out.solution, out.weighting);

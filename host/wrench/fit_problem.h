@@ -49,8 +49,9 @@ struct Problem {
   Vector6 scale;                          ///< of wrenches: largest force and torque, N, N m
   Vector6 motion_scale;                   ///< of displacements: largest of each, m, rad
   bool has_prior = false;
-  Eigen::MatrixXd prior_mean;   ///< 6 x features
-  Eigen::MatrixXd prior_sigma;  ///< 6 x features
+  Matrix6 reciprocity = Matrix6::Zero();  ///< standard deviation of K_ij - K_ji; 0: not assumed
+  Eigen::MatrixXd prior_mean;             ///< 6 x features
+  Eigen::MatrixXd prior_sigma;            ///< 6 x features
 
   int feature_columns() const { return static_cast<int>(prior_mean.cols()); }
   int zero_at(int zero) const { return 6 * (feature_columns() + zero); }

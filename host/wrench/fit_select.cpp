@@ -11,6 +11,7 @@ namespace {
 // than one, as the best of a dozen candidates is looked for.
 constexpr double kSure = 2;
 constexpr double kWorthwhile = 0.05;  // of the held-out squared residual
+constexpr double kFelt = 0.001;       // of full load, held-out RMS of the axis that wins most
 
 std::vector<FeatureSpec> candidates(const Problem& problem, std::span<const PathPoint> path) {
   std::vector<FeatureSpec> out{{.kind = FeatureKind::quadratic}};
@@ -40,25 +41,39 @@ std::vector<double> block_scores(const Problem& problem, const Judged& linear,
   return out;
 }
 
+/// RMS of what is held out and counts, of full load.
+Vector6 held_out_rms(const Problem& problem, const Judged& linear,
+                     const std::vector<Vector6>& errors) {
+  Vector6 squares = Vector6::Zero();
+  double n = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (linear.weighting.block[static_cast<std::size_t>(problem.rows[i].block)] == 0) continue;
+    squares += errors[i].cwiseQuotient(problem.scale).cwiseAbs2();
+    n += 1;
+  }
+  return (squares / n).cwiseSqrt();
+}
+
 }  // namespace
 
 std::vector<ModelTrial> try_richer(const Problem& problem, const Judged& linear,
                                    std::span<const Observation> observations,
                                    std::span<const PathPoint> path) {
-  const std::vector<double> reference =
-      block_scores(problem, linear, hold_out_errors(problem, linear.solution));
+  const std::vector<Vector6> linear_errors = hold_out_errors(problem, linear.solution);
+  const std::vector<double> reference = block_scores(problem, linear, linear_errors);
   const auto blocks = static_cast<double>(reference.size());
   double total = 0;
   for (const double score : reference) total += score;
   std::vector<ModelTrial> out;
   if (blocks < 3 || total == 0) return out;
   std::size_t best = 0;
+  bool felt = false;
   double best_score = std::numeric_limits<double>::infinity();
   for (const FeatureSpec& features : candidates(problem, path)) {
     const Problem other = with_features(problem, observations, path, features);
     const Solution solution = solve(other, linear.weighting, {});
-    const std::vector<double> scores =
-        block_scores(problem, linear, hold_out_errors(other, solution));
+    const std::vector<Vector6> errors = hold_out_errors(other, solution);
+    const std::vector<double> scores = block_scores(problem, linear, errors);
     double sum = 0;
     for (const double score : scores) sum += score;
     const double mean_won = (total - sum) / blocks;
@@ -71,11 +86,13 @@ std::vector<ModelTrial> try_richer(const Problem& problem, const Judged& linear,
     if (trial.score < best_score) {
       best_score = trial.score;
       best = out.size();
+      felt = (held_out_rms(problem, linear, linear_errors) - held_out_rms(problem, linear, errors))
+                 .maxCoeff() > kFelt;
     }
     out.push_back(trial);
   }
   ModelTrial& winner = out[best];
-  winner.adopted = 1 - winner.score > std::max(kSure * winner.score_sigma, kWorthwhile);
+  winner.adopted = felt && 1 - winner.score > std::max(kSure * winner.score_sigma, kWorthwhile);
   return out;
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMostIterations = 12;
 constexpr double kConverged = 1e-9;  // of the scaled unknowns
-constexpr double kFloor = 1e-5;      // of full load: no reference is better
+constexpr double kFloor = 3e-5;      // of full load: no bench is better
 constexpr double kVagueOffset = 10;  // of full load
 
 auto matrix_of(const Problem& problem, const Eigen::VectorXd& unknowns) {
@@ -47,6 +47,17 @@ Normal prior_normal(const Problem& problem) {
       const double weight = 1 / (problem.prior_sigma(i, k) * problem.prior_sigma(i, k));
       prior.information(6 * k + i, 6 * k + i) = weight;
       prior.right[6 * k + i] = weight * problem.prior_mean(i, k);
+    }
+  }
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < i; ++j) {
+      if (problem.reciprocity(i, j) == 0) continue;
+      const double weight = 1 / (problem.reciprocity(i, j) * problem.reciprocity(i, j));
+      const int one = 6 * j + i, other = 6 * i + j;
+      prior.information(one, one) += weight;
+      prior.information(other, other) += weight;
+      prior.information(one, other) -= weight;
+      prior.information(other, one) -= weight;
     }
   }
   for (int z = 0; z < static_cast<int>(problem.zeros.size()); ++z) {
@@ -184,14 +195,16 @@ Solution solve(const Problem& problem, const Weighting& weighting, const Eigen::
       if (weight == 0) continue;
       const Matrix6 tangent = matrix_of(problem, solution.unknowns) * row.jacobian;
       Matrix6 S = effective_covariance(problem, row, solution.unknowns);
-      S.diagonal() += weighting.error.variance(row.load);
-      const Matrix6 W = inverse(S);
-      // The displacement that the fit believes in, and the wrench to go with it.
+      // The displacement that the fit believes in, and the wrench to go with it. The model's error
+      // is left to the displacement: else an axis that was never loaded explains its noise best by
+      // having no stiffness.
       Vector6 shift = Vector6::Zero();
       if (adjust) {
-        shift = row.displacement_covariance * tangent.transpose() * W *
+        shift = row.displacement_covariance * tangent.transpose() * inverse(S) *
                 residual(problem, row, solution.unknowns);
       }
+      S.diagonal() += weighting.error.variance(row.load);
+      const Matrix6 W = inverse(S);
       const Row at = linearised(problem, row, solution.unknowns);
       add_row(problem, at, row.phi + row.jacobian * shift, at.wrench + tangent * shift, weight * W,
               solution.blocks[static_cast<std::size_t>(row.block)]);

@@ -55,16 +55,16 @@ std::vector<Scored> with_ideal_reference(const std::vector<Readings>& readings,
   print_ratios(all, table);
 
   table.columns("what limits (c): parts of its RMSE", kMilliHeads);
-  table.figures("the platform's own dynamics, as in (t)", in_milli(all[kTruth].rmse), 3);
-  table.figures("the tracker's error", in_milli(without(all[kOurs].rmse, all[kTruth].rmse)), 3);
+  table.figures("the platform's own dynamics, as in (t)", in_milli(all[kTruth].rmse), 4);
+  table.figures("the tracker's error", in_milli(without(all[kOurs].rmse, all[kTruth].rmse)), 4);
   table.line("The reference tells what the hand applies, the springs feel it filtered by the mass");
   table.line("that they carry: a lag of its own for each mode, where the fit has one for all.");
 
   SixFigures limit{};
   limit.fill(kLeastR2);
   table.columns("targets", kAxisHeads);
-  table.figures("(c) held-out R^2", all[kOurs].r2, 5);
-  table.at_least("(c) held-out R^2", all[kOurs].r2, limit, 5);
+  table.figures("(c) held-out R^2", all[kOurs].r2, 6);
+  table.at_least("(c) held-out R^2", all[kOurs].r2, limit, 6);
   table.at_least("Fz RMSE, (a) / (c)", all[kPaper].rmse[2] / all[kOurs].rmse[2], kLeastGainFz,
                  "times");
   return all;
@@ -83,15 +83,15 @@ void with_optoforce(const std::vector<Readings>& readings, const sim::Scenario& 
   SixFigures noise{};
   Vector6::Map(noise.data()) = reference.noise;
   table.columns("how far the reference limits", kMilliHeads);
-  table.figures("its noise and rounding, RMS", in_milli(noise), 3);
-  table.figures("RMSE of (t): reference and dynamics alone", in_milli(all[kTruth].rmse), 3);
-  table.figures("RMSE of (c)", in_milli(all[kOurs].rmse), 3);
+  table.figures("its noise and rounding, RMS", in_milli(noise), 4);
+  table.figures("RMSE of (t): reference and dynamics alone", in_milli(all[kTruth].rmse), 4);
+  table.figures("RMSE of (c)", in_milli(all[kOurs].rmse), 4);
   table.figures("(c) / (t)", ratio(all[kOurs].rmse, all[kTruth].rmse), 4);
   table.line("Between two readings of the reference, interpolation averages their noise. A lag");
   table.line("below zero: the reference is late.");
   table.columns("off from what was applied, held out", kMilliHeads);
   for (const Scored& s : all)
-    table.figures(s.readings.name, in_milli(error_from_truth(s, scenario, reference)), 3);
+    table.figures(s.readings.name, in_milli(error_from_truth(s, scenario, reference)), 4);
 }
 
 }  // namespace

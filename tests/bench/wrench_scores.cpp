@@ -39,9 +39,9 @@ SixFigures error_from_truth(const Scored& scored, const sim::Scenario& scenario,
 
 void print(const std::vector<Scored>& all, Table& table) {
   table.columns("held-out R^2", kAxisHeads);
-  for (const Scored& s : all) table.figures(s.readings.name, s.r2, 5);
+  for (const Scored& s : all) table.figures(s.readings.name, s.r2, 6);
   table.columns("held-out RMSE", kMilliHeads);
-  for (const Scored& s : all) table.figures(s.readings.name, in_milli(s.rmse), 3);
+  for (const Scored& s : all) table.figures(s.readings.name, in_milli(s.rmse), 4);
   table.line("");
   table.line(fmt::format("{:<42}{:>12}{:>9}{:>15}{:>14}", "", "frames held", "lag ms", "of folds",
                          "us per frame"));

@@ -27,8 +27,14 @@ class Record : public testing::Test {
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
   std::string small() const { return "sim:" + file("small.yaml"); }
   Outcome record(const std::string& source, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments{"record",   "--out",    file("r.twr"), "--source", source,
-                                       "--output", "jsonl:" + file("live.jsonl"), "--fast"};
+    std::vector<std::string> arguments{"record",
+                                       "--out",
+                                       file("r.twr"),
+                                       "--source",
+                                       source,
+                                       "--output",
+                                       "jsonl:" + file("live.jsonl"),
+                                       "--fast"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_bridge(arguments);
   }
@@ -71,9 +77,10 @@ TEST_F(Record, AReplayOfALiveSourcePrintsTheSameBytes) {
 }
 
 TEST_F(Record, JpegFilesAreKeptAsTheyAreAndReplayedToTheSameBytes) {
-  write_file(folder_ / "jpeg.yaml", std::string(kSmall) + "compression: {file: jpeg, jpeg_quality: 85}\n");
-  const Outcome sim =
-      run_bridge({"sim", "--scenario", file("jpeg.yaml"), "--out", file("frames"), "--frames", "40"});
+  write_file(folder_ / "jpeg.yaml",
+             std::string(kSmall) + "compression: {file: jpeg, jpeg_quality: 85}\n");
+  const Outcome sim = run_bridge(
+      {"sim", "--scenario", file("jpeg.yaml"), "--out", file("frames"), "--frames", "40"});
   ASSERT_EQ(sim.status, 0) << sim.err;
   ASSERT_EQ(record("images:" + file("frames")).status, 0);
   expect_replay_is_the_same(40);
@@ -87,15 +94,16 @@ TEST_F(Record, JpegFilesAreKeptAsTheyAreAndReplayedToTheSameBytes) {
 std::string without_latency(const std::string& jsonl) {
   std::string out;
   std::istringstream lines(jsonl);
-  for (std::string line; std::getline(lines, line);) out += line.substr(0, line.find("\"dropped\""));
+  for (std::string line; std::getline(lines, line);)
+    out += line.substr(0, line.find("\"dropped\""));
   return out;
 }
 
 TEST_F(Record, ExportedFramesAreAFolderThatRunsTheSame) {
   ASSERT_EQ(record(small(), {"--frames", "40"}).status, 0);
   ASSERT_EQ(run_bridge({"export", file("r.twr"), "--frames", file("out/")}).status, 0);
-  const Outcome ran = run_bridge(
-      {"run", "--source", "images:" + file("out"), "--fast", "--output", "jsonl:-"});
+  const Outcome ran =
+      run_bridge({"run", "--source", "images:" + file("out"), "--fast", "--output", "jsonl:-"});
   EXPECT_EQ(without_latency(ran.out), without_latency(read_file(file("live.jsonl"))));
   const Outcome again = run_bridge({"export", file("r.twr"), "--frames", file("out")});
   EXPECT_EQ(again.status, 2);
@@ -103,10 +111,10 @@ TEST_F(Record, ExportedFramesAreAFolderThatRunsTheSame) {
 }
 
 TEST_F(Record, ExportedSamplesAreTheBytesOfTheCsvOutput) {
-  ASSERT_EQ(record(small(), {"--frames", "40", "--output", "csv:" + file("live.csv"), "--keep",
-                             "none"})
-                .status,
-            0);
+  ASSERT_EQ(
+      record(small(), {"--frames", "40", "--output", "csv:" + file("live.csv"), "--keep", "none"})
+          .status,
+      0);
   ASSERT_EQ(run_bridge({"export", file("r.twr"), "--csv", file("out.csv"), "--events",
                         file("events.csv"), "--references", file("references.csv")})
                 .status,
@@ -168,7 +176,7 @@ TEST_F(Record, ARecordingIsNotOverwrittenAndNonsenseIsRefused) {
 
 TEST_F(Record, AFullDiskEndsItWithOneAndTheRestIsReadable) {
   // The shell's limit stands in for the disk.
-  const std::string command = std::string("ulimit -f 2000; exec ") + TAGWRENCH_PROGRAM +
+  const std::string command = std::string("ulimit -f 20000; exec ") + TAGWRENCH_PROGRAM +
                               " record --fast --source " + small() + " --out " + file("r.twr");
   const Outcome ended = Bridge({"-c", command}, "/dev/null", "/bin/bash").finish();
   EXPECT_EQ(ended.status, 1) << ended.err;
@@ -179,7 +187,9 @@ TEST_F(Record, AFullDiskEndsItWithOneAndTheRestIsReadable) {
 }
 
 /// In memory where that is possible: a kill is about the program, not about the disk.
-fs::path roomy() { return ::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : fs::temp_directory_path(); }
+fs::path roomy() {
+  return ::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : fs::temp_directory_path();
+}
 
 struct Killed {
   fs::path file;
@@ -187,8 +197,8 @@ struct Killed {
 };
 
 TEST_F(Record, KilledAHundredTimesItLosesAtMostTheLastSecond) {
-  constexpr int kAtOnce = 10;
-  constexpr int kRounds = 10;
+  constexpr int kAtOnce = 20;
+  constexpr int kRounds = 5;
   const fs::path folder = roomy() / fs::path(folder_.path()).filename();
   fs::create_directories(folder);
   std::minstd_rand random(20200531);
@@ -202,7 +212,7 @@ TEST_F(Record, KilledAHundredTimesItLosesAtMostTheLastSecond) {
       bridges.push_back(std::make_unique<Bridge>(
           std::vector<std::string>{"record", "--source", small(), "--keep", "region", "--out",
                                    killed.back().file, "--output", "jsonl:-"}));
-      order.emplace_back(static_cast<int>(random() % 1800), i);
+      order.emplace_back(static_cast<int>(random() % 1600), i);
     }
     // From when they all run, so that the first to go has something to lose.
     for (const auto& bridge : bridges) ASSERT_TRUE(bridge->wait_for_lines(1)) << bridge->err();

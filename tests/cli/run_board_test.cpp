@@ -64,8 +64,9 @@ class RunBoard : public ::testing::Test {
   std::string source() const { return "sim:" + (folder / "still.yaml").string(); }
 
   /// As if 100,000 counts were a newton on every channel.
-  void calibrate_cells() {
-    const Outcome info = run_bridge({"board", "info", "--json", "--port", port()});
+  void calibrate_cells() { calibrate_cells(port()); }
+  void calibrate_cells(const std::string& of_port) {
+    const Outcome info = run_bridge({"board", "info", "--json", "--port", of_port});
     const std::string id = nlohmann::json::parse(info.out)["id"];
     nlohmann::json cells{{"format", "tagwrench-cells-1"}, {"board", id}};
     for (int channel = 0; channel < 4; ++channel) {
@@ -179,6 +180,28 @@ TEST_F(RunBoard, ABoardThatGoesAwayIsSaidAndTheFramesGoOn) {
   const Outcome outcome = run.finish();
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find(",ok,"), std::string::npos);
+}
+
+TEST_F(RunBoard, ALoadCellThatIsThereForGoodContradictsASensorThatFeelsNothing) {
+  ASSERT_EQ(run_bridge({"sim", "--scenario", folder / "still.yaml", "--out", folder / "frames",
+                        "--frames", "1"})
+                .status,
+            0);
+  const std::filesystem::path sensor = folder / "sensor.yaml";
+  // This board's cell swings by half a newton; the platform is left alone.
+  const std::string swinging_port = (folder / "swinging").string();
+  Bridge swinging({"--port", swinging_port, "--cell", "0=sine:0.5:0.4"}, "/dev/null",
+                  TAGWRENCH_BOARD_PC);
+  wait_for_file(swinging_port);
+  calibrate_cells(swinging_port);
+  write_file(sensor, read_file(folder / "frames" / "sensor.yaml") +
+                         "  reference: {channel: 0, point_mm: [5, 3, 0], direction: [0, 0, -1]}\n");
+  Bridge run({"run", "--source", source(), "--sensor", sensor, "--board", swinging_port, "--output",
+              "csv:" + (folder / "out.csv").string(), "--seconds", "60"});
+  ASSERT_TRUE(run.wait_for_message("every sample is compared with load cell 0")) << run.err();
+  ASSERT_TRUE(run.wait_for_message("against load cell 0 the sensor measures")) << run.err();
+  run.signal(SIGINT);
+  EXPECT_EQ(run.finish().status, 0);
 }
 
 TEST_F(RunBoard, AReferenceWithoutABoardIsRefusedBeforeAnythingIsLit) {

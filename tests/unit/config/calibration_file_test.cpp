@@ -29,7 +29,7 @@ class CalibrationFile : public testing::Test {
   WrenchModel load(const std::string& text) {
     std::ofstream(path_) << text;
     WrenchModel model;
-    load_calibration(path_, CameraModel{}, TargetDescription{}, model);
+    load_calibration(path_, CameraModel{}, TargetDescription{}, RestOptions{}, model);
     return model;
   }
   std::string complaint(const std::string& from, const std::string& to) {
@@ -60,7 +60,7 @@ TEST_F(CalibrationFile, RefusesTheCalibrationOfAnotherSensor) {
                 .find("another sensor: its tag_ids is [5,3], sensor.yaml has [5,2]"),
             std::string::npos);
   EXPECT_NE(
-      complaint("3.8", "4.0").find("another sensor: its tag_size_mm is 4.0, sensor.yaml has 3.8"),
+      complaint("3.8", "4.0").find("another sensor: its tag_size_mm is 4, sensor.yaml has 3.8"),
       std::string::npos);
   EXPECT_NE(complaint("[640, 480]", "[1280, 720]").find("another sensor: its image_px"),
             std::string::npos);

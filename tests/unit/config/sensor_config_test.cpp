@@ -54,6 +54,17 @@ TEST(SensorConfig, ReadsAFreshlyBuiltSensor) {
   EXPECT_EQ(s.spacemouse.vendor, 0x256f);
 }
 
+TEST(SensorConfig, SpringsMayStayBesideACalibration) {
+  const std::string both =
+      replaced(kGood, "  springs:\n", "  calibration: /nonexistent/c.json\n  springs:\n");
+  EXPECT_NE(complaint(both).find("/nonexistent/c.json: cannot be read"), std::string::npos);
+  const SensorConfig s = parse_sensor(both, "sensor.yaml", WrenchCalibration::ignore);
+  EXPECT_EQ(s.calibration, "/nonexistent/c.json");
+  ASSERT_TRUE(s.spring_stiffness);
+  EXPECT_NEAR((*s.spring_stiffness)(2, 2), 2800.0, 1e-9);  // N/m
+  EXPECT_EQ(s.wrench.K, *s.spring_stiffness);
+}
+
 TEST(SensorConfig, RemembersTheCalibrationOfTheCamera) {
   const auto with = [](const std::string& record) {
     return replaced(kGood, "cy: 239.5}", "cy: 239.5, calibrated: " + record + "}");

@@ -36,8 +36,8 @@ TEST_F(DiskFull, EndsWithOneLineAndKeepsWhatWasThere) {
   int read = 0;
   for (Entry entry; reader.next(entry); ++read) {
     const auto pixels = picture(read);
-    ASSERT_TRUE(std::equal(pixels.begin(), pixels.end(), entry.raw.bytes.begin(),
-                           entry.raw.bytes.end()))
+    ASSERT_TRUE(
+        std::equal(pixels.begin(), pixels.end(), entry.raw.bytes.begin(), entry.raw.bytes.end()))
         << read;
   }
   Database database(path(), Database::Mode::read);

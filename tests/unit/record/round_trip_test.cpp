@@ -33,8 +33,8 @@ TEST_F(RoundTrip, EverythingReadsBackToTheSameBits) {
     EXPECT_EQ(entry.time, at_ms(1000 + 40 * i));
     EXPECT_EQ(entry.raw.fourcc, fourcc("GREY"));
     EXPECT_EQ(entry.raw.stride, kWidth);
-    EXPECT_TRUE(std::equal(pixels.begin(), pixels.end(), entry.raw.bytes.begin(),
-                           entry.raw.bytes.end()));
+    EXPECT_TRUE(
+        std::equal(pixels.begin(), pixels.end(), entry.raw.bytes.begin(), entry.raw.bytes.end()));
     EXPECT_EQ(entry.latency, std::chrono::microseconds(812));
   }
   EXPECT_FALSE(reader.next(entry));

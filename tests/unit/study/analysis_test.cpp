@@ -182,7 +182,7 @@ TEST(Analysis, GapsRepeatsConstantColumnsAndCoarseStepsAreSaid) {
   const Analysis a = analyze({trial}, {});
   EXPECT_WARNS(a, "1 gap in the readings, the longest 0.52 s");
   EXPECT_WARNS(a, "1 gap in the reference");
-  EXPECT_WARNS(a, "dz_m never changes");
+  EXPECT_WARNS(a, "z_m never changes");
   EXPECT_WARNS(a, "40 of 1000 readings repeat the one before");
   EXPECT_WARNS(a, "Mz: the reference counts in steps of 0.001 N m");
 }
@@ -259,7 +259,7 @@ TEST(Analysis, CrossTalkIsFoundWhereItWasLearnedAway) {
   other.reference.col(1) += 0.04 * one.reference.col(0);
   const Analysis a = analyze({one, other}, {});
   ASSERT_EQ(a.folds.size(), 2U);
-  EXPECT_EQ(a.validation, "each of 2 trials");
+  EXPECT_EQ(a.validation, "each of 2 trials, predicted from the rest");
   // Once +4 %, once -4 %: the mean is none, the scores tell.
   EXPECT_NEAR(a.cross_talk(1, 0), 0, 0.5) << "% of range";
   EXPECT_GT(a.axis[1].rmse, 0.02) << "N";
@@ -275,11 +275,37 @@ TEST(Analysis, StepsOfAPlanAreHeldOutAsAWhole) {
     trial.step[i] = i % 50 < 5 ? -1 : static_cast<int>(i / 50);
   }
   const Analysis a = analyze({trial}, {});
-  EXPECT_EQ(a.validation, "24 steps in 10 groups, each group");
+  EXPECT_EQ(a.validation, "each of 24 steps, predicted from the rest");
   EXPECT_EQ(a.readings, 24U * 45U);
   EXPECT_EQ(a.lag.value, 0);
   EXPECT_EQ(a.reference_rate, 0);
   for (const study::AxisReport& axis : a.axis) EXPECT_GT(axis.r2, 0.99);
+}
+
+TEST(Analysis, PredictionsThatACalibrationBringsAreScoredAsTheyAre) {
+  Trial trial = steps(loads_in_turn(1), 1);
+  trial.held = true;
+  trial.step.resize(trial.time.size());
+  trial.predicted = Eigen::MatrixXd::Constant(trial.time.size(), 6, std::nan(""));
+  trial.predicted_sigma = trial.predicted;
+  for (Eigen::Index i = 0; i < trial.time.size(); ++i) {
+    trial.step[i] = static_cast<int>(i / 50);
+    if (i % 50 != 25) continue;
+    // One reading of each hold, 3 % too much, and sigmas of 2 % of the load and 1 mN.
+    trial.predicted.row(i) = 1.03 * trial.reference.row(i);
+    trial.predicted_sigma.row(i) = 0.02 * trial.reference.row(i).cwiseAbs().array() + 1e-3;
+  }
+  const Analysis a = analyze({trial}, {});
+  EXPECT_EQ(a.validation, "each step, by the calibration's own fit without it");
+  EXPECT_EQ(a.time.size(), 24);
+  EXPECT_TRUE(a.folds.empty());
+  EXPECT_NEAR(a.axis[0].rmse, 0.03 * std::sqrt(2.0 / 24), 1e-9) << "N";
+  EXPECT_NEAR(a.axis[0].r2, 1 - 0.03 * 0.03, 1e-9);
+  EXPECT_EQ(*a.axis[0].coverage, 1);
+  EXPECT_NEAR(a.cross_talk(0, 0), 3, 1e-6) << "% of range: the gain";
+  EXPECT_NEAR(a.axis[0].nonlinearity_percent, 0, 1e-6) << "% of range";
+  EXPECT_TRUE(std::isnan(a.axis[0].hysteresis_percent)) << "one reading of a hold rises nowhere";
+  EXPECT_TRUE(a.axis[0].noise.has_value());
 }
 
 TEST(Analysis, WhatIsHeldOutIsNotLearnedFrom) {

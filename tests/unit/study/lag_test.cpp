@@ -57,6 +57,22 @@ TEST(Lag, ErrorsAreAsLargeAsItsSigmaSays) {
   EXPECT_LT(normalised, 1.5);
 }
 
+TEST(Lag, IsNotDrawnToWhereInterpolationHalvesTheReferencesNoise) {
+  // Clocks in step: every reading falls 0.5 ms beside a sample of the reference at the true lag,
+  // and midway between two of them at 4.5 ms more.
+  double sum = 0;
+  constexpr int kSeeds = 20;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    LoadedPlatform platform;
+    platform.reading_rate = 25;
+    platform.lag = -0.0395;
+    platform.reference_noise = 5;
+    platform.seed = seed;
+    sum += lag_of(platform).value - platform.lag;
+  }
+  EXPECT_NEAR(sum / kSeeds, 0, 0.5e-3) << "s, mean error";
+}
+
 TEST(Lag, AxesThatNeverChangeDoNotCount) {
   LoadedPlatform platform;
   study::Trial trial = platform.trial();

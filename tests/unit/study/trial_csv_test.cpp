@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -64,6 +65,9 @@ TEST_F(TrialFiles, ATrialComesBackBitForBit) {
   trial.reference_sigma = Eigen::MatrixXd::Constant(trial.reference_time.size(), 6, 1e-3);
   trial.step = Eigen::VectorXi::LinSpaced(trial.time.size(), -1, 5);
   trial.held = true;
+  trial.predicted = Eigen::MatrixXd::Constant(trial.time.size(), 6, 0.1);
+  trial.predicted.row(3).setConstant(std::nan(""));
+  trial.predicted_sigma = 0.3 * trial.predicted;
   const study::Trial back = study::read_trial(write("a.data.csv", study::trial_to_csv(trial)));
   EXPECT_EQ(back.name, trial.name);
   EXPECT_EQ(back.feature_names, trial.feature_names);
@@ -75,6 +79,9 @@ TEST_F(TrialFiles, ATrialComesBackBitForBit) {
   EXPECT_EQ(back.reference_sigma, trial.reference_sigma);
   EXPECT_EQ(back.step, trial.step);
   EXPECT_TRUE(back.held);
+  EXPECT_TRUE(back.predicted.row(3).array().isNaN().all());
+  EXPECT_EQ(back.predicted.row(4), trial.predicted.row(4));
+  EXPECT_EQ(back.predicted_sigma.row(4), trial.predicted_sigma.row(4));
 }
 
 TEST_F(TrialFiles, WhatIsNotKnownIsLeftOut) {
@@ -99,7 +106,8 @@ TEST_F(TrialFiles, DamageIsNamedByFileAndLine) {
   EXPECT_SAYS(read_complaint(head + "mark,0.2,1e-6,,,,,,\n"), "reading or reference");
   EXPECT_SAYS(read_complaint("kind,t_s,dx_m\nreading,1,2\n"), "does not begin with");
   EXPECT_SAYS(read_complaint("# tagwrench-data-1\nkind,t_s,dx_m,Fx_N\nreading,1,2,\n"), "six of");
-  EXPECT_SAYS(read_complaint(""), "no rows");
+  EXPECT_SAYS(read_complaint(""), "does not begin with");
+  EXPECT_SAYS(read_complaint("# tagwrench-data-1\n"), "no rows");
   EXPECT_SAYS(complaint([&] { study::read_trial(folder_); }), "a folder");
   EXPECT_SAYS(complaint([&] { study::read_trial(folder_ / "none.csv"); }), "cannot be read");
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <limits>
 
 namespace tagwrench {
@@ -88,6 +89,44 @@ TEST(WrenchEstimate, TurningTheFrameTurnsForceAndTorqueAlike) {
   // The frame's x axis is the camera's y axis, so a push along camera y is a push along frame x.
   WrenchEstimator(m).estimate(ok_track(v6(0, 1, 0, 0, 2, 0)), s);
   EXPECT_TRUE(s.wrench.isApprox(v6(1, 0, 0, 2, 0, 0), 1e-12));
+}
+
+TEST(WrenchEstimate, SigmaHoldsWhatTheFitDoesNotKnowAtThisLoad) {
+  WrenchModel m = diagonal_model();
+  m.B.setZero();
+  m.parameter_covariance = Eigen::MatrixXd::Zero(42, 42);
+  m.parameter_covariance(14, 14) = 28.0 * 28.0;    // K(2, 2): 1 % of 2800 N/m
+  m.parameter_covariance(38, 38) = 0.003 * 0.003;  // B[2], N
+  m.error_at_full_load = v6(0, 0, 0.02, 0, 0, 0);  // N at 2 N
+  m.full_load.setConstant(2);
+  m.wrench_origin = {0.010, 0, 0};
+  Track track = ok_track(v6(0, 0, 0.5e-3, 0, 0, 0));
+  track.covariance.setZero();
+  Sample s;
+  WrenchEstimator(m).estimate(track, s);
+  EXPECT_NEAR(s.wrench[2], 1.4, 1e-12);                                           // N
+  const double sigma = std::sqrt(0.014 * 0.014 + 0.003 * 0.003 + 0.014 * 0.014);  // N
+  EXPECT_NEAR(s.wrench_sigma[2], sigma, 1e-12);
+  EXPECT_NEAR(s.wrench_sigma[4], 0.010 * sigma, 1e-12) << "its arm about the new origin, N m";
+}
+
+TEST(WrenchEstimate, CreepIsTakenOutOfALongHold) {
+  // A standard linear solid: 5 % of the displacement comes late, in 10 s.
+  WrenchModel m;
+  m.K = 105.0 * Matrix6::Identity();
+  m.features = {.kind = FeatureKind::creep, .time_constant = 10};
+  m.extra = -5.0 * Matrix6::Identity();
+  WrenchEstimator estimator(m);
+  Sample s;
+  estimator.estimate(ok_track(Vector6::Zero()), s);
+  for (int i = 0; i < 10'000; ++i) {
+    s.capture_time += std::chrono::milliseconds(10);
+    estimator.estimate(ok_track(v6(1e-3, 0, 0, 0, 0, 0)), s);
+    if (i == 0) {
+      EXPECT_NEAR(s.wrench[0], 0.105, 1e-5);  // N, at once
+    }
+  }
+  EXPECT_NEAR(s.wrench[0], 0.100, 1e-5);  // N, after 100 s
 }
 
 }  // namespace

@@ -96,7 +96,7 @@ TEST(WrenchFit, NamesTheTorqueThatWasNeverApplied) {
   EXPECT_EQ(found.missing, std::vector<std::string>{"Mz"});
   EXPECT_EQ(found.axis[5].state, AxisState::spring_model);
   EXPECT_EQ(found.axis[5].reason, "no torque about z was applied");
-  EXPECT_LT(found.axis[5].coverage, 0.2);
+  EXPECT_LT(found.axis[5].coverage, 0.3);
   EXPECT_GT(found.axis[5].gain_sigma, 0.1);
   EXPECT_GT(found.model.range[5], 1e8) << "not known";
   for (std::size_t i = 0; i < 5; ++i) {
@@ -124,10 +124,38 @@ TEST(WrenchFit, NamesLoadsThatOnlyCameTogether) {
 
 TEST(WrenchFit, AxesThatTheDataDoNotReachKeepTheSprings) {
   KnownLoads bench(5);
-  const WrenchFit found = fit(bench.applied(loads_without(bench, 5), 0));
+  const WrenchFit found = fit(bench.applied(loads_without(bench, 5)));
   const Matrix6 nominal = test::nominal_stiffness();
   // The column that only a twist would show.
-  EXPECT_NEAR(found.model.K(5, 5), nominal(5, 5), 0.1 * nominal(5, 5));
+  EXPECT_NEAR(found.model.K(5, 5), nominal(5, 5), 0.15 * nominal(5, 5));
+}
+
+TEST(WrenchFit, ReciprocityTellsWhatAPushOffItsLineCannot) {
+  // Upright masses are three times as heavy as those that pull across, and half a degree off.
+  const auto error = [](double reciprocity) {
+    double worst = 0;
+    for (unsigned seed = 30; seed < 36; ++seed) {
+      KnownLoads bench(seed, {.gravity = 0.01, .point = 0.02e-3});
+      const WrenchFit found = fit_wrench(
+          bench.six_orientations(), {},
+          {.prior = test::nominal_stiffness(), .reciprocity = reciprocity, .try_richer = false});
+      // What it reads along x under a load along z.
+      const Vector6 load = Vector6::Unit(2);
+      const Vector6 read = found.model.K * bench.stiffness.inverse() * load;
+      worst = std::max(worst, std::hypot(read[0], read[1]));
+    }
+    return worst;
+  };
+  EXPECT_LT(error(0.005), 0.6 * error(0));
+}
+
+TEST(WrenchFit, AStructureThatIsNotConservativeIsNoticed) {
+  KnownLoads bench(31, {.mass = 1e-4, .gravity = 1e-3, .point = 0.02e-3, .asymmetry = 0.05});
+  const WrenchFit found = fit(bench.six_orientations());
+  ASSERT_EQ(found.warnings.size(), 1u);
+  EXPECT_TRUE(found.warnings[0].starts_with("K is not symmetric by ")) << found.warnings[0];
+  const Matrix6 ratio = found.model.K * bench.stiffness.inverse();
+  EXPECT_LT((ratio - Matrix6::Identity()).diagonal().cwiseAbs().maxCoeff(), 0.01);
 }
 
 TEST(WrenchFit, AWrongMassIsFoundAndLeftOut) {
@@ -135,7 +163,7 @@ TEST(WrenchFit, AWrongMassIsFoundAndLeftOut) {
     KnownLoads bench(seed);
     std::vector<Observation> seen = bench.six_orientations();
     const Vector6 before = fit(seen).model.K.row(0).transpose();
-    Observation& wrong = seen[7 + seed];
+    Observation& wrong = seen[9 + seed];
     ASSERT_GT(wrong.wrench.norm(), 0.1);
     // What the tracker saw was 12 % more than the plan says.
     const int zero = wrong.zero;

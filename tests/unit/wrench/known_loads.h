@@ -34,6 +34,8 @@ struct Errors {
   double pose = 1;        ///< of the tracker's noise
   double nonlinear = 0;   ///< of full load: quadratic in the load
   double unstated = 1;    ///< true errors over those that are stated
+  double asymmetry =
+      0.003;  ///< of the stiffness: the tracker's axes are not quite those of the load
 };
 
 class KnownLoads {
@@ -43,8 +45,12 @@ class KnownLoads {
     const Matrix6 nominal = nominal_stiffness();
     stiffness = nominal;
     for (int i = 0; i < 6; ++i) {
-      for (int j = 0; j < 6; ++j)
-        stiffness(i, j) += 0.08 * normal() * std::sqrt(nominal(i, i) * nominal(j, j));
+      for (int j = 0; j <= i; ++j) {
+        const double unit = std::sqrt(nominal(i, i) * nominal(j, j));
+        const double off = 0.08 * normal() * unit;
+        stiffness(i, j) += off + errors.asymmetry * normal() * unit;
+        if (i != j) stiffness(j, i) += off;
+      }
     }
     const Vector6 sigma =
         (Vector6() << 0.1e-6, 0.1e-6, 0.6e-6, 30e-6, 30e-6, 12e-6).finished() * errors.pose;

@@ -1,0 +1,199 @@
+// `tagwrench calibrate wrench` as its users run it, on the simulated bench.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host/config/sensor_config.h"
+#include "tests/cli/bridge.h"
+
+namespace tagwrench::test {
+namespace {
+
+using nlohmann::json;
+
+// A small picture, so that a calibration takes seconds.
+const char* const kScenario = R"(seed: 3
+camera: {width: 320, height: 240, fx: 402.5, fy: 402.5, cx: 159.5, cy: 119.5}
+optics: {psf_sigma_px: 0.6}
+)";
+
+// Three loads along x and two of the three torques: what they do not reach is completed.
+const char* const kShortPlan = R"(about: short
+reference: masses
+points:
+  - {name: right, position_mm: [15, 0, 6]}
+  - {name: left, position_mm: [-15, 0, 6]}
+  - {name: lower, position_mm: [0, 15, 6]}
+mountings:
+  - name: standing
+    gravity: [0, 0, -1]
+    say: stand it up
+    steps:
+      - {do: rest}
+      - {do: mass, mass_g: 50, at: right}
+      - {do: mass, mass_g: 50, at: left}
+      - {do: mass, mass_g: 50, at: lower}
+      - {do: rest}
+)";
+
+class CalibrateWrench : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_file(scenario_, kScenario);
+    const std::string frames = (temporary_ / "frames").string();
+    ASSERT_EQ(run_bridge({"sim", "--scenario", scenario_, "--out", frames, "--frames", "1"}).status,
+              0);
+    std::string sensor = read_file(temporary_ / "frames" / "sensor.yaml");
+    replace(sensor, "axial_n_per_mm: 0.7", "axial_n_per_mm: 0.8");  // as roughly as people know it
+    write_file(sensor_, "# mine\n" + sensor);
+    write_file(plan_, kShortPlan);
+    before_ = read_file(sensor_);
+  }
+  static void replace(std::string& text, const std::string& old, const std::string& fresh) {
+    ASSERT_NE(text.find(old), std::string::npos) << old;
+    text.replace(text.find(old), old.size(), fresh);
+  }
+  Outcome calibrate(const std::string& plan, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"calibrate", "wrench",   "--sensor",
+                                          sensor_,     "--source", "sim:" + scenario_.string(),
+                                          "--plan",    plan};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_bridge(arguments);
+  }
+  void faults(const std::string& text) {
+    write_file(scenario_, std::string(kScenario) + "bench: {faults: {" + text + "}}\n");
+  }
+  void expect_refused(const Outcome& outcome, const std::string& part, int status = 2) {
+    EXPECT_EQ(outcome.status, status) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_NE(outcome.err.find(part), std::string::npos)
+        << "no '" << part << "' in " << outcome.err;
+    EXPECT_EQ(read_file(sensor_), before_) << "the old calibration stays in force";
+    EXPECT_FALSE(std::filesystem::exists(out_));
+  }
+
+  TemporaryFolder temporary_;
+  std::filesystem::path scenario_ = temporary_ / "scenario.yaml";
+  std::filesystem::path sensor_ = temporary_ / "sensor.yaml";
+  std::filesystem::path plan_ = temporary_ / "plan.yaml";
+  std::filesystem::path out_ = temporary_ / "calibration.json";
+  std::filesystem::path partial_ = temporary_ / "calibration.json.partial";
+  std::string before_;
+};
+
+TEST_F(CalibrateWrench, OneKitchenWeightCalibratesAllSixAxesAndRunUsesIt) {
+  const Outcome outcome = calibrate("six_orientations");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  const json calibration = json::parse(read_file(out_));
+  for (const json& axis : calibration.at("axes")) EXPECT_EQ(axis.at("state"), "calibrated");
+  EXPECT_EQ(calibration.at("plan"), "six_orientations");
+  EXPECT_NEAR(calibration.at("K")[2][2].get<double>(), 2800, 40);  // N/m, described as 3200
+  EXPECT_TRUE(std::filesystem::exists(temporary_ / "calibration.data.csv"));
+  EXPECT_FALSE(std::filesystem::exists(partial_));
+
+  const std::string after = read_file(sensor_);
+  EXPECT_EQ(after.rfind("# mine\n", 0), 0u);
+  EXPECT_NE(after.find("axial_n_per_mm: 0.8"), std::string::npos) << "the springs stay";
+  const SensorConfig sensor = load_sensor(sensor_);
+  EXPECT_NEAR(sensor.wrench.K(2, 2), 2800, 40);
+  EXPECT_TRUE(sensor.spring_stiffness);
+  const Outcome run =
+      run_bridge({"run", "--sensor", sensor_, "--source", "sim:" + scenario_.string(), "--fast",
+                  "--frames", "60", "--output", "jsonl:-"});
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.out.find("\"status\":\"ok\""), std::string::npos);
+}
+
+TEST_F(CalibrateWrench, AxesThatNoStepReachesAreCompletedAndMarkedOrRefusedByName) {
+  expect_refused(calibrate(plan_, {"--require-all"}), "no load twists about z: Mz");
+  const Outcome outcome = calibrate(plan_);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("no load pushes along x: Fx"), std::string::npos) << outcome.err;
+  const json axes = json::parse(read_file(out_)).at("axes");
+  EXPECT_EQ(axes[2].at("state"), "calibrated");
+  EXPECT_NE(axes[0].at("state"), "calibrated");
+  EXPECT_NE(axes[5].at("state"), "calibrated");
+  EXPECT_NE(axes[5].at("reason"), "");
+}
+
+TEST_F(CalibrateWrench, WhatWasStoppedGoesOnAndBelongsToItsPlan) {
+  expect_refused(calibrate(plan_, {"--seconds", "7"}), "--resume goes on", 1);
+  ASSERT_TRUE(std::filesystem::exists(partial_));
+  expect_refused(calibrate(plan_), "a calibration was stopped here");
+  expect_refused(calibrate("six_orientations", {"--resume"}), "belongs to another plan");
+
+  const std::string kept = read_file(partial_);
+  write_file(partial_, kept.substr(0, kept.size() / 2));
+  expect_refused(calibrate(plan_, {"--resume"}), "is not an interrupted calibration");
+  write_file(partial_, kept);
+  std::string other = before_;
+  replace(other, "fx: 402.5", "fx: 410");
+  write_file(sensor_, other);
+  const Outcome refused = calibrate(plan_, {"--resume"});
+  EXPECT_NE(refused.err.find("belongs to another sensor"), std::string::npos) << refused.err;
+  write_file(sensor_, before_);
+
+  const Outcome outcome = calibrate(plan_, {"--resume"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("going on: "), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(partial_));
+}
+
+TEST_F(CalibrateWrench, AnInterruptedOneLeavesTheOldInForce) {
+  ASSERT_EQ(calibrate(plan_).status, 0);
+  const std::string old = read_file(out_);
+  Bridge bridge({"calibrate", "wrench", "--sensor", sensor_, "--source",
+                 "sim:" + scenario_.string(), "--plan", "six_orientations"});
+  ASSERT_TRUE(bridge.wait_for_message("accepted: step 2"));
+  bridge.signal(SIGINT);
+  const Outcome outcome = bridge.finish();
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  EXPECT_EQ(read_file(out_), old);
+  EXPECT_TRUE(std::filesystem::exists(partial_));
+}
+
+TEST_F(CalibrateWrench, ABumpRepeatsWhatItSpoilt) {
+  faults("bump: 2");  // orders: hang, hang, hang, let go
+  const Outcome outcome = calibrate(plan_);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("the sensor was bumped, or a tag has slipped"), std::string::npos)
+      << outcome.err;
+}
+
+TEST_F(CalibrateWrench, ALoadCellThatIsWiredTheWrongWayRoundIsSaid) {
+  write_file(scenario_, std::string(kScenario) + "bench: {load_cell: {wrong_sign: true}}\n");
+  expect_refused(calibrate("load_cell"), "swap its wires", 1);
+}
+
+TEST_F(CalibrateWrench, BadInputIsNamedAndNothingIsWritten) {
+  std::string bad = kShortPlan;
+  replace(bad, "at: lower", "at: nowhere");
+  write_file(plan_, bad);
+  expect_refused(calibrate(plan_), "plan.yaml:15: ");
+  expect_refused(calibrate("no_such_plan"), "six_orientations");
+  expect_refused(calibrate("paper", {"--resume"}), "to go on from");
+  expect_refused(run_bridge({"calibrate", "wrench", "--sensor", sensor_, "--source",
+                             "images:" + (temporary_ / "frames").string(), "--plan", "paper"}),
+                 "nobody is there");
+  expect_refused(run_bridge({"calibrate", "wrench", "--sensor", sensor_, "--plan", "paper"}),
+                 "--source");
+  expect_refused(calibrate("load_cell", {"--board", "/dev/null"}), "simulated instruments");
+  write_file(out_, "a shopping list");
+  const Outcome foreign = calibrate("paper");
+  EXPECT_EQ(foreign.status, 2);
+  EXPECT_EQ(read_file(out_), "a shopping list");
+}
+
+TEST_F(CalibrateWrench, PlansAreListedAndShownOnStandardOutput) {
+  const Outcome list = run_bridge({"calibrate", "wrench", "--list-plans"});
+  EXPECT_EQ(list.status, 0);
+  EXPECT_EQ(lines_in(list.out), 4u);
+  const Outcome show = run_bridge({"calibrate", "wrench", "--show-plan", "six_axis"});
+  EXPECT_EQ(show.status, 0);
+  write_file(plan_, show.out);
+  EXPECT_NE(show.out.find("reference: six_axis"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tagwrench::test

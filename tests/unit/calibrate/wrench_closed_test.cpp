@@ -1,0 +1,127 @@
+// Does the calibration find the simulator's stiffness, and does it know how well?
+#include "tests/unit/calibrate/wrench_closed.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "host/wrench/estimate.h"
+
+namespace tagwrench::test {
+namespace {
+
+constexpr int kLoads = 200;
+
+/// Errors of a calibrated sensor under random loads, pooled over calibrations.
+struct Score {
+  Vector6 squares = Vector6::Zero();  ///< sum, share of range
+  Vector6 inside = Vector6::Zero();   ///< number within 95 % intervals
+  int count = 0;
+
+  void add(ClosedBench& bench, WrenchModel model) {
+    model.range.setConstant(1e9);
+    WrenchEstimator estimator(model);
+    const auto springs = bench.truth().ldlt();
+    for (int i = 0; i < kLoads; ++i) {
+      const Vector6 load = bench.random_load();
+      Track track;
+      track.status = Status::ok;
+      track.displacement = bench.noisy(springs.solve(load));
+      track.covariance = tracker_noise().cwiseAbs2().asDiagonal();
+      Sample sample;
+      estimator.estimate(track, sample);
+      const Vector6 error = sample.wrench - load;
+      squares += error.cwiseQuotient(paper_range()).cwiseAbs2();
+      inside += (error.array().abs() <= 1.96 * sample.wrench_sigma.array()).cast<double>().matrix();
+      ++count;
+    }
+  }
+  Vector6 rms() const { return (squares / count).cwiseSqrt(); }
+  Vector6 coverage() const { return inside / count; }
+};
+
+class EveryPlanClosed : public testing::TestWithParam<const char*> {};
+
+TEST_P(EveryPlanClosed, FindsTheStiffnessAtAPerfectBench) {
+  sim::BenchSettings perfect;
+  perfect.perfect = true;
+  ClosedBench bench(GetParam(), perfect, 1);
+  bench.play();
+  ASSERT_TRUE(bench.guide().done() && !bench.guide().failed()) << bench.guide().failure();
+  EXPECT_TRUE(bench.guide().skipped().empty());
+  Score score;
+  WrenchData data = bench.data();
+  // What a person would state of such a bench: nothing is off.
+  for (Observation& o : data.observations) {
+    o.common.clear();
+    o.products.clear();
+  }
+  score.add(bench, bench.fit(data).model);
+  EXPECT_LT(score.rms().maxCoeff(), 0.003) << score.rms().transpose();  // of range
+}
+
+TEST_P(EveryPlanClosed, ErrorsOfAnHonestBenchAreAsLargeAsStated) {
+  Score score;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    ClosedBench bench(GetParam(), {}, seed);
+    bench.play();
+    ASSERT_TRUE(bench.guide().done() && !bench.guide().failed()) << bench.guide().failure();
+    score.add(bench, bench.fit(bench.data()).model);
+  }
+  EXPECT_LT(score.rms().maxCoeff(), 0.025) << score.rms().transpose();  // of range
+  EXPECT_GT(score.coverage().mean(), 0.90) << score.coverage().transpose();
+}
+
+INSTANTIATE_TEST_SUITE_P(Plans, EveryPlanClosed,
+                         testing::Values("paper", "six_orientations", "load_cell", "six_axis"),
+                         [](const auto& plan) { return std::string(plan.param); });
+
+TEST(WrenchClosed, AWrongMassIsFoundAmongTheOthersAndLeftOut) {
+  sim::BenchSettings settings;
+  settings.faults.wrong_mass = 5;
+  settings.faults.wrong_mass_factor = 2;
+  ClosedBench bench("six_orientations", settings, 2);
+  bench.play();
+  ASSERT_TRUE(bench.guide().done() && !bench.guide().failed()) << bench.guide().failure();
+  const WrenchFit fit = bench.fit(bench.data());
+  int rejected = 0;
+  for (const BlockFit& block : fit.blocks) {
+    if (!block.rejected) continue;
+    ++rejected;
+    EXPECT_EQ(block.step, 9) << block.remark;  // the fifth mass of the plan
+    EXPECT_NEAR(block.load_ratio, 2, 0.2);
+  }
+  EXPECT_EQ(rejected, 1);
+}
+
+TEST(WrenchClosed, ABumpIsRepeatedAndDoesNoHarm) {
+  sim::BenchSettings settings;
+  settings.faults.bump = 2;  // orders of the plan: hang, hang, let go, turn ...
+  ClosedBench bench("six_orientations", settings, 1);
+  bench.play();
+  ASSERT_TRUE(bench.guide().done() && !bench.guide().failed()) << bench.guide().failure();
+  EXPECT_TRUE(bench.told("the sensor was bumped"));
+  Score score;
+  score.add(bench, bench.fit(bench.data()).model);
+  EXPECT_LT(score.rms().maxCoeff(), 0.03) << score.rms().transpose();  // of range
+}
+
+TEST(WrenchClosed, AnOverloadedCellIsNotBelieved) {
+  sim::BenchSettings settings;
+  settings.load_cell.range = 0.4;  // N
+  ClosedBench bench("load_cell", settings, 1);
+  bench.play(200);
+  EXPECT_TRUE(bench.told("the reference was overloaded"));
+}
+
+TEST(WrenchClosed, ReferenceLagIsFoundWithinItsUncertaintyOfAMillisecond) {
+  sim::BenchSettings settings;
+  ClosedBench bench("load_cell", settings, 1);
+  bench.play();
+  const WrenchData data = bench.data();
+  ASSERT_TRUE(data.lag.known);
+  EXPECT_NEAR(data.lag.value, -settings.load_cell.lag, 2e-3);  // s: the platform's own is 1 ms
+}
+
+}  // namespace
+}  // namespace tagwrench::test
