@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <iostream>
 #include <stdexcept>
 #include <string_view>
+#include <system_error>
+#include <vector>
 
 #include "host/config/sensor_edit.h"
 #include "host/config_error.h"
@@ -21,6 +24,19 @@ char known_separator(const std::string& text) {
   if (text.size() == 1 && std::string_view(";,|:\t ").find(text[0]) != std::string_view::npos)
     return text[0];
   throw ConfigError(fmt::format("--separator: '{}' is none; use ; , tab or auto", text));
+}
+
+/// That `out` can be written, and is none of the files that are read.
+void check_output(const char* option, const std::filesystem::path& out,
+                  const std::vector<std::filesystem::path>& inputs) {
+  check_replaceable(out);
+  for (const std::filesystem::path& input : inputs) {
+    std::error_code none;
+    if (std::filesystem::equivalent(out, input, none)) {
+      throw ConfigError(
+          fmt::format("{} {}: is what is to be read; name another file", option, out.string()));
+    }
+  }
 }
 
 }  // namespace
@@ -118,8 +134,10 @@ int AnalyzeCommand::run() const {
     throw ConfigError("--readings: either that or data files, not both");
   if (!mapped && files_.empty())
     throw ConfigError("analyze: name a data file, or --readings of another program's CSV");
-  if (!json_.empty() && json_ != "-") check_replaceable(json_);
-  if (!data_.empty()) check_replaceable(data_);
+  std::vector<std::filesystem::path> inputs(files_.begin(), files_.end());
+  if (mapped) inputs.insert(inputs.end(), {mapping_.readings, mapping_.reference});
+  if (!json_.empty() && json_ != "-") check_output("--json", json_, inputs);
+  if (!data_.empty()) check_output("--data", data_, inputs);
 
   std::vector<study::Trial> trials;
   std::vector<std::string> notes;

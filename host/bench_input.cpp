@@ -16,9 +16,14 @@ BenchInput open_at_bench(const InputOptions& options) {
   const sim::Scenario scenario =
       spec.argument.empty() ? sim::Scenario{} : load_scenario(spec.argument);
   at.bench = std::make_unique<sim::Bench>(scenario.bench, scenario.seed);
-  at.input.sensor = options.sensor.empty()
-                        ? parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor")
-                        : load_sensor(options.sensor, options.calibration);
+  if (options.sensor.empty()) {
+    at.input.sensor_name = "the simulated sensor";
+    at.input.sensor_text = sim::sensor_yaml(scenario);
+    at.input.sensor = parse_sensor(at.input.sensor_text, at.input.sensor_name);
+  } else {
+    at.input.sensor_name = options.sensor;
+    at.input.sensor = load_sensor(options.sensor, options.calibration);
+  }
   at.input.source =
       std::make_unique<SimulatorSource>(scenario, /*live=*/false, nullptr, at.bench.get());
   return at;

@@ -76,8 +76,11 @@ void CalibrateCommand::declare_wrench() {
   wrench_->add_option("--sensor", o.sensor, "sensor.yaml of this sensor");
   wrench_->add_option("--source", o.source,
                       "sim | sim:SCENARIO.yaml, which loads itself, or "
-                      "v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]");
-  wrench_->add_option("--plan", o.plan, "a ready-made plan (--list-plans) or a plan file");
+                      "v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or recording:FILE of --record, whose "
+                      "loads are fitted once more");
+  wrench_->add_option("--plan", o.plan,
+                      "a ready-made plan (--list-plans) or a plan file; of a recording, without it "
+                      "its own");
   wrench_->add_option("--out", o.out, "file to write; without it calibration.json beside --sensor");
   wrench_->add_option("--notes", o.notes, "temperature, place, who: goes into the record");
   wrench_->add_option("--board", o.board, "serial port of the board with the load cell, or auto");
@@ -90,6 +93,17 @@ void CalibrateCommand::declare_wrench() {
       ->delimiter(',')
       ->expected(6)
       ->check(CLI::PositiveNumber);
+  auto* record = wrench_->add_option(
+      "--record", record_.file,
+      "keep frames, readings and accepted steps in a new file, for --source recording:FILE");
+  wrench_
+      ->add_option("--keep", keep_,
+                   "what of each frame is recorded:\n"
+                   "  raw       as it came from the source (MJPG stays MJPG)\n"
+                   "  region    grey pixels of the part around the tags")
+      ->check(CLI::IsMember({"raw", "region"}))
+      ->capture_default_str()
+      ->needs(record);
   wrench_->add_flag("--resume", o.resume, "go on with a calibration that was stopped");
   wrench_->add_flag("--force", o.force, "begin anew, whatever is there");
   wrench_->add_flag("--require-all", o.require_all,
@@ -99,9 +113,14 @@ void CalibrateCommand::declare_wrench() {
       ->check(duration());
   wrench_->callback([this, list, show] {
     if (list->count() > 0 || show->count() > 0) return;
+    const bool recorded = wrench_options_.source.rfind("recording:", 0) == 0;
     for (const char* needed : {"--sensor", "--source", "--plan"}) {
-      if (wrench_->count(needed) == 0) throw CLI::RequiredError(needed);
+      const bool optional = recorded && std::string_view(needed) == "--plan";
+      if (wrench_->count(needed) == 0 && !optional) throw CLI::RequiredError(needed);
     }
+    if (record_.file.empty()) return;
+    record_.keep = keep_ == "raw" ? record::Keep::raw : record::Keep::region;
+    wrench_options_.record = record_;
   });
 }
 

@@ -29,6 +29,8 @@ class CalibrateCommand {
   CalibrateCameraOptions camera_options_;
   CalibrateTargetOptions target_options_;
   CalibrateWrenchOptions wrench_options_;
+  RecordOptions record_;
+  std::string keep_ = "raw";  ///< of that
 };
 
 }  // namespace tagwrench

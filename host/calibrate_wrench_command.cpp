@@ -3,18 +3,24 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <system_error>
 
+#include "host/calibrate_wrench/recorder.h"
 #include "host/calibrate_wrench/references.h"
+#include "host/calibrate_wrench/replay.h"
 #include "host/calibrate_wrench/result.h"
 #include "host/calibrate_wrench/run.h"
 #include "host/config/plan_config.h"
 #include "host/config/sensor_edit.h"
 #include "host/config/sha256.h"
 #include "host/config_error.h"
+#include "host/hands_off.h"
+#include "host/recording_sensor.h"
 #include "host/tell.h"
 
 namespace tagwrench {
@@ -23,6 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kStopped = 1;
+constexpr int kRecordingFailed = 1;
 constexpr int kAttempts = 3;  // of the simulated person
 constexpr double kUnknownRange = 1e8;
 
@@ -94,13 +101,30 @@ void check_files(const CalibrationFiles& files, const CalibrateWrenchOptions& op
 }
 
 /// Pictures cannot be asked to hang a weight.
-void check_source(const std::string& source) {
-  const std::string kind = split_spec(source).kind;
-  if (kind == "images" || kind == "recording") {
+void check_source(const CalibrateWrenchOptions& options) {
+  if (split_spec(options.source).kind == "images") {
     throw ConfigError(fmt::format(
-        "--source {}: nobody is there who could do what the plan asks; give a camera or sim",
-        source));
+        "--source {}: nobody is there who could do what the plan asks; give a camera, sim, or the "
+        "recording of a calibration",
+        options.source));
   }
+  if (!options.record) return;
+  check_recording(*options.record, "--record");
+  if (options.resume) {
+    throw ConfigError(
+        "--record, --resume: what was measured before would not be in the recording; leave one "
+        "out");
+  }
+}
+
+/// What a recording has already, or cannot do any more.
+void check_replay_options(const CalibrateWrenchOptions& options) {
+  if (!options.record && !options.resume && !options.seconds && options.board.empty() &&
+      options.cells.empty() && options.optoforce.empty() && options.counts_per_unit.empty())
+    return;
+  throw ConfigError(
+      "--record, --resume, --seconds, --board, --cells, --optoforce, --counts-per-unit: are for "
+      "loads that are still to come, the recording has its own; leave them out");
 }
 
 std::string now_utc() {
@@ -118,18 +142,26 @@ std::string sensor_sha256(const SensorConfig& sensor) {
   return sha256_hex(text);
 }
 
-Calibration calibration_of(const CalibrateWrenchOptions& options, const WrenchPlan& plan,
-                           const SensorConfig& sensor, const WrenchData& data, const WrenchFit& fit,
-                           const Reference* reference) {
+/// What was measured, and what is said of it.
+struct Measured {
+  std::vector<StepRecord> records = {};
+  std::string reference;
+  double gain_sigma = 0;  ///< relative, of a load cell
+  std::string notes;
+  std::string date = {};  ///< UTC
+};
+
+Calibration calibration_of(const WrenchPlan& plan, const SensorConfig& sensor,
+                           const Measured& measured, const WrenchData& data, const WrenchFit& fit) {
   Calibration out;
   out.sensor = identity_of(sensor.camera, sensor.target, sensor.rest);
   out.model = fit.model;
   CalibrationRecord& record = out.record;
-  record.date = now_utc();
+  record.date = measured.date;
   record.software = std::string("tagwrench ") + TAGWRENCH_VERSION;
   record.plan = plan.name;
-  record.reference = reference != nullptr ? reference->description() : "masses";
-  record.notes = options.notes;
+  record.reference = measured.reference;
+  record.notes = measured.notes;
   if (data.lag.known) record.lag = {data.lag.value, data.lag.sigma};
   record.axis = fit.axis;
   record.inside_95 = fit.inside_95;
@@ -137,6 +169,39 @@ Calibration calibration_of(const CalibrateWrenchOptions& options, const WrenchPl
   record.warnings = fit.warnings;
   record.trials = fit.trials;
   return out;
+}
+
+/// What is calibrated, and where to.
+struct Subject {
+  CalibrationFiles files;
+  std::string sensor_text;
+  const SensorConfig& sensor;
+  Matrix6 stiffness;  ///< known before
+  Vector6 range;      ///< N and N m
+};
+
+void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject,
+                   const WrenchPlan& plan, const Measured& measured) {
+  WrenchData data = collect(plan, measured.records, measured.gain_sigma);
+  const WrenchFit fit = fit_wrench(data.observations, data.path,
+                                   {.prior = subject.stiffness,
+                                    .require_all = options.require_all,
+                                    .zero_in_use = data.zero_in_use});
+  add_predictions(plan, fit, data);
+  write_calibration(subject.files, subject.sensor_text, options.sensor, subject.sensor, data,
+                    calibration_of(plan, subject.sensor, measured, data, fit));
+  std::error_code none;
+  fs::remove(subject.files.progress, none);
+  for (const std::string& line : describe(plan, data, fit, subject.range)) tell(line);
+  tell(fmt::format("written: {}, {} and wrench.calibration in {}",
+                   subject.files.calibration.string(), subject.files.data.string(),
+                   options.sensor));
+}
+
+void check_sensor(const Input& input, const std::string& sensor_text, const std::string& file) {
+  check_editable(sensor_text, {{"wrench", {{"calibration", "''"}}}}, file);
+  check_size(input);
+  check_appearance(input);
 }
 
 int say_stopped(GuideEnd end, const WrenchGuide& guide, const fs::path& progress) {
@@ -150,39 +215,64 @@ int say_stopped(GuideEnd end, const WrenchGuide& guide, const fs::path& progress
   return kStopped;
 }
 
-}  // namespace
+/// Ends a recording. False: it is not whole.
+bool end_recording(CalibrationRecorder& recorder, const std::string& file) {
+  const std::string trouble = recorder.finish();
+  const record::WriterState state = recorder.state();
+  tell(fmt::format("recording {}: {} frames, {:.3g} MB{}", file, state.frames,
+                   1e-6 * static_cast<double>(state.bytes),
+                   state.lost_frames > 0
+                       ? fmt::format("; the disk was too slow for {} of them; --keep region keeps "
+                                     "less",
+                                     state.lost_frames)
+                       : ""));
+  if (!trouble.empty()) tell(trouble);
+  return trouble.empty() && state.lost_frames == 0 && state.lost_others == 0;
+}
 
-int calibrate_wrench(const CalibrateWrenchOptions& options) {
-  if (options.list_plans) return list_plans();
-  if (!options.show_plan.empty()) {
-    std::fputs(plan_text(options.show_plan).c_str(), stdout);
-    return 0;
-  }
+/// A rest that is learned at the start is that of the mounting in which the program was started.
+void check_resumable(const SensorConfig& sensor, const WrenchPlan& plan, const Progress& progress,
+                     const fs::path& partial) {
+  if (rest_is_calibrated(sensor)) return;
+  int next = 0;
+  const auto done = [&] {
+    return std::any_of(progress.records.begin(), progress.records.end(),
+                       [&](const StepRecord& record) { return record.step == next; }) ||
+           std::find(progress.skipped.begin(), progress.skipped.end(), next) !=
+               progress.skipped.end();
+  };
+  while (next < static_cast<int>(plan.steps.size()) && done()) ++next;
+  if (next == static_cast<int>(plan.steps.size()) ||
+      plan.steps[static_cast<std::size_t>(next)].mounting == plan.steps.front().mounting)
+    return;
+  throw ConfigError(fmt::format(
+      "--resume: this sensor's rest is learned anew at every start, and now it lies otherwise than "
+      "when {} was begun; run `tagwrench calibrate target`, then begin again with --force",
+      partial.string()));
+}
+
+int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles& files) {
   const std::string text = plan_text(options.plan);
   const WrenchPlan plan = parse_plan(text, options.plan);
   const std::string sensor_text = read_text(options.sensor);
-  const CalibrationFiles files =
-      files_of(options.out.empty() ? fs::path(options.sensor).parent_path() / "calibration.json"
-                                   : fs::path(options.out));
   check_replaceable(options.sensor);
   check_files(files, options);
-  check_source(options.source);
+  check_source(options);
   BenchInput at =
       open_at_bench({options.sensor, options.source, /*fast=*/true, WrenchCalibration::ignore});
   const SensorConfig& sensor = at.input.sensor;
-  check_editable(sensor_text, {{"wrench", {{"calibration", "''"}}}}, options.sensor);
-  check_size(at.input);
-  check_appearance(at.input);
+  check_sensor(at.input, sensor_text, options.sensor);
 
-  GuideOptions guide_options;
-  guide_options.stiffness = known_stiffness(sensor, options.sensor);
-  guide_options.range = full_load(sensor);
-  guide_options.attempts = at.bench ? kAttempts : 0;
-  check_plan(plan, guide_options.range, options.require_all);
+  const Subject subject{files, sensor_text, sensor, known_stiffness(sensor, options.sensor),
+                        full_load(sensor)};
+  check_plan(plan, subject.range, options.require_all);
   const ProgressOf of{sha256_hex(text), sensor_sha256(sensor)};
-  WrenchGuide guide(plan, guide_options);
+  WrenchGuide guide(plan, {.stiffness = subject.stiffness,
+                           .range = subject.range,
+                           .attempts = at.bench ? kAttempts : 0});
   if (options.resume) {
     const Progress progress = load_progress(files.progress, of, plan);
+    check_resumable(sensor, plan, progress, files.progress);
     guide.resume(progress.records, progress.skipped);
     tell(fmt::format("going on: {} steps are done", progress.records.size()));
   }
@@ -191,24 +281,120 @@ int calibrate_wrench(const CalibrateWrenchOptions& options) {
       at.bench.get(), TimePoint{});
   tell("source: " + at.input.source->format().description);
   if (reference) tell("reference: " + reference->description());
+  if (!rest_is_calibrated(sensor)) {
+    tell(
+        "this sensor's rest is learned anew at every start; run `tagwrench calibrate target` first "
+        "if `check`, `zero` and --resume shall work: newtons hold for the target as it was");
+  }
+  Measured measured{.reference = reference  ? reference->description()
+                                 : at.bench ? "simulated masses"
+                                            : "masses",
+                    .gain_sigma = reference ? reference->gain_sigma() : 0,
+                    .notes = options.notes};
 
-  const GuideEnd end =
-      run_guide({&at, reference.get(), &plan, files.progress, of, options.seconds}, guide);
+  const UniqueFd stop = signals_as_fd();
+  std::optional<CalibrationRecorder> recorder;
+  if (options.record) {
+    record::Head head = recording_head(at.input, options.record->keep);
+    put_into(head, {options.plan, text, measured.reference, measured.gain_sigma, measured.notes});
+    recorder.emplace(record::WriterOptions{.path = options.record->file,
+                                           .lossless = at.input.source->poll_fd() < 0},
+                     head);
+  }
+  const GuideEnd end = run_guide({&at, reference.get(), recorder ? &*recorder : nullptr, &stop,
+                                  &plan, files.progress, of, options.seconds},
+                                 guide);
+  const bool recorded = !recorder || end_recording(*recorder, options.record->file);
   if (end != GuideEnd::done) return say_stopped(end, guide, files.progress);
+  measured.records = guide.records();
+  measured.date = now_utc();
+  fit_and_write(options, subject, plan, measured);
+  return recorded ? 0 : kRecordingFailed;
+}
 
-  const WrenchData data = collect(plan, guide.records(), reference ? reference->gain_sigma() : 0);
-  const WrenchFit fit = fit_wrench(data.observations, data.path,
-                                   {.prior = guide_options.stiffness,
-                                    .require_all = options.require_all,
-                                    .zero_in_use = data.zero_in_use});
-  write_calibration(files, sensor_text, options.sensor, sensor, data,
-                    calibration_of(options, plan, sensor, data, fit, reference.get()));
-  std::error_code none;
-  fs::remove(files.progress, none);
-  for (const std::string& line : describe(plan, data, fit, guide_options.range)) tell(line);
-  tell(fmt::format("written: {}, {} and wrench.calibration in {}", files.calibration.string(),
-                   files.data.string(), options.sensor));
+/// The plan that is given, which must ask for the same steps, or the recording's own.
+WrenchPlan plan_of_recording(const CalibrateWrenchOptions& options,
+                             const RecordedCalibration& recorded) {
+  if (recorded.plan_yaml.empty()) {
+    throw ConfigError(fmt::format(
+        "--source {}: holds no calibration; record one with `tagwrench calibrate wrench --record "
+        "FILE`",
+        options.source));
+  }
+  WrenchPlan its = parse_plan(recorded.plan_yaml, recorded.plan);
+  if (options.plan.empty()) return its;
+  WrenchPlan ours = parse_plan(plan_text(options.plan), options.plan);
+  const bool same = ours.reference == its.reference && ours.cell_channel == its.cell_channel &&
+                    std::equal(ours.steps.begin(), ours.steps.end(), its.steps.begin(),
+                               its.steps.end(), [](const PlanStep& a, const PlanStep& b) {
+                                 return a.kind == b.kind && a.visit == b.visit;
+                               });
+  if (!same) {
+    throw ConfigError(fmt::format(
+        "--plan {}: asks for other steps than the recording's plan, {}; correct its numbers only, "
+        "or leave --plan out",
+        options.plan, recorded.plan));
+  }
+  return ours;
+}
+
+/// As known_stiffness(); of a sensor without springs what the recorded one began with.
+Matrix6 stiffness_before(const SensorConfig& sensor, const record::RecordingReader& recording) {
+  if (sensor.spring_stiffness) return *sensor.spring_stiffness;
+  return recorded_sensor(recording.head(), recording.path().string()).wrench.K;
+}
+
+/// The loads of an earlier calibration once more.
+int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFiles& files) {
+  check_replay_options(options);
+  const std::string sensor_text = read_text(options.sensor);
+  check_replaceable(options.sensor);
+  check_files(files, options);
+  record::RecordingReader recording(split_spec(options.source).argument);
+  const RecordedCalibration recorded = calibration_in(recording.head());
+  const WrenchPlan plan = plan_of_recording(options, recorded);
+  const std::vector<AcceptedStep> steps = accepted_steps(recording, plan);
+  Input input =
+      open_input({options.sensor, options.source, /*fast=*/true, WrenchCalibration::ignore});
+  const SensorConfig& sensor = input.sensor;
+  check_sensor(input, sensor_text, options.sensor);
+  const SensorConfig then =
+      recorded_sensor(recording.head(), recording.path().string(), WrenchCalibration::ignore);
+  const std::string other = difference(identity_of(then.camera, then.target, then.rest),
+                                       identity_of(sensor.camera, sensor.target, sensor.rest));
+  if (!other.empty())
+    tell(fmt::format("recorded with another sensor.yaml ({}); --sensor counts", other));
+  const Subject subject{files, sensor_text, sensor, stiffness_before(sensor, recording),
+                        full_load(sensor)};
+  check_plan(plan, subject.range, options.require_all);
+  tell("source: " + input.source->format().description);
+  tell(fmt::format("plan {}, {}: {} steps were accepted", plan.name, recorded.reference,
+                   steps.size()));
+  if (const std::string missing = not_recorded(steps, plan); !missing.empty())
+    tell("not in the recording: " + missing);
+
+  fit_and_write(options, subject, plan,
+                {.records = replay_steps(input, recording, steps, plan),
+                 .reference = recorded.reference,
+                 .gain_sigma = recorded.gain_sigma,
+                 .notes = options.notes.empty() ? recorded.notes : options.notes,
+                 .date = recording.head().created});
   return 0;
+}
+
+}  // namespace
+
+int calibrate_wrench(const CalibrateWrenchOptions& options) {
+  if (options.list_plans) return list_plans();
+  if (!options.show_plan.empty()) {
+    std::fputs(plan_text(options.show_plan).c_str(), stdout);
+    return 0;
+  }
+  const CalibrationFiles files =
+      files_of(options.out.empty() ? fs::path(options.sensor).parent_path() / "calibration.json"
+                                   : fs::path(options.out));
+  return split_spec(options.source).kind == "recording" ? calibrate_again(options, files)
+                                                        : calibrate_live(options, files);
 }
 
 }  // namespace tagwrench

@@ -6,14 +6,17 @@
 #include <string>
 #include <vector>
 
+#include "host/recording.h"
+
 namespace tagwrench {
 
 struct CalibrateWrenchOptions {
   std::string sensor;  ///< path
   std::string source;  ///< SRC
-  std::string plan;    ///< of a ready-made plan, or path
+  std::string plan;    ///< of a ready-made plan, or path; of a recording empty: its own
   std::string out;     ///< path; empty: calibration.json beside `sensor`
   std::string notes;   ///< environment, for the record
+  std::optional<RecordOptions> record;
   bool resume = false;
   bool force = false;
   bool require_all = false;
@@ -28,8 +31,9 @@ struct CalibrateWrenchOptions {
 };
 
 /// Returns the exit status: 0 written; 1 stopped or failed on the way, what was measured is kept
-/// for --resume. Throws ConfigError if it cannot start, or if what was measured makes no
-/// calibration. A calibration that was in force stays so until the new one is complete.
+/// for --resume; or written, but a recording that was asked for is not whole. Throws ConfigError if
+/// it cannot start, or if what was measured makes no calibration. A calibration that was in force
+/// stays so until the new one is complete.
 int calibrate_wrench(const CalibrateWrenchOptions& options);
 
 }  // namespace tagwrench

@@ -17,6 +17,7 @@
 #include "host/config/sha256.h"
 #include "host/config/yaml_reader.h"
 #include "host/config_error.h"
+#include "host/recorded_trial.h"
 #include "host/study/analysis.h"
 #include "host/study/trial_csv.h"
 #include "host/tell.h"
@@ -47,8 +48,9 @@ fs::path calibration_of(const std::string& sensor) {
   return fs::path(sensor).parent_path() / named;
 }
 
-CertificateData described(const fs::path& file, const std::string& text) {
-  return {file.filename().string(), sha256_hex(text), text.size()};
+CertificateData described(const fs::path& file) {
+  const FileSha256 hash = sha256_of_file(file);
+  return {file.filename().string(), hash.hex, hash.bytes};
 }
 
 }  // namespace
@@ -70,8 +72,10 @@ CertificateCommand::CertificateCommand(CLI::App& app)
   CLI::Option* sensor = verb_->add_option(
       "--sensor", sensor_, "sensor.yaml: its calibration, after a check that it belongs to it");
   verb_->add_option("--calibration", calibration_, "calibration.json")->excludes(sensor);
-  verb_->add_option("data", data_,
-                    "FILE.data.csv ... as calibrations and `analyze --data` leave them");
+  verb_->add_option(
+      "data", data_,
+      "FILE.data.csv ... as calibrations and `analyze --data` leave them, or recordings "
+      "with a six-axis reference");
   verb_->add_option("--environment", environment_,
                     "in place of what the calibration noted: temperature, place, who");
   verb_->add_flag("--force", force_, "replace files that are there");
@@ -112,11 +116,13 @@ Certificate CertificateCommand::certificate() const {
   result.issued = today();
   result.software = "tagwrench " TAGWRENCH_VERSION;
   std::vector<study::Trial> trials;
+  std::vector<std::string> notes;
   for (const fs::path& file : subject.data) {
-    result.data.push_back(described(file, read_text(file)));
-    trials.push_back(study::read_trial(file));
+    trials.push_back(is_recording(file) ? recorded_trial(file, notes) : study::read_trial(file));
+    result.data.push_back(described(file));  // a recording that was left open is closed by now
   }
   result.analysis = study::analyze(trials, {});
+  result.analysis.warnings.insert(result.analysis.warnings.begin(), notes.begin(), notes.end());
   if (subject.calibration) {
     Calibration calibration = *subject.calibration;
     if (!environment_.empty()) calibration.record.notes = environment_;

@@ -4,8 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "host/certificate/quantity.h"
+#include "host/study/analysis_warnings.h"
 
 namespace tagwrench {
 namespace {
@@ -29,10 +31,17 @@ std::string rmse_text(const std::array<AxisFit, 6>& axes) {
   for (int i = 0; i < 6; ++i) {
     const AxisFit& axis = axes[static_cast<std::size_t>(i)];
     if (axis.state == AxisState::calibrated)
-      parts.push_back(fmt::format("{} {}", study::kAxisNames[static_cast<std::size_t>(i)],
+      parts.push_back(fmt::format("{}\u00a0{}", study::kAxisNames[static_cast<std::size_t>(i)],
                                   load_text(axis.held_out_rmse, i)));
   }
   return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+/// Those that change with what the calibration says of its axes.
+std::vector<std::string> axis_warnings(const study::Analysis& analysis) {
+  std::vector<std::string> lines = study::excitation_warnings(analysis);
+  for (std::string& line : study::coverage_warnings(analysis)) lines.push_back(std::move(line));
+  return lines;
 }
 
 }  // namespace
@@ -63,22 +72,34 @@ std::vector<Fact> procedure_facts(const Calibration& calibration) {
   add(facts, "Plan", record.plan);
   add(facts, "Reference", record.reference);
   add(facts, "Model", model_text(calibration));
-  if (record.axis) add(facts, "Its own RMSE held out", rmse_text(*record.axis));
+  // With an instrument each reading counts, with masses the mean of each hold, which has less
+  // noise.
+  if (record.axis)
+    add(facts, record.lag ? "RMSE in its fit" : "Each hold's mean, RMSE", rmse_text(*record.axis));
   add(facts, "Software", record.software);
   add(facts, "Environment", record.notes.empty() ? "not noted" : record.notes);
   return facts;
 }
 
 void add_calibration(const CalibrationRecord& record, study::Analysis& analysis) {
+  for (const std::string& line : axis_warnings(analysis)) std::erase(analysis.warnings, line);
+  std::vector<std::string> remarks;
   for (std::size_t i = 0; i < 6; ++i) {
     study::AxisReport& report = analysis.axis[i];
     if (record.inside_95) report.coverage = (*record.inside_95)[i];
-    if (!record.axis || (*record.axis)[i].state == AxisState::calibrated) continue;
+    if (!record.axis) continue;
     const AxisFit& axis = (*record.axis)[i];
-    report.calibrated = false;
-    report.reason = axis.reason.empty() ? name(axis.state)
-                                        : fmt::format("{}: {}", name(axis.state), axis.reason);
+    if (axis.state != AxisState::calibrated) {
+      report.calibrated = false;
+      report.reason = axis.reason.empty() ? name(axis.state)
+                                          : fmt::format("{}: {}", name(axis.state), axis.reason);
+    } else if (!report.calibrated && analysis.own_predictions && report.full_scale > 0) {
+      report.calibrated = true;
+      remarks.push_back(fmt::format("{}: calibrated, but {}", study::kAxisNames[i], report.reason));
+    }
   }
+  for (const std::string& line : axis_warnings(analysis)) remarks.push_back(line);
+  analysis.warnings.insert(analysis.warnings.begin(), remarks.begin(), remarks.end());
   for (const std::string& warning : record.warnings) {
     if (std::find(analysis.warnings.begin(), analysis.warnings.end(), warning) ==
         analysis.warnings.end())

@@ -11,7 +11,7 @@ namespace tagwrench {
 std::vector<Fact> sensor_facts(const SensorIdentity& sensor);
 std::vector<Fact> procedure_facts(const Calibration& calibration);
 
-/// What the calibration knows better than an analysis of its data: axes that are not calibrated,
+/// What the calibration knows better than an analysis of its data: which axes are calibrated,
 /// coverage of the intervals that it states, and its warnings.
 void add_calibration(const CalibrationRecord& record, study::Analysis& analysis);
 

@@ -53,7 +53,7 @@ bool print(const std::vector<InSituFinding>& findings) {
 
 /// M = r x F, where r is where the point has gone with the platform; and what is not known of mass,
 /// point and direction.
-void set_known(const CheckOptions& options, const Vector6& displacement, KnownLoad& load) {
+void set_known(const CheckOptions& options, const Vector6& displacement, ProofLoad& load) {
   const Eigen::Vector3d point = vector3(options.at_mm) * 1e-3;
   const double force = *options.mass_g * 1e-3 * link::kStandardGravity;
   const Eigen::Vector3d f = force * vector3(options.gravity).normalized();
@@ -77,7 +77,7 @@ void set_known(const CheckOptions& options, const Vector6& displacement, KnownLo
 
 /// How far the wrench must go before the load is taken to be there, of the range.
 double least_change(const CheckOptions& options, const Vector6& range) {
-  KnownLoad load;
+  ProofLoad load;
   set_known(options, Vector6::Zero(), load);
   return 0.3 * load.known.cwiseQuotient(range).cwiseAbs().maxCoeff();
 }
@@ -172,7 +172,7 @@ int CheckCommand::run() const {
 }
 
 bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off) const {
-  KnownLoad load;
+  ProofLoad load;
   load.range = at.input.sensor.wrench.range;
   const Vector6 before = hands_off.result().wrench;
   hands_off.wait_for_change(least_change(options_, load.range));

@@ -11,6 +11,7 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kToldApart = 1.96 * std::numbers::sqrt2;  // of two pictures, at 95 %
 constexpr double kFlat = 0.05;                             // that a resonance adds at most
+constexpr double kSameSprings = 0.005;                     // stiffness: alike in all digits shown
 
 using study::Design;
 using study::DesignRow;
@@ -64,13 +65,20 @@ std::string bandwidth(const Instrument& i, const Design& d) {
       0.5 * i.frame_rate, i.frame_rate, modes, 100 * kFlat, std::min(flat, 0.5 * i.frame_rate));
 }
 
+/// Three digits: "1.58 N", "312 N"; "> 1000 N" for what was not reached.
+std::string force(double newtons) {
+  if (newtons >= study::kMostForce) return fmt::format("> {:g} N", study::kMostForce);
+  const int decimals = newtons >= 99.95 ? 0 : newtons >= 9.995 ? 1 : newtons >= 0.9995 ? 2 : 3;
+  return fmt::format("{:.{}f} N", newtons, decimals);
+}
+
 std::string reach(const Design& d) {
   const char* axes[] = {"x", "y", "z"};
   std::string text = "\nlargest force    tags in view    springs not closed\n";
   for (int a = 0; a < 3; ++a) {
     const study::Reach& reach = d.reach[static_cast<std::size_t>(a)];
-    text += fmt::format("  along {:<10}{:>8.2f} N      {}\n", axes[a], reach.in_view,
-                        reach.to_solid ? fmt::format("{:.2f} N", *reach.to_solid) : "not known");
+    text += fmt::format("  along {:<10}{:>10}      {}\n", axes[a], force(reach.in_view),
+                        reach.to_solid ? force(*reach.to_solid) : "not known");
   }
   return text;
 }
@@ -94,13 +102,16 @@ std::string table(const Design& d) {
       " "
       "    My       Mz     Hz\n";
   for (std::size_t i = 0; i < d.rows.size(); ++i) {
-    text += row(d.rows[i], i == 0 ? fmt::format("{:g} (1)", d.rows[i].range)
-                                  : fmt::format("{:g}", d.rows[i].range));
+    const DesignRow& r = d.rows[i];
+    if (i > 0 && r.range == d.rows[0].range && std::abs(r.scale - 1) < kSameSprings) continue;
+    text += row(r, i == 0 ? "given" : fmt::format("{:g}", r.range));
   }
-  text +=
-      "  (1) the springs as given; below it all springs stiffer or softer by one factor, so that\n"
-      "  +- this force along any axis at the platform's origin just keeps tags in view and coils\n"
-      "  apart. counted: 2 range / (counts per px x travel in px).\n";
+  text += fmt::format(
+      "  given: the springs as they are, under +- {:g} N; below, all springs stiffer or softer by\n"
+      "  one factor, so that +- this force along any axis at the platform's origin just keeps "
+      "tags\n"
+      "  in view and coils apart. counted: 2 range / (counts per px x travel in px).\n",
+      d.rows[0].range);
   return text;
 }
 

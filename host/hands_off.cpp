@@ -45,15 +45,19 @@ Vector6 sigma(const Track& track) { return track.covariance.diagonal().cwiseMax(
 
 }  // namespace
 
-void check_calibrated_rest(const SensorConfig& sensor, const std::string& verb) {
+bool rest_is_calibrated(const SensorConfig& sensor) {
   const bool placed = std::all_of(sensor.target.tags.begin(), sensor.target.tags.end(),
                                   [](const Tag& tag) { return tag.platform_T_tag.has_value(); });
-  if (placed && sensor.rest.camera_T_platform && sensor.rest.appearance) return;
+  return placed && sensor.rest.camera_T_platform && sensor.rest.appearance;
+}
+
+void check_calibrated_rest(const SensorConfig& sensor, const std::string& verb) {
+  if (rest_is_calibrated(sensor)) return;
   throw ConfigError(fmt::format(
       "--sensor: its rest is learned anew at every start, so `tagwrench {}` has nothing to compare "
       "with; run `tagwrench calibrate target` once, which writes rest.position_mm, the tags' "
       "places "
-      "and rest.appearance",
+      "and rest.appearance; newtons are calibrated after it",
       verb));
 }
 

@@ -16,6 +16,9 @@
 
 namespace tagwrench {
 
+/// Whether `calibrate target` has written rest pose, tags' places and the picture at rest.
+bool rest_is_calibrated(const SensorConfig& sensor);
+
 /// Throws ConfigError, naming `verb`, unless rest pose, tags' places and the picture at rest are
 /// known: without them there is nothing to compare with.
 void check_calibrated_rest(const SensorConfig& sensor, const std::string& verb);

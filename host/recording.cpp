@@ -39,16 +39,17 @@ double in_seconds(Duration duration) { return std::chrono::duration<double>(dura
 
 }  // namespace
 
-void check_recording(const RecordOptions& options) {
+void check_recording(const RecordOptions& options, std::string_view option) {
   const fs::path path = options.file;
   std::error_code error;
   if (fs::exists(fs::symlink_status(path, error))) {
-    throw ConfigError(fmt::format(
-        "--out {}: exists, and a recording replaces nothing; choose another name", options.file));
+    throw ConfigError(
+        fmt::format("{} {}: exists, and a recording replaces nothing; choose another name", option,
+                    options.file));
   }
   const fs::path folder = path.has_parent_path() ? path.parent_path() : ".";
   if (::access(folder.c_str(), W_OK) != 0) {
-    throw ConfigError(fmt::format("--out {}: cannot be written: {}; choose a folder of yours",
+    throw ConfigError(fmt::format("{} {}: cannot be written: {}; choose a folder of yours", option,
                                   options.file, std::strerror(errno)));
   }
 }

@@ -18,8 +18,8 @@ struct RecordOptions {
   record::Keep keep = record::Keep::raw;
 };
 
-/// Throws ConfigError if the file exists, or its folder cannot be written.
-void check_recording(const RecordOptions& options);
+/// Throws ConfigError if the file, named by `option`, exists, or its folder cannot be written.
+void check_recording(const RecordOptions& options, std::string_view option = "--out");
 
 /// What a recording says of itself, for this input.
 record::Head recording_head(const Input& input, record::Keep keep);

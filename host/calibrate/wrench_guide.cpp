@@ -214,7 +214,7 @@ void WrenchGuide::begin_taking(double time) {
   begun_ = time;
   taking_ = {todo_.front(), 0, {}, {}};
   for (const ReferenceSample& sample : readings_) {
-    if (sample.time > time - 0.5) taking_.readings.push_back(sample);
+    if (sample.time > time - kReadingsBeforeTaking) taking_.readings.push_back(sample);
   }
 }
 

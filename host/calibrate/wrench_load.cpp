@@ -9,13 +9,14 @@
 namespace tagwrench {
 namespace {
 
-// Of each hang and each push alone: where in its dimple the string or the tip sits, and how the
-// string or the hand leans.
+// Of each hang and each push alone, standard deviations: where in its dimple the string or the tip
+// sits (each coordinate), how a string that rubs or a hand leans (about each of two axes), what
+// string and knot weigh.
 constexpr double kContact = 0.1e-3;      // m
 constexpr double kStringLean = 0.003;    // rad
-constexpr double kHandLean = 0.005;      // rad
+constexpr double kHandLean = 0.004;      // rad
 constexpr double kStringForce = 0.3e-3;  // N
-// How well a six-axis reference's place is known.
+// How well a six-axis reference's place is known, each coordinate and about each axis.
 constexpr double kOriginSigma = 0.3e-3;  // m
 constexpr double kTurnSigma = 0.003;     // rad
 
@@ -83,7 +84,8 @@ void set_push(const WrenchPlan& plan, int step, const CellForce& force, const Ve
                  .point_name = "place of " + point.name,
                  .force_noise = force.noise,
                  .direction_noise = kHandLean,
-                 .point_noise = kContact},
+                 .contact_sigma = kContact,
+                 .contact_name = fmt::format("contact of push {}", step + 1)},
                 observation);
 }
 

@@ -298,4 +298,33 @@ WrenchData collect(const WrenchPlan& plan, const std::vector<StepRecord>& record
   return Collector(plan, records, cell_gain_sigma).collect();
 }
 
+void add_predictions(const WrenchPlan& plan, const WrenchFit& fit, WrenchData& data) {
+  study::Trial& trial = data.trial;
+  const Eigen::Index n = trial.time.size();
+  trial.predicted.setConstant(n, 6, std::nan(""));
+  trial.predicted_sigma.setConstant(n, 6, std::nan(""));
+  for (const HeldOut& held : fit.held_out) {
+    const Observation& o = data.observations[held.observation];
+    const StepKind kind = plan.steps[static_cast<std::size_t>(o.step)].kind;
+    const bool hold = kind == StepKind::rest || kind == StepKind::mass;
+    std::vector<Eigen::Index> rows;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (trial.step[i] == o.step && (hold || trial.time[i] == o.time)) rows.push_back(i);
+    }
+    if (rows.empty()) continue;
+    const Eigen::RowVectorXd mean = trial.features(rows, Eigen::all).colwise().mean();
+    for (const Eigen::Index row : rows) {
+      const Vector6 apart = (trial.features.row(row) - mean).transpose();
+      trial.predicted.row(row) = (held.predicted + fit.model.K * apart).transpose();
+      // Its own noise beside that of the hold's mean; of a single frame the fit has counted it.
+      Vector6 variance = held.sigma.cwiseAbs2();
+      if (hold) {
+        const Vector6 own = trial.feature_sigma.row(row).transpose();
+        variance += fit.model.K.cwiseAbs2() * own.cwiseAbs2();
+      }
+      trial.predicted_sigma.row(row) = variance.cwiseSqrt().transpose();
+    }
+  }
+}
+
 }  // namespace tagwrench

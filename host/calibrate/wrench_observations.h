@@ -30,4 +30,9 @@ struct WrenchData {
 WrenchData collect(const WrenchPlan& plan, const std::vector<StepRecord>& records,
                    double cell_gain_sigma);
 
+/// Fills `predicted` of the data's trial: what the fit, without the step in question, says of each
+/// reading. The readings of a hold share its prediction and differ by their own displacement; of a
+/// push or a movement those frames have one that were observations.
+void add_predictions(const WrenchPlan& plan, const WrenchFit& fit, WrenchData& data);
+
 }  // namespace tagwrench

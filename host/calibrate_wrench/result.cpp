@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "host/config/sensor_edit.h"
 #include "host/config/sha256.h"
@@ -24,19 +25,44 @@ std::string name_from(const fs::path& sensor, const fs::path& file) {
   return name + "'";
 }
 
-std::string axis_line(int i, const AxisFit& axis, double full_load, double inside) {
+/// How well the loads of the held-out predictions were known themselves, rms, N and N m.
+Vector6 known_to(const WrenchData& data, const WrenchFit& fit) {
+  Vector6 sum = Vector6::Zero();
+  for (const HeldOut& h : fit.held_out) {
+    const Observation& o = data.observations[h.observation];
+    sum += o.wrench_covariance.diagonal();
+    for (const CommonError& error : o.common) sum += error.effect.cwiseAbs2();
+  }
+  if (!fit.held_out.empty()) sum /= static_cast<double>(fit.held_out.size());
+  return sum.cwiseSqrt();
+}
+
+std::string axis_line(int i, const AxisFit& axis, double range, double reference, double inside) {
   const double milli = 1e3;
-  std::string line =
-      fmt::format("{}  {:9}  to {:7.1f} {:5}", kWrenchAxes[static_cast<std::size_t>(i)],
-                  axis.state == AxisState::calibrated ? "calibrated" : "NOT", milli * axis.largest,
-                  i < 3 ? "mN" : "mN m");
-  if (axis.state != AxisState::calibrated)
-    return line + fmt::format("  {}: {}", name(axis.state), axis.reason);
-  return line + fmt::format(
-                    "  held out {:8.3f} {} rms, {:5.2f} % of full load, R2 {:.5f}, {:.0f} % "
-                    "within 95 %",
-                    milli * axis.held_out_rmse, i < 3 ? "mN" : "mN m",
-                    100 * axis.held_out_rmse / full_load, axis.held_out_r2, 100 * inside);
+  const char* name_of_axis = kWrenchAxes[static_cast<std::size_t>(i)];
+  const char* unit = i < 3 ? "mN" : "mN m";
+  if (axis.state != AxisState::calibrated) {
+    return fmt::format("{}    NOT calibrated, {}: {}", name_of_axis, name(axis.state), axis.reason);
+  }
+  return fmt::format("{} {:9.1f} {:4} {:9.2f} {:4} {:6.2f} % {:9.2f} {:4} {:8.0f} %", name_of_axis,
+                     milli * axis.largest, unit, milli * axis.held_out_rmse, unit,
+                     100 * axis.held_out_rmse / range, milli * reference, unit, 100 * inside);
+}
+
+/// All that were tried, the best of each kind, in one line.
+std::string trials_line(const std::vector<ModelTrial>& trials) {
+  std::string tried;
+  std::string_view adopted = "linear";
+  for (const ModelTrial& trial : trials) {
+    if (trial.adopted) adopted = name(trial.features.kind);
+    const bool best = std::none_of(trials.begin(), trials.end(), [&](const ModelTrial& t) {
+      return t.features.kind == trial.features.kind && t.score < trial.score;
+    });
+    if (!best) continue;
+    tried += fmt::format("{}{} {:.2f} +- {:.2f}", tried.empty() ? "" : ", ",
+                         name(trial.features.kind), trial.score, trial.score_sigma);
+  }
+  return fmt::format("model: {} (held-out squared error, linear = 1: {})", adopted, tried);
 }
 
 }  // namespace
@@ -59,6 +85,8 @@ void write_calibration(const CalibrationFiles& files, const std::string& sensor_
   std::error_code none;
   if (fs::exists(files.calibration, none))
     write_atomically(files.before, read_text(files.calibration));
+  if (fs::exists(files.data, none))
+    write_atomically(fs::path(files.data) += ".before", read_text(files.data));
   write_atomically(files.data, csv);
   save_calibration(files.calibration, calibration);
   write_sensor(sensor_text, {{"wrench", entries}}, sensor_file);
@@ -66,25 +94,19 @@ void write_calibration(const CalibrationFiles& files, const std::string& sensor_
 
 std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,
                                   const WrenchFit& fit, const Vector6& range) {
-  std::vector<std::string> lines;
+  std::vector<std::string> lines = {
+      "     loads up to   error held out   of range   loads known to   within 95 %"};
+  const Vector6 reference = known_to(data, fit);
   for (int i = 0; i < 6; ++i) {
     const auto axis = static_cast<std::size_t>(i);
-    lines.push_back(axis_line(i, fit.axis[axis], range[i], fit.inside_95[axis]));
+    lines.push_back(axis_line(i, fit.axis[axis], range[i], reference[i], fit.inside_95[axis]));
   }
-  for (const ModelTrial& trial : fit.trials) {
-    const bool best = std::none_of(fit.trials.begin(), fit.trials.end(), [&](const ModelTrial& t) {
-      return t.features.kind == trial.features.kind && t.score < trial.score;
-    });
-    if (!best) continue;  // of its kind
-    lines.push_back(
-        fmt::format("model {}: held-out squared error {:.3g} +- {:.2g} of the linear "
-                    "one's; {}",
-                    name(trial.features.kind), trial.score, trial.score_sigma,
-                    trial.adopted ? "adopted" : "not adopted"));
-  }
-  for (const BlockFit& block : fit.blocks) {
-    if (block.rejected) lines.push_back("left out: " + block.remark);
-  }
+  lines.push_back(
+      "error held out: rms, each step predicted by the others. The load's own uncertainty is in it "
+      "(loads known to: rms), so where the two are alike the reference limits, not the sensor");
+  lines.push_back(
+      "within 95 %: how many of these errors their stated 95 % interval holds; 90 to 99 % is good");
+  if (!fit.trials.empty()) lines.push_back(trials_line(fit.trials));
   if (data.lag.known) {
     // The study counts from the reference to the reading; people ask how late the reference is.
     lines.push_back(fmt::format("the reference comes {:.1f} +- {:.1f} ms after the camera",

@@ -23,8 +23,8 @@ struct CalibrationFiles {
 CalibrationFiles files_of(const std::filesystem::path& calibration);
 
 /// Writes data and calibration, and names it in sensor.yaml, whose text is `sensor_text`. An
-/// earlier calibration is kept as `before`. Throws ConfigError or std::runtime_error; then the old
-/// calibration is in force.
+/// earlier calibration is kept as `before`, and its data likewise. Throws ConfigError or
+/// std::runtime_error; then the old calibration is in force.
 void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
                        const std::filesystem::path& sensor_file, const SensorConfig& sensor,
                        const WrenchData& data, Calibration calibration);

@@ -72,8 +72,7 @@ class Runner {
         guide_(guide),
         source_(*run.at->input.source),
         tracker_(run.at->input.sensor.camera, run.at->input.sensor.target,
-                 run.at->input.sensor.rest),
-        stop_(signals_as_fd()) {
+                 run.at->input.sensor.rest) {
     if (run.at->bench)
       person_.emplace(*run.at->bench, *run.plan, run.at->input.sensor.wrench.range);
   }
@@ -96,11 +95,11 @@ class Runner {
 
  private:
   void wait() {
-    if (signalled(stop_)) end_ = GuideEnd::stopped;
+    if (signalled(*run_.stop)) end_ = GuideEnd::stopped;
     if (source_.poll_fd() < 0) return;
     std::array<pollfd, 4> fds{
         {{source_.poll_fd(), POLLIN, 0},
-         {stop_.get(), POLLIN, 0},
+         {run_.stop->get(), POLLIN, 0},
          {run_.reference != nullptr ? run_.reference->poll_fd() : -1, POLLIN, 0},
          {keys_.poll_fd(), POLLIN, 0}}};
     ::poll(fds.data(), fds.size(), kPatience_ms);
@@ -119,10 +118,11 @@ class Runner {
   void take_readings() {
     if (run_.reference == nullptr) return;
     run_.reference->service();
-    for (ReferenceReading reading; run_.reference->next(reading);)
+    for (ReferenceReading reading; run_.reference->next(reading);) {
+      if (run_.recorder != nullptr) run_.recorder->reading(reading, run_.plan->cell_channel);
       guide_.reading(to_sample(reading));
-    if (const std::string trouble = run_.reference->trouble(); !trouble.empty())
-      tell_.line(trouble);
+    }
+    if (const std::string trouble = run_.reference->trouble(); !trouble.empty()) say(trouble);
   }
 
   void take_frame() {
@@ -135,17 +135,23 @@ class Runner {
         end_ = GuideEnd::ended;
         return;
       case ReadStatus::disconnected:
+        if (run_.recorder != nullptr) run_.recorder->disconnected(source_.detail());
+        tell_.line(source_.detail());
+        return;
       case ReadStatus::reconnected:
+        if (run_.recorder != nullptr) run_.recorder->reconnected(source_.detail());
         tell_.line(source_.detail());
         return;
       default:
         return;
     }
+    const Region decoded = frame.readable();
     Track track = tracker_.track(frame);
     if (track.needs_whole_frame && source_.complete(frame)) track = tracker_.track(frame);
     source_.want(track.wanted);
+    if (run_.recorder != nullptr) run_.recorder->frame(frame, decoded, source_.raw(), track);
     const bool news = track.hint != last_hint_ || is_trouble(track.hint);
-    if (track.hint != Hint::none && news) tell_.line(hint_text(track.hint, track.details));
+    if (track.hint != Hint::none && news) say(hint_text(track.hint, track.details));
     if (track.hint != Hint::none) last_hint_ = track.hint;
     const double time = seconds(frame.capture_time);
     if (!first_time_) first_time_ = time;
@@ -160,11 +166,22 @@ class Runner {
 
   void speak() {
     for (GuideLine line; guide_.next(line);)
-      tell_.line((line.kind == GuideLine::Kind::task ? "> " : "") + line.text);
+      say((line.kind == GuideLine::Kind::task ? "> " : "") + line.text);
+  }
+
+  /// What people are told is in the recording too.
+  void say(const std::string& line) {
+    tell_.line(line);
+    if (run_.recorder != nullptr) run_.recorder->note(line);
   }
 
   /// What was accepted is not lost, whatever comes.
   void keep() {
+    if (run_.recorder != nullptr) {
+      run_.recorder->follow(guide_.records());
+      if (const std::string trouble = run_.recorder->trouble(); !trouble.empty())
+        tell_.line(trouble + "; the calibration goes on, the recording has ended");
+    }
     if (guide_.records().size() == kept_ && guide_.skipped().size() == skipped_) return;
     kept_ = guide_.records().size();
     skipped_ = guide_.skipped().size();
@@ -175,7 +192,6 @@ class Runner {
   WrenchGuide& guide_;
   FrameSource& source_;
   Tracker tracker_;
-  UniqueFd stop_;
   Keys keys_;
   Telling tell_;
   std::optional<SimulatedPerson> person_;

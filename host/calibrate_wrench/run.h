@@ -9,12 +9,15 @@
 #include "host/calibrate/reference.h"
 #include "host/calibrate/wrench_guide.h"
 #include "host/calibrate_wrench/progress.h"
+#include "host/calibrate_wrench/recorder.h"
 
 namespace tagwrench {
 
 struct GuideRun {
   BenchInput* at = nullptr;
-  Reference* reference = nullptr;  ///< null: masses
+  Reference* reference = nullptr;           ///< null: masses
+  CalibrationRecorder* recorder = nullptr;  ///< null: nothing is recorded
+  const UniqueFd* stop = nullptr;           ///< of signals_as_fd()
   const WrenchPlan* plan = nullptr;
   std::filesystem::path progress;
   ProgressOf of;

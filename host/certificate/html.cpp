@@ -7,6 +7,7 @@
 
 #include "host/certificate/quantity.h"
 #include "host/certificate/style.h"
+#include "host/study/analysis_warnings.h"
 
 namespace tagwrench {
 namespace {
@@ -55,8 +56,8 @@ std::string cell(const std::string& text, const char* attributes = "") {
   return fmt::format("<td{}>{}</td>", attributes, text);
 }
 
-std::string optional_load(const std::optional<double>& value, int axis, const char* suffix = "") {
-  return value ? load_text(*value, axis) + suffix : "–";
+std::string optional_load(const std::optional<double>& value, int axis) {
+  return value ? load_text(*value, axis) : "–";
 }
 
 std::string header(const Certificate& c) {
@@ -91,14 +92,14 @@ std::string axis_row(const AxisReport& r, int axis, const PageRoom& room) {
                        escaped(shortened(r.reason, room.warning_length)));
   }
   row += cell(range_text(r.range_low, r.range_high, axis));
-  row += cell(fmt::format("{:.5f}", r.r2), " class=\"first\"");
+  row += cell(std::isfinite(r.r2) ? fmt::format("{:.5f}", r.r2) : "–", " class=\"first\"");
   row += cell(load_text(r.rmse, axis)) + cell(percent_text(r.rmse_percent));
-  row += cell(r.coverage ? fmt::format("{:.0f} %", 100 * *r.coverage) : "–");
+  row += cell(r.coverage ? fmt::format("{:.0f}\u00a0%", 100 * *r.coverage) : "–");
   row += cell(percent_text(r.nonlinearity_percent), " class=\"first\"");
   row += cell(percent_text(r.hysteresis_percent));
   row += cell(r.creep_percent ? percent_text(*r.creep_percent) : "–");
   row += cell(optional_load(r.noise, axis), " class=\"first\"");
-  row += cell(optional_load(r.noise_density, axis, "/√Hz"));
+  row += cell(optional_load(r.noise_density, axis));
   row += cell(optional_load(r.resolution, axis));
   row += cell(optional_load(r.drift_per_hour, axis));
   row += cell(excitation_text(r.excitation), " class=\"first\"");
@@ -109,10 +110,19 @@ std::string axis_row(const AxisReport& r, int axis, const PageRoom& room) {
 std::string columns() {
   std::string text = "<colgroup>";
   for (const double width :
-       {4.2, 12.6, 6.4, 8.0, 6.6, 6.0, 6.2, 6.2, 6.2, 7.8, 9.8, 7.8, 7.8, 4.4}) {
+       {3.2, 15.0, 6.4, 8.4, 5.8, 5.6, 6.0, 6.0, 5.8, 8.2, 8.4, 8.2, 8.6, 4.4}) {
     text += fmt::format("<col style=\"width:{}%\">", width);
   }
   return text + "</colgroup>";
+}
+
+std::string axes_note(const Analysis& a) {
+  return fmt::format(
+      "<p class=\"note\">R² and RMSE are of single readings{}, their own noise and that "
+      "of "
+      "the reference included. Percentages are of the full scale loaded: the larger end of the "
+      "range. – not told by these data.</p>\n",
+      a.own_predictions ? ", predicted by the calibration's own fit without their step" : "");
 }
 
 std::string axes(const Analysis& a, const PageRoom& room) {
@@ -123,11 +133,12 @@ std::string axes(const Analysis& a, const PageRoom& room) {
       "full scale</th><th colspan=\"4\" class=\"first\">at rest</th><th class=\"first\"></th></tr>"
       "<tr><th></th><th>range</th><th class=\"first\">R²</th><th>RMSE</th><th>of full<br>scale</th>"
       "<th>in 95 %<br>interval</th><th class=\"first\">non-<br>linearity</th><th>hyster-<br>esis"
-      "</th><th>creep</th><th class=\"first\">noise</th><th>density</th><th>resolu-<br>tion</th>"
+      "</th><th>creep</th><th class=\"first\">noise</th><th>density<br>per "
+      "√Hz</th><th>resolu-<br>tion</th>"
       "<th>drift/h</th><th class=\"first\">excita-<br>tion</th></tr></thead><tbody>\n";
   for (int axis = 0; axis < 6; ++axis)
     text += axis_row(a.axis[static_cast<std::size_t>(axis)], axis, room);
-  return text + "</tbody></table>\n";
+  return text + "</tbody></table>\n" + axes_note(a);
 }
 
 /// % with two decimals, and no minus before a zero.
@@ -160,11 +171,12 @@ std::string cross_talk(const Analysis& a) {
          "diagonal: error of gain.</p>";
 }
 
-std::string lag_text(const study::Lag& lag) {
+std::string lag_of(const study::Lag& lag) {
   if (!lag.known) return "not found";
-  return fmt::format("{} {:.1f} ± {:.1f} ms late, same for all axes",
-                     lag.value < 0 ? "reference" : "sensor", 1e3 * std::abs(lag.value),
-                     1e3 * lag.sigma);
+  std::string text = study::lag_text(lag);
+  if (const std::size_t sign = text.find("+-"); sign != std::string::npos)
+    text.replace(sign, 2, "±");
+  return text + ", the same on all axes";
 }
 
 std::vector<Fact> conditions(const Analysis& a) {
@@ -178,7 +190,7 @@ std::vector<Fact> conditions(const Analysis& a) {
   } else {
     facts.push_back({"Reference", "loads that hung still, without lag"});
   }
-  if (moving) facts.push_back({"Lag", lag_text(a.lag)});
+  if (moving) facts.push_back({"Lag", lag_of(a.lag)});
   if (!a.validation.empty()) facts.push_back({"Held out", a.validation});
   facts.push_back({"Conditioning", number_text(a.condition)});
   if (!a.weakest.empty()) facts.push_back({"Least excited", a.weakest});
@@ -201,12 +213,8 @@ std::string data(const Certificate& c) {
 
 /// Whether the table of axes says it already.
 bool in_the_table(const Analysis& a, const std::string& warning) {
-  for (std::size_t i = 0; i < 6; ++i) {
-    if (!a.axis[i].calibrated &&
-        warning == fmt::format("{}: not calibrated: {}", study::kAxisNames[i], a.axis[i].reason))
-      return true;
-  }
-  return false;
+  const std::vector<std::string> said = study::excitation_warnings(a);
+  return std::find(said.begin(), said.end(), warning) != said.end();
 }
 
 std::string remarks(const Analysis& a, const PageRoom& room) {
@@ -223,8 +231,8 @@ std::string remarks(const Analysis& a, const PageRoom& room) {
     }
   }
   if (more > 0) items += fmt::format("<li><b>{} more, in the JSON.</b></li>", more);
-  return "<section><h2>Remarks</h2>" + (items.empty() ? "<p>None.</p>" : "<ul>" + items + "</ul>") +
-         "</section>";
+  if (items.empty()) return "<section><h2>Remarks: None.</h2></section>";
+  return "<section><h2>Remarks</h2><ul>" + items + "</ul></section>";
 }
 
 constexpr const char* kDefinitions =

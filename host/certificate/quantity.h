@@ -1,4 +1,4 @@
-// Numbers as people read them.
+// Numbers as people read them. The spaces in them do not break.
 #pragma once
 
 #include <string>
@@ -9,7 +9,8 @@ namespace tagwrench {
 /// finite is a dash.
 std::string load_text(double value, int axis);
 
-/// From low to high: "±0.45 N" where they are alike within 5 %, else "-0.45 to 0.90 N".
+/// From low to high: "±0.45 N" where they are alike within 5 %, else "-0.450 to 0.900 N": three
+/// significant digits of the larger, and as many decimals of the other.
 std::string range_text(double low, double high, int axis);
 
 /// Three significant digits, a dash for what is not finite.

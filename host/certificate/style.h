@@ -28,7 +28,7 @@ table { border-collapse: collapse }
 .facts th { width: 1% }
 .facts td { padding: 0; overflow-wrap: anywhere }
 code { font-family: inherit; font-variant-numeric: tabular-nums }
-.axes { width: 100%; table-layout: fixed; margin-bottom: 2.4mm; font-size: 6.5pt; font-variant-numeric: tabular-nums }
+.axes { width: 100%; table-layout: fixed; margin-bottom: 0.6mm; font-size: 6.1pt; font-variant-numeric: tabular-nums }
 .axes th { font-weight: 400; color: #666; text-align: right; padding: 0.2mm 0.7mm; vertical-align: bottom; line-height: 1.1 }
 .axes thead tr:first-child th { text-align: center; color: #14406b }
 .axes thead tr:last-child { border-bottom: 0.6pt solid #14406b }

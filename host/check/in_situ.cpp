@@ -192,7 +192,7 @@ std::vector<InSituFinding> judge(const AtRest& rest, const InSituLimits& limits)
   return findings;
 }
 
-InSituFinding judge(const KnownLoad& load, const InSituLimits& limits) {
+InSituFinding judge(const ProofLoad& load, const InSituLimits& limits) {
   InSituFinding finding{.subject = Subject::scale};
   const Eigen::LDLT<Matrix6> covariance(load.known_covariance + load.measured_covariance);
   const Vector6 weighted = covariance.solve(load.known);

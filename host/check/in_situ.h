@@ -42,7 +42,7 @@ struct AtRest {
 };
 
 /// A known load and what the sensor made of it, both as changes from the rest before it.
-struct KnownLoad {
+struct ProofLoad {
   Vector6 known = Vector6::Zero();  ///< N, N m
   Matrix6 known_covariance = Matrix6::Zero();
   Vector6 measured = Vector6::Zero();
@@ -101,7 +101,7 @@ struct InSituLimits {
 std::vector<InSituFinding> judge(const AtRest& rest, const InSituLimits& limits = {});
 
 /// Measured over known, by least squares over the six axes, each as well as it is known.
-InSituFinding judge(const KnownLoad& load, const InSituLimits& limits = {});
+InSituFinding judge(const ProofLoad& load, const InSituLimits& limits = {});
 
 /// The same by a load cell through which somebody has pushed.
 InSituFinding judge(const ReferenceMonitor& monitor, const InSituLimits& limits = {});

@@ -16,6 +16,8 @@ void read(YamlSection& s, sim::BenchErrors& e) {
   s.number("point_mm", e.point, kMilli);
   s.number("contact_mm", e.contact, kMilli);
   s.number("gravity_rad", e.gravity_rad);
+  s.number("lean_rad", e.lean_rad);
+  s.number("string_mn", e.string, kMilli);
   s.number("direction_rad", e.direction_rad);
   s.number("sway_rad", e.sway_rad);
   s.number("tremor", e.tremor);
@@ -69,6 +71,8 @@ void read(YamlSection& s, sim::SixAxisSettings& x) {
   s.number("lag_ms", x.lag, kMilli);
   s.numbers("range", x.range);
   s.numbers("origin_mm", x.origin, kMilli);
+  s.number("place_error_mm", x.place_error, kMilli);
+  s.number("turn_error_rad", x.turn_error);
   read(s, x.faults);
 }
 

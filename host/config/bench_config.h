@@ -5,8 +5,9 @@
 //   bench:
 //     perfect: false
 //     gravity: 9.80665
-//     errors: {mass_percent: 0.2, point_mm: 0.2, contact_mm: 0.05, gravity_rad: 0.009,
-//              direction_rad: 0.009, sway_rad: 0.004, tremor: 0.02}
+//     errors: {mass_percent: 0.2, point_mm: 0.2, contact_mm: 0.1, gravity_rad: 0.0087,
+//              lean_rad: 0.003, string_mn: 0.3, direction_rad: 0.0087, sway_rad: 0.004,
+//              tremor: 0.02}
 //     times: {reaction_s: 0.4, turn_s: 1, load_s: 0.5, swing_rad: 0.06, swing_decay_s: 0.7,
 //             string_mm: 120}
 //     faults: {wrong_mass: 0, wrong_mass_factor: 2, bump: 0, bump_change: [x, y, z, rx, ry, rz],
@@ -14,7 +15,8 @@
 //     load_cell: {ideal: false, rate_hz: 80, noise_mn: 0.5, counts_per_newton: 200000, lag_ms: 10,
 //                 scale_error_percent: 0.2, range_n: 10}
 //     six_axis: {ideal: false, rate_hz: 100, counts_per_unit: [six], noise_counts: 1,
-//                filter_hz: 15, lag_ms: 40, range: [six], origin_mm: [0, 0, -51]}
+//                filter_hz: 15, lag_ms: 40, range: [six], origin_mm: [0, 0, -51],
+//                place_error_mm: 0.3, turn_error_rad: 0.003}
 //     # and of both: silent_from_s, silent_to_s, wrong_sign, clock_offset_s, clock_ppm
 #pragma once
 

@@ -17,6 +17,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::uintmax_t kLargestFile = 16 << 20;  // a quadratic model has 0.4 MB
+constexpr double kLargest = 1e12;                  // of any number, SI
 
 /// Every access checks; every complaint names the file.
 class CalibrationReader {
@@ -60,6 +61,8 @@ class CalibrationReader {
     if (!value.is_number()) fail(fmt::format("\"{}\" must be a number", key));
     const double out = value.get<double>();
     if (!std::isfinite(out)) fail(fmt::format("\"{}\" holds a number that is not finite", key));
+    if (std::abs(out) > kLargest)
+      fail(fmt::format("\"{}\" holds {:g}, which no sensor has; calibrate anew", key, out));
     return out;
   }
 

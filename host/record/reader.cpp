@@ -21,7 +21,12 @@ static_assert(std::endian::native == std::endian::little, "blobs are copied as t
 constexpr int kLargest_px = 16384;
 constexpr std::size_t kLongestText = 1 << 20;
 
-TimePoint time_point(std::int64_t ns) { return TimePoint(Duration(ns)); }
+/// ns, so that a damaged file's times can be subtracted and added; 95 years.
+constexpr std::int64_t kLongest_ns = 3'000'000'000'000'000'000;
+
+Duration duration(std::int64_t ns) { return Duration(std::clamp(ns, -kLongest_ns, kLongest_ns)); }
+
+TimePoint time_point(std::int64_t ns) { return TimePoint(duration(ns)); }
 
 std::optional<Status> status_of(std::string_view text) {
   for (const Status s :
@@ -117,6 +122,16 @@ void close_left_open(const std::filesystem::path& path) {
     database.try_run("PRAGMA journal_mode = DELETE");
   } catch (const DatabaseError&) {
     return;  // then it is read as it is, if it can be
+  }
+}
+
+/// Takes out the latest beginning and end of a step that no longer counts.
+void withdraw(const Mark& lost, std::vector<Mark>& marks) {
+  for (const bool begin : {false, true}) {
+    const auto last = std::find_if(marks.rbegin(), marks.rend(), [&](const Mark& mark) {
+      return mark.step == lost.step && mark.begin == begin;
+    });
+    if (last != marks.rend()) marks.erase(std::next(last).base());
   }
 }
 
@@ -309,7 +324,7 @@ bool RecordingReader::next(Entry& entry) try {
     entry.raw.stride = stride < 0 || stride > 8 * kLargest_px ? 0 : static_cast<int>(stride);
     entry.first = region(frames, 6, head_.width, head_.height);
     entry.all = region(frames, 10, head_.width, head_.height);
-    if (!frames.is_null(14)) entry.latency = Duration(frames.integer(14));
+    if (!frames.is_null(14)) entry.latency = duration(frames.integer(14));
     entry.touched = frames.integer(15) != 0;
     entry.raw.bytes = frames.blob(16);
     entry.crop = code == "CROP";
@@ -329,7 +344,7 @@ bool RecordingReader::next(Entry& entry) try {
                                                  : Entry::Kind::reconnected;
   entry.time = time_point(troubles.integer(2));
   entry.text = std::string(troubles.text(3).substr(0, kLongestText));
-  if (!troubles.is_null(4)) entry.latency = Duration(troubles.integer(4));
+  if (!troubles.is_null(4)) entry.latency = duration(troubles.integer(4));
   return true;
 } catch (const DatabaseError& e) {
   damaged(e.what());
@@ -391,8 +406,9 @@ bool RecordingReader::next(ReferenceRecord& reading) try {
   Statement& row = cursors_->cursor(cursors_->references, kReferences);
   if (!row.step()) return false;
   reading = {};
+  reading.id = row.integer(0);
   reading.time = time_point(row.integer(1));
-  reading.time_sigma = Duration(row.integer(2));
+  reading.time_sigma = duration(row.integer(2));
   reading.channel = static_cast<int>(std::clamp<std::int64_t>(row.integer(3), 0, 255));
   reading.axes = row.integer(4) == 6 ? 6 : 1;
   reading.saturated = row.integer(5) != 0;
@@ -429,11 +445,20 @@ bool RecordingReader::next(EventRecord& event) try {
 std::vector<Mark> RecordingReader::marks() const try {
   std::vector<Mark> marks;
   Statement row(cursors_->database,
-                "SELECT t_ns, step, value FROM events WHERE kind = 'mark' ORDER BY id");
+                "SELECT t_ns, step, value, id FROM events WHERE kind = 'mark' ORDER BY id");
   while (row.step()) {
     const std::int64_t step = row.integer(1);
     if (step < 0 || step > 1'000'000) damaged(fmt::format("a mark is of step {}", step));
-    marks.push_back({static_cast<int>(step), row.integer(2) != 0, time_point(row.integer(0))});
+    const std::int64_t value = row.integer(2);
+    if (value < kMarkWithdrawn || value > 1'000'000)
+      damaged(fmt::format("a mark has the value {}", value));
+    const Mark mark{static_cast<int>(step), value >= kMarkBegins, time_point(row.integer(0)),
+                    row.integer(3),
+                    static_cast<int>(std::max<std::int64_t>(value - kMarkBegins, 0))};
+    if (value == kMarkWithdrawn)
+      withdraw(mark, marks);
+    else
+      marks.push_back(mark);
   }
   return marks;
 } catch (const DatabaseError& e) {

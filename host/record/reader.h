@@ -16,7 +16,9 @@ namespace tagwrench::record {
 struct Mark {
   int step = 0;  ///< counted from 0
   bool begin = false;
-  TimePoint time{};  ///< on the frames' clock
+  TimePoint time{};     ///< on the frames' clock
+  std::int64_t id = 0;  ///< place in the order of events
+  int zero = 0;         ///< of a beginning: steps with one number count from one rest
 };
 
 /// What happened to the source, in order.
@@ -69,7 +71,7 @@ class RecordingReader {
   bool next(ReferenceRecord& reading);
   bool next(EventRecord& event);
 
-  /// All of them; a reader of its own walks on undisturbed.
+  /// Of all stretches but those that were withdrawn; a reader of its own walks on undisturbed.
   std::vector<Mark> marks() const;
 
  private:

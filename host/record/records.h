@@ -42,6 +42,7 @@ struct Head {
 struct ReferenceRecord {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
+  std::int64_t id = 0;  ///< set by the reader
   TimePoint time{};
   Duration time_sigma{};
   int channel = 0;
@@ -69,6 +70,11 @@ enum class EventKind : std::uint8_t {
 
 /// As the database writes it.
 std::string_view name(EventKind kind);
+
+/// Values of a mark.
+inline constexpr int kMarkWithdrawn = -1;
+inline constexpr int kMarkEnds = 0;
+inline constexpr int kMarkBegins = 1;  ///< or more: plus the number of its zero
 
 struct EventRecord {
   std::int64_t id = 0;

@@ -34,7 +34,10 @@
 //              led           value: level in permille
 //              clock         of the board; text: JSON of its state
 //              button        step: number, value: 1 pressed, 0 let go
-//              mark          of a plan: step, counted from 0; value: 1 it begins, 0 it ends
+//              mark          of a plan: step, counted from 0; value: 1 or more it begins, 0 it
+//                            ends, -1 the stretch marked before does not count (a bump, or done
+//                            again). Steps that begin with one value count from one rest. Stands
+//                            where the step was accepted; t_ns is that of its first or last frame
 //              lost          value: records that found the buffer full, since the last such event
 #pragma once
 

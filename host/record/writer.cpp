@@ -211,8 +211,12 @@ void RecordingWriter::event(EventKind kind, TimePoint time, std::string_view tex
   ring_.publish();
 }
 
-void RecordingWriter::mark(int step, bool begin, TimePoint time) noexcept {
-  event(EventKind::mark, time, {}, begin ? 1 : 0, step);
+void RecordingWriter::mark(int step, bool begin, TimePoint time, int zero) noexcept {
+  event(EventKind::mark, time, {}, begin ? kMarkBegins + zero : kMarkEnds, step);
+}
+
+void RecordingWriter::withdraw(int step, TimePoint time) noexcept {
+  event(EventKind::mark, time, {}, kMarkWithdrawn, step);
 }
 
 /// A loss is itself recorded, as soon as there is room.

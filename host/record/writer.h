@@ -62,8 +62,11 @@ class RecordingWriter {
   /// A text longer than 4000 bytes is cut.
   void event(EventKind kind, TimePoint time, std::string_view text = {}, std::int64_t value = 0,
              int step = -1) noexcept;
-  /// A step of a plan, counted from 0, begins or ends.
-  void mark(int step, bool begin, TimePoint time) noexcept;
+  /// A step of a plan, counted from 0, begins or ends. Steps whose beginnings bear one `zero` count
+  /// from one rest. A stretch may be marked after it has passed.
+  void mark(int step, bool begin, TimePoint time, int zero = 0) noexcept;
+  /// The stretch of this step that was marked last, and began at `time`, no longer counts.
+  void withdraw(int step, TimePoint time) noexcept;
 
   WriterState state() const noexcept;
   /// One line, once state().failed.

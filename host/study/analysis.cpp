@@ -107,6 +107,7 @@ Analysis analyze(const std::vector<Trial>& trials, const AnalysisOptions& option
     analysis.axis[k].r2_in_sample = in_sample[static_cast<Eigen::Index>(k)];
 
   if (brings_predictions(clean)) {
+    analysis.own_predictions = true;
     analysis.validation = "each step, by the calibration's own fit without it";
     keep_held_out(brought_predictions(rows), analysis);
   } else {

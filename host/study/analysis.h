@@ -25,7 +25,7 @@ struct AnalysisOptions {
   double drop_start = 0;   ///< s of readings left out at the start
   double lag_from = -0.2;  ///< s, searched
   double lag_to = 0.5;
-  double usual_lag_from = 0;  ///< s; outside is warned about
+  double usual_lag_from = -0.2;  ///< s; outside is warned about
   double usual_lag_to = 0.2;
   bool fit_lag = true;
   bool drop_backlog = true;  ///< rows at the start stamped far faster than the rest
@@ -57,9 +57,11 @@ struct AxisReport {
 
 struct Fold {
   std::size_t trial = 0;
-  double from = 0, to = 0;             ///< s, held out
-  Lag lag;                             ///< found without it
-  std::array<double, 6> r2{}, rmse{};  ///< R^2 is NaN where the load did not change
+  double from = 0, to = 0;  ///< s, held out
+  Lag lag;                  ///< found without it
+  bool lag_sought = false;  ///< false: it learned from loads that hung, or was told not to
+  std::array<double, 6> r2{}, rmse{};  ///< R^2 is NaN where the load changed no
+                                       ///< more than the reference's own noise
 };
 
 struct Analysis {
@@ -69,7 +71,8 @@ struct Analysis {
   double seconds = 0;
   double reading_rate = 0, reference_rate = 0;  ///< Hz; reference 0 where loads hung
   std::string validation;                       ///< what was held out, for people
-  Lag lag;                                      ///< of all
+  bool own_predictions = false;  ///< scores are of the predictions that the trials brought
+  Lag lag;                       ///< of all
   std::array<AxisReport, 6> axis;
   Eigen::MatrixXd matrix;  ///< 6 x p: reference = matrix * features + offset, of all data
   Eigen::VectorXd offset;  ///< 6

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -20,6 +21,18 @@ std::string percent(double value) {
   return std::isfinite(value) ? fmt::format("{:.2f}", value) : "-";
 }
 
+std::string score(double value) {
+  return std::isfinite(value) ? fmt::format("{:.4f}", value) : "-";
+}
+
+/// Decimals that show a range to four digits of its larger end.
+int range_decimals(double full_scale) {
+  return full_scale > 0 ? std::clamp(3 - static_cast<int>(std::floor(std::log10(full_scale))), 0, 7)
+                        : 0;
+}
+
+std::string times(double value) { return value > 1000 ? ">1000" : fmt::format("{:.3g}", value); }
+
 void add_head(Out out, const Analysis& a) {
   fmt::format_to(out, "{}\n", fmt::join(a.names, ", "));
   fmt::format_to(out, "{} readings at {:.1f} Hz, {} of the reference", a.readings, a.reading_rate,
@@ -29,9 +42,7 @@ void add_head(Out out, const Analysis& a) {
                  a.feature_names.size(), a.condition);
   if (a.reference_rate > 0) {
     if (a.lag.known) {
-      fmt::format_to(out,
-                     "lag {:.1f} +- {:.1f} ms (readings after reference), the same on all axes\n",
-                     1e3 * a.lag.value, 1e3 * a.lag.sigma);
+      fmt::format_to(out, "lag: {}, the same on all axes\n", lag_text(a.lag));
     } else {
       fmt::format_to(out, "lag not known; taken as 0\n");
     }
@@ -43,18 +54,21 @@ void add_scores(Out out, const Analysis& a) {
   fmt::format_to(out, "{:<5}{:>10}{:>10}  {:<4}{:>8}{:>8}{:>11}{:>7}{:>8}{:>7}{:>9}{:>8}\n", "axis",
                  "from", "to", "", "R2 in", "R2 held", "RMSE", "% FS", "non-lin", "hyst.",
                  "excited", "alone");
+  // Predictions that a calibration brought have figures, whatever these data alone could show.
+  const char* not_calibrated = a.own_predictions ? "  see below" : "  not calibrated";
   for (std::size_t k = 0; k < 6; ++k) {
     const AxisReport& x = a.axis[k];
-    fmt::format_to(out, "{:<5}{:>10.4f}{:>10.4f}  {:<4}", kAxisNames[k], x.range_low, x.range_high,
-                   kAxisUnits[k]);
+    const int decimals = range_decimals(x.full_scale);
+    fmt::format_to(out, "{:<5}{:>10.{}f}{:>10.{}f}  {:<4}", kAxisNames[k], x.range_low, decimals,
+                   x.range_high, decimals, kAxisUnits[k]);
     if (x.full_scale == 0) {
       fmt::format_to(out, "  not calibrated\n");
       continue;
     }
-    fmt::format_to(out, "{:>8.4f}{:>8.4f}{:>11.3g}{:>7.2f}{:>8}{:>7}{:>9.3g}{:>8.3g}{}\n",
-                   x.r2_in_sample, x.r2, x.rmse, x.rmse_percent, percent(x.nonlinearity_percent),
-                   percent(x.hysteresis_percent), x.excitation, x.independent,
-                   x.calibrated ? "" : "  not calibrated");
+    fmt::format_to(out, "{:>8}{:>8}{:>11.3g}{:>7.2f}{:>8}{:>7}{:>9}{:>8}{}\n",
+                   score(x.r2_in_sample), score(x.r2), x.rmse, x.rmse_percent,
+                   percent(x.nonlinearity_percent), percent(x.hysteresis_percent),
+                   times(x.excitation), times(x.independent), x.calibrated ? "" : not_calibrated);
   }
   fmt::format_to(out,
                  "R2 and RMSE held out, in the axis' unit; % of full scale; excited: times the "
@@ -101,11 +115,14 @@ void add_folds(Out out, const Analysis& a) {
   fmt::format_to(out, "\n");
   for (const Fold& fold : a.folds) {
     fmt::format_to(out, "{:<22}{:>9}", fmt::format("{:.2f} to {:.2f}", fold.from, fold.to),
-                   fold.lag.known ? fmt::format("{:.1f}", 1e3 * fold.lag.value) : "?");
+                   !fold.lag_sought ? "-"
+                   : fold.lag.known ? fmt::format("{:.1f}", 1e3 * fold.lag.value)
+                                    : "?");
     for (const double r2 : fold.r2)
       fmt::format_to(out, "{:>9}", std::isfinite(r2) ? fmt::format("{:.3f}", r2) : "-");
     fmt::format_to(out, "\n");
   }
+  fmt::format_to(out, "- where no lag was looked for, or the reference did no more than waver\n");
 }
 
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }

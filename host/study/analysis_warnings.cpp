@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "host/study/smoothing.h"
 #include "host/study/trial_check.h"
@@ -20,19 +21,32 @@ constexpr double kBothWays = 0.1;           // of full scale
 constexpr double kApart = 3;                // sigmas
 constexpr Eigen::Index kLeastToSplit = 90;  // readings
 
-void warn_of_excitation(Analysis& analysis) {
+constexpr double kFewInside = 0.85;  // within intervals that are to hold 95 %
+
+void warn_of_dependence(Analysis& analysis) {
+  std::vector<std::string> together;
+  double least = kLittleIndependent;
+  double most = 0;
   for (std::size_t k = 0; k < 6; ++k) {
     const AxisReport& axis = analysis.axis[k];
-    if (!axis.calibrated) {
-      analysis.warnings.push_back(
-          fmt::format("{}: not calibrated: {}", kAxisNames[k], axis.reason));
-    } else if (axis.independent < kLittleIndependent) {
-      analysis.warnings.push_back(fmt::format(
-          "{}: loaded almost only together with other axes: by itself {:.1f} times the reference's "
-          "noise; its figures hold for loads like these alone",
-          kAxisNames[k], axis.independent));
-    }
+    if (!axis.calibrated || axis.independent >= kLittleIndependent) continue;
+    together.push_back(kAxisNames[k]);
+    least = std::min(least, axis.independent);
+    most = std::max(most, axis.independent);
   }
+  if (together.empty()) return;
+  analysis.warnings.push_back(fmt::format(
+      "{}: loaded almost only together with other axes: by itself {} times the reference's noise; "
+      "figures hold for loads like these alone",
+      fmt::join(together, " "),
+      together.size() > 1 ? fmt::format("{:.1f} to {:.1f}", least, most)
+                          : fmt::format("{:.1f}", least)));
+}
+
+void warn_of_excitation(Analysis& analysis) {
+  for (std::string& line : excitation_warnings(analysis))
+    analysis.warnings.push_back(std::move(line));
+  warn_of_dependence(analysis);
   std::vector<std::string> one_way;
   for (std::size_t k = 0; k < 6; ++k) {
     const AxisReport& axis = analysis.axis[k];
@@ -51,15 +65,21 @@ void warn_of_excitation(Analysis& analysis) {
 }
 
 void warn_of_steps(Analysis& analysis) {
+  std::vector<std::string> axes;
+  std::vector<std::string> steps;
   for (std::size_t k = 0; k < 6; ++k) {
     const AxisReport& axis = analysis.axis[k];
     const double step = axis.reference_step;
     if (axis.full_scale > 0 && step > 0.02 * axis.full_scale) {
-      analysis.warnings.push_back(
-          fmt::format("{}: the reference counts in steps of {:.2g} {}, {:.0f} % of its range here",
-                      kAxisNames[k], step, kAxisUnits[k], 100 * step / axis.full_scale));
+      axes.push_back(kAxisNames[k]);
+      steps.push_back(
+          fmt::format("{:.2g} {} ({:.0f} %)", step, kAxisUnits[k], 100 * step / axis.full_scale));
     }
   }
+  if (axes.empty()) return;
+  analysis.warnings.push_back(
+      fmt::format("{}: the reference counts in steps of {} of the range here", fmt::join(axes, " "),
+                  fmt::join(steps, ", ")));
 }
 
 /// The readings of a trial and one axis of its reference, or all of them.
@@ -153,6 +173,41 @@ void warn_of_sign(const std::vector<Range>& ranges, const std::vector<CleanTrial
 
 }  // namespace
 
+std::vector<std::string> excitation_warnings(const Analysis& analysis) {
+  std::vector<std::string> reasons;
+  std::vector<std::string> axes;
+  for (std::size_t k = 0; k < 6; ++k) {
+    const AxisReport& axis = analysis.axis[k];
+    if (axis.calibrated) continue;
+    const auto known = std::find(reasons.begin(), reasons.end(), axis.reason);
+    if (known != reasons.end()) {
+      axes[static_cast<std::size_t>(known - reasons.begin())] += fmt::format(" {}", kAxisNames[k]);
+    } else {
+      reasons.push_back(axis.reason);
+      axes.emplace_back(kAxisNames[k]);
+    }
+  }
+  const char* verdict = analysis.own_predictions ? "" : "not calibrated: ";
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    lines.push_back(fmt::format("{}: {}{}", axes[i], verdict, reasons[i]));
+  return lines;
+}
+
+std::vector<std::string> coverage_warnings(const Analysis& analysis) {
+  std::vector<std::string> parts;
+  for (std::size_t k = 0; k < 6; ++k) {
+    const AxisReport& axis = analysis.axis[k];
+    if (axis.calibrated && axis.coverage && *axis.coverage < kFewInside)
+      parts.push_back(fmt::format("{} {:.0f} %", kAxisNames[k], 100 * *axis.coverage));
+  }
+  if (parts.empty()) return {};
+  return {
+      fmt::format("few errors lie within the stated 95 % intervals ({}): the true uncertainty is "
+                  "larger than stated",
+                  fmt::join(parts, ", "))};
+}
+
 void add_warnings(const std::vector<CleanTrial>& trials, const std::vector<Range>& ranges,
                   const AnalysisOptions& options, Analysis& analysis) {
   const bool instrument = std::any_of(trials.begin(), trials.end(),
@@ -164,6 +219,8 @@ void add_warnings(const std::vector<CleanTrial>& trials, const std::vector<Range
     warn_of_clocks(trials, options, analysis);
   }
   warn_of_excitation(analysis);
+  for (std::string& line : coverage_warnings(analysis))
+    analysis.warnings.push_back(std::move(line));
   warn_of_steps(analysis);
   warn_of_sign(ranges, trials, options, analysis);
 }

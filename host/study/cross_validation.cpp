@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <set>
 #include <utility>
@@ -13,7 +16,8 @@
 namespace tagwrench::study {
 namespace {
 
-constexpr double kGapsOfMedian = 5;  // between readings, that end a stretch
+constexpr double kGapsOfMedian = 5;   // between readings, that end a stretch
+constexpr double kLeastSpread = 1.5;  // of the reference's noise: it alone has 1
 
 bool usable(const CleanTrial& trial, Eigen::Index i) {
   return trial.step.size() == 0 || trial.step[i] >= 0;
@@ -131,6 +135,19 @@ std::pair<Eigen::Index, Eigen::Index> reference_rows(const CleanTrial& trial, do
   const Eigen::Index last = std::upper_bound(begin, end, to) - begin;
   return {std::max<Eigen::Index>(0, first - 1),
           std::min<Eigen::Index>(trial.reference_time.size(), last + 1)};
+}
+
+/// Without those axes on which the reference of a fold, k x 6, does no more than waver: its share
+/// that is explained is no figure of the sensor.
+std::array<double, 6> r2_of_fold(const Eigen::VectorXd& r2, const Eigen::MatrixXd& felt,
+                                 const Eigen::VectorXd& noise) {
+  std::array<double, 6> result{};
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    const double spread = std::sqrt((felt.col(k).array() - felt.col(k).mean()).square().mean());
+    result[static_cast<std::size_t>(k)] =
+        spread > kLeastSpread * noise[k] ? r2[k] : std::numeric_limits<double>::quiet_NaN();
+  }
+  return result;
 }
 
 }  // namespace
@@ -263,6 +280,9 @@ HeldOut cross_validate(const std::vector<CleanTrial>& trials, const FoldPlans& p
     const FoldPlan& plan = plans.folds[f];
     Fold fold;
     fold.lag = lag_of(trials, plan.learned, options);
+    fold.lag_sought =
+        options.fit_lag && std::any_of(plan.learned.begin(), plan.learned.end(),
+                                       [&](const Range& r) { return !trials[r.trial].held; });
     const bool smooth = options.smooth;
     const Rows learned =
         rows_of(trials, plan.learned, fold.lag.value, smooth ? Smoothing::apart : Smoothing::none);
@@ -283,7 +303,7 @@ HeldOut cross_validate(const std::vector<CleanTrial>& trials, const FoldPlans& p
     fold.to = rows.time.maxCoeff();
     const Eigen::VectorXd r2 = r_squared(predicted.back(), rows.felt);
     const Eigen::VectorXd rmse = rms_error(predicted.back(), rows.felt);
-    std::copy(r2.begin(), r2.end(), fold.r2.begin());
+    fold.r2 = r2_of_fold(r2, rows.felt, trials[fold.trial].noise);
     std::copy(rmse.begin(), rmse.end(), fold.rmse.begin());
     result.folds.push_back(fold);
     total += rows.time.size();

@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kShear = 79e9;      // of spring steel, Pa
 constexpr double kEndCoils = 2;      // closed ends
-constexpr double kMostForce = 1000;  // N, searched
 constexpr double kNearStill = 0.15;  // of the frame rate: an alias that passes for slow motion
 constexpr double kSharedEdges = 4;   // standard deviations of the point spread, in a cell
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};

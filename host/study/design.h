@@ -132,6 +132,8 @@ struct Reach {
   double least() const { return to_solid ? std::min(in_view, *to_solid) : in_view; }
 };
 
+inline constexpr double kMostForce = 1000;  ///< N, how far design() looks
+
 /// Along camera x, y, z at the platform's origin. Up to `most` (N). Small angles.
 std::array<Reach, 3> reach(const Instrument& instrument, double most);
 

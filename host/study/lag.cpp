@@ -304,28 +304,27 @@ Lag estimate_lag(std::span<const Stretch> given, const LagSearch& search) {
   return lag;
 }
 
+std::string lag_text(const Lag& lag) {
+  const bool late = lag.value >= 0;
+  return fmt::format("the {} {:.1f} +- {:.1f} ms after the {}",
+                     late ? "readings come" : "reference comes", 1e3 * std::abs(lag.value),
+                     1e3 * lag.sigma, late ? "reference" : "readings");
+}
+
 std::string lag_warning(const Lag& lag, double from, double to) {
   if (!lag.known) {
     return "the lag between readings and reference cannot be told: they do not move together";
   }
-  const std::string found = fmt::format("lag {:.1f} ms", 1e3 * lag.value);
   if (lag.at_limit) {
-    return found +
-           ": the end of what was searched, so the true one may lie beyond; are both on one "
-           "clock?";
+    return lag_text(lag) +
+           ": the end of what was searched, so the true lag may lie beyond; are both on one clock?";
   }
-  if (lag.value + 2 * lag.sigma < from) {
-    return found +
-           ": readings are stamped before what the reference felt; is the reference slow, "
-           "or on another clock?";
-  }
-  if (lag.value - 2 * lag.sigma > to) {
-    return found + fmt::format(
-                       ": more than {:.0f} ms; are both on one clock, and stamped when they "
-                       "were taken?",
-                       1e3 * to);
-  }
-  return {};
+  const bool early = lag.value + 2 * lag.sigma < from;
+  if (!early && lag.value - 2 * lag.sigma <= to) return {};
+  return lag_text(lag) + fmt::format(
+                             ", more than {:.0f} ms; are both on one clock, and stamped when they "
+                             "were taken?",
+                             1e3 * std::abs(early ? from : to));
 }
 
 }  // namespace tagwrench::study

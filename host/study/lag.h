@@ -47,8 +47,13 @@ struct LagSearch {
 /// nothing changes.
 Lag estimate_lag(std::span<const Stretch> stretches, const LagSearch& search = {});
 
-/// One line that warns of it; empty if there is nothing to say. `from` to `to` is what is usual, s.
-std::string lag_warning(const Lag& lag, double from = 0, double to = 0.2);
+/// "the readings come 41.2 +- 0.7 ms after the reference", or the other way round: whichever comes
+/// first, the number is positive.
+std::string lag_text(const Lag& lag);
+
+/// One line that warns of it; empty if there is nothing to say. `from` to `to` is what is usual, s:
+/// pictures and instruments alike may be slow by some tenths of a second.
+std::string lag_warning(const Lag& lag, double from = -0.2, double to = 0.2);
 
 /// The reference at `time` - lag, by linear interpolation: n x q. Rows before the first or after
 /// the last reference, or between two that are more than `longest_gap` (s) apart, are NaN.

@@ -10,6 +10,7 @@ namespace {
 
 /// Eigenvalues of the correlation matrix below this, of the largest, are rounding.
 constexpr double kRankTolerance = 1e-12;
+constexpr double kRounding = 1e-9;  // of the largest value: less is no change
 
 Eigen::MatrixXd standardised(const LinearModel& model, const Eigen::MatrixXd& features) {
   return (features.rowwise() - model.mean.transpose()) * model.scale.asDiagonal();
@@ -77,7 +78,9 @@ Eigen::VectorXd r_squared(const Eigen::MatrixXd& predicted, const Eigen::MatrixX
   const Eigen::RowVectorXd left = (predicted - truth).colwise().squaredNorm();
   Eigen::VectorXd r2(truth.cols());
   for (Eigen::Index i = 0; i < r2.size(); ++i) {
-    r2[i] = total[i] > 0 ? 1 - left[i] / total[i] : std::numeric_limits<double>::quiet_NaN();
+    const double rounding = kRounding * truth.col(i).cwiseAbs().maxCoeff();
+    const bool changes = total[i] > static_cast<double>(truth.rows()) * rounding * rounding;
+    r2[i] = changes ? 1 - left[i] / total[i] : std::numeric_limits<double>::quiet_NaN();
   }
   return r2;
 }

@@ -56,6 +56,12 @@ void set_line_load(const LineLoad& load, Observation& observation) {
     product(tilt[i], tilt[i], -0.5 * load.direction_sigma * aside * along);
   }
 
+  // Along the line the point may lie anywhere.
+  for (std::size_t i = 0; i < 2; ++i) {
+    shared(load.contact_sigma, load.contact_name + (i == 0 ? ", one way" : ", the other way"),
+           torque(ways[i], force));
+  }
+
   constexpr std::array<const char*, 3> kAxis{", x", ", y", ", z"};
   for (std::size_t k = 0; k < 3; ++k) {
     const Eigen::Vector3d axis = Eigen::Vector3d::Unit(static_cast<Eigen::Index>(k));

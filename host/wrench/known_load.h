@@ -21,7 +21,9 @@ struct LineLoad {
 
   double force_noise = 0;      ///< N, of this observation alone
   double direction_noise = 0;  ///< rad, of this observation alone
-  double point_noise = 0;      ///< m, of this observation alone
+  double contact_sigma = 0;    ///< m, each way across the line; shared by one push, as its line
+  std::string contact_name = {};
+  double point_noise = 0;  ///< m, of this observation alone
 };
 
 /// Sets wrench, wrench_covariance, common and products: F = force * direction, M = point x F.

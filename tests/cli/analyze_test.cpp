@@ -170,6 +170,17 @@ TEST_F(Analyze, WrongUseIsRefusedInOneLine) {
   expect_refused(run(mapped(readings(3))), "record more");
 }
 
+TEST_F(Analyze, WhatIsReadIsNotWrittenOver) {
+  const fs::path file = readings();
+  const auto size = fs::file_size(file);
+  for (const char* option : {"--json", "--data"}) {
+    expect_refused(run(mapped(file), {option, file}), "is what is to be read");
+    expect_refused(run(mapped(file), {option, folder_ / "." / "other.csv"}),
+                   "is what is to be read");
+    EXPECT_EQ(fs::file_size(file), size);
+  }
+}
+
 TEST_F(Analyze, ABrokenRowIsNamed) {
   const fs::path file = readings();
   std::ofstream(file, std::ios::app) << "8000;1;NaN;1;1\n";

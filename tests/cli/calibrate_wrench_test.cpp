@@ -1,6 +1,7 @@
 // `tagwrench calibrate wrench` as its users run it, on the simulated bench.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "host/config/sensor_config.h"
@@ -33,6 +34,25 @@ mountings:
       - {do: mass, mass_g: 50, at: right}
       - {do: mass, mass_g: 50, at: left}
       - {do: mass, mass_g: 50, at: lower}
+      - {do: rest}
+)";
+
+// Three short pushes, from two sides and above.
+const char* const kCellPlan = R"(about: short
+reference: load_cell
+points:
+  - {name: right, position_mm: [15, 0, 6]}
+  - {name: lower, position_mm: [0, 15, 6]}
+  - {name: top, position_mm: [0, 0, 6]}
+mountings:
+  - name: standing
+    gravity: [0, 0, -1]
+    say: stand it up
+    steps:
+      - {do: rest}
+      - {do: push, at: right, along: [-1, 0, 0], up_to_n: 0.7, seconds: 3}
+      - {do: push, at: lower, along: [0, -1, 0], up_to_n: 0.7, seconds: 3}
+      - {do: push, at: top, along: [0, 0, -1], up_to_n: 0.7, seconds: 3}
       - {do: rest}
 )";
 
@@ -70,6 +90,28 @@ class CalibrateWrench : public testing::Test {
         << "no '" << part << "' in " << outcome.err;
     EXPECT_EQ(read_file(sensor_), before_) << "the old calibration stays in force";
     EXPECT_FALSE(std::filesystem::exists(out_));
+  }
+
+  Outcome recalibrate(const std::string& recording, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"calibrate", "wrench",   "--sensor",
+                                          sensor_,     "--source", "recording:" + recording};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_bridge(arguments);
+  }
+  /// Where there is a calibration already.
+  void expect_refused_again(const Outcome& outcome, const std::string& part) {
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos)
+        << "no '" << part << "' in " << outcome.err;
+  }
+  static void expect_same_newtons(const json& first, const json& second) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j) {
+        const double k = first.at("K")[i][j];
+        EXPECT_NEAR(second.at("K")[i][j].get<double>(), k, 1e-9 * std::abs(k)) << i << ' ' << j;
+      }
+    }
+    EXPECT_EQ(second.at("axes"), first.at("axes"));
   }
 
   TemporaryFolder temporary_;
@@ -164,6 +206,67 @@ TEST_F(CalibrateWrench, ABumpRepeatsWhatItSpoilt) {
 TEST_F(CalibrateWrench, ALoadCellThatIsWiredTheWrongWayRoundIsSaid) {
   write_file(scenario_, std::string(kScenario) + "bench: {load_cell: {wrong_sign: true}}\n");
   expect_refused(calibrate("load_cell"), "swap its wires", 1);
+}
+
+TEST_F(CalibrateWrench, FromItsRecordingItGivesTheSameNewtons) {
+  faults("bump: 2");  // steps are accepted, lost and done again
+  const std::string recording = (temporary_ / "all.twr").string();
+  const Outcome live = calibrate(plan_, {"--record", recording, "--notes", "21 degrees"});
+  ASSERT_EQ(live.status, 0) << live.err;
+  ASSERT_NE(live.err.find("to be done again: step"), std::string::npos) << live.err;
+  const json first = json::parse(read_file(out_));
+  const std::string data = read_file(temporary_ / "calibration.data.csv");
+  expect_refused_again(calibrate(plan_, {"--record", recording}), "replaces nothing");
+
+  const Outcome again = recalibrate(recording);
+  ASSERT_EQ(again.status, 0) << again.err;
+  EXPECT_EQ(again.out, "");
+  const json second = json::parse(read_file(out_));
+  expect_same_newtons(first, second);
+  EXPECT_EQ(read_file(temporary_ / "calibration.data.csv"), data);
+  EXPECT_EQ(second.at("notes"), "21 degrees");
+  EXPECT_EQ(second.at("plan"), first.at("plan"));
+
+  // The plan's numbers may be corrected afterwards: the weight was lighter than it was thought.
+  std::string lighter = kShortPlan;
+  for (int i = 0; i < 3; ++i) replace(lighter, "mass_g: 50", "mass_g: 45");
+  write_file(plan_, lighter);
+  ASSERT_EQ(recalibrate(recording, {"--plan", plan_}).status, 0);
+  const double before = first.at("K")[2][2];
+  EXPECT_NEAR(json::parse(read_file(out_)).at("K")[2][2].get<double>(), 0.9 * before,
+              0.02 * before);
+  expect_refused_again(recalibrate(recording, {"--plan", "six_orientations"}), "other steps");
+  expect_refused_again(recalibrate(recording, {"--resume"}), "leave them out");
+}
+
+TEST_F(CalibrateWrench, ALoadCellsReadingsAreInTheRecordingToo) {
+  write_file(plan_, kCellPlan);
+  const std::string recording = (temporary_ / "all.twr").string();
+  const Outcome live = calibrate(plan_, {"--record", recording, "--keep", "region"});
+  ASSERT_EQ(live.status, 0) << live.err;
+  const json first = json::parse(read_file(out_));
+  const std::string data = read_file(temporary_ / "calibration.data.csv");
+  const Outcome again = recalibrate(recording);
+  ASSERT_EQ(again.status, 0) << again.err;
+  const json second = json::parse(read_file(out_));
+  expect_same_newtons(first, second);
+  EXPECT_EQ(second.at("reference"), first.at("reference"));
+  EXPECT_EQ(read_file(temporary_ / "calibration.data.csv"), data);
+}
+
+TEST_F(CalibrateWrench, ARecordingWithoutACalibrationIsRefused) {
+  const std::string recording = (temporary_ / "run.twr").string();
+  const Outcome record =
+      run_bridge({"record", "--out", recording, "--sensor", sensor_, "--source",
+                  "sim:" + scenario_.string(), "--fast", "--frames", "10", "--keep", "region"});
+  ASSERT_EQ(record.status, 0) << record.err;
+  expect_refused(recalibrate(recording), "record one with `tagwrench calibrate wrench --record");
+  expect_refused(recalibrate(scenario_.string()), "scenario.yaml");
+
+  const std::string stopped = (temporary_ / "stopped.twr").string();
+  expect_refused(calibrate(plan_, {"--seconds", "1", "--record", stopped}), "nothing was measured",
+                 1);
+  expect_refused(recalibrate(stopped), "holds no step of a calibration");
 }
 
 TEST_F(CalibrateWrench, BadInputIsNamedAndNothingIsWritten) {

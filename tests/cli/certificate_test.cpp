@@ -118,6 +118,17 @@ TEST(Design, PrintsThePublishedFigures) {
     EXPECT_NE(outcome.out.find(figure), std::string::npos) << figure << "\n" << outcome.out;
   }
   EXPECT_NE(outcome.err.find("leave the image"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.out.find("(1)"), std::string::npos);
+}
+
+TEST(Design, SaysWhatWasNotReachedAndRepeatsNoRow) {
+  const Outcome stiff =
+      run_bridge({"design", "--axial-n-per-mm", "5000", "--lateral-n-per-mm", "5000"});
+  ASSERT_EQ(stiff.status, 0) << stiff.err;
+  EXPECT_NE(stiff.out.find("> 1000 N"), std::string::npos) << stiff.out;
+  EXPECT_EQ(stiff.out.find("1000.00"), std::string::npos);
+  EXPECT_NE(stiff.out.find("\n  given "), std::string::npos);
+  EXPECT_NE(stiff.out.find("under +- 1 N"), std::string::npos);
 }
 
 TEST(Design, RefusesWhatCannotBeBuilt) {

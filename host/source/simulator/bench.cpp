@@ -61,6 +61,8 @@ BenchSettings effective(BenchSettings settings) {
                      .point = 0,
                      .contact = 0,
                      .gravity_rad = 0,
+                     .lean_rad = 0,
+                     .string = 0,
                      .direction_rad = 0,
                      .sway_rad = 0,
                      .tremor = 0};
@@ -127,6 +129,9 @@ void Bench::hang(double mass, const Eigen::Vector3d& point) noexcept {
   ++masses_;
   action.size = true_mass(mass);
   if (masses_ == settings_.faults.wrong_mass) action.size *= settings_.faults.wrong_mass_factor;
+  Random random = Random::numbered(seed_, kBenchString, action.number);
+  for (double& lean : action.lean) lean = error(random, settings_.errors.lean_rad);
+  action.size += error(random, settings_.errors.string) / settings_.gravity;
   action.point = touched(point, action.number);
   done_ = action.begin + action.ease_in;
 }
@@ -250,7 +255,7 @@ Eigen::Vector3d Bench::string_pull(const Action& action, double time) const noex
   const double second_rate =
       local > 0 ? kOvalSwing * left * rate * cosine - second / times.swing_decay : 0;
   const Eigen::Vector3d down = gravity(time);
-  const Eigen::Vector3d string = tilted(down, first, second);
+  const Eigen::Vector3d string = tilted(down, action.lean[0] + first, action.lean[1] + second);
   const double tension =
       settings_.gravity * string.dot(down) +
       times.string_length * (first_rate * first_rate + second_rate * second_rate);

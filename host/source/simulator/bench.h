@@ -101,6 +101,7 @@ class Bench final : public AppliedLoad {
     double size = 0;                                      ///< kg of a mass, N of a push
     int strokes = 1;
     std::array<double, 2> sway_hz{}, sway_phase{};
+    std::array<double, 2> lean{};  ///< of a string, rad
     double tremor_hz = 0;
     double tremor_phase = 0;
     std::optional<TrajectoryPlayer> hand;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/source/simulator/rigid_pose.h"
+
 namespace tagwrench::sim {
 namespace {
 
@@ -13,6 +15,7 @@ constexpr double kStepVariance = 1.0 / 12;       // of whole counts, counts^2 (u
 constexpr double kMostCounts = 32767;            // of a 16-bit reading
 constexpr std::uint64_t kFirstTick = 1'000'000;  // numbers of the seeds' streams
 constexpr std::uint64_t kScale = 1'000'001;
+constexpr std::uint64_t kPlace = 1'000'002;
 
 double first_tick(std::uint64_t seed, Stream stream, double rate) {
   return Random::numbered(seed, stream, kFirstTick).uniform() / rate;
@@ -70,7 +73,16 @@ SimulatedSixAxis::SimulatedSixAxis(const Bench& bench)
       settings_(bench.settings().six_axis),
       ticks_(settings_.rate, first_tick(bench.seed(), kSixAxis, settings_.rate), settings_.faults),
       random_(bench.seed(), kSixAxis),
-      delay_(std::max(0.0, settings_.lag - 0.5 / (std::numbers::pi * settings_.filter_hz))) {}
+      delay_(std::max(0.0, settings_.lag - 0.5 / (std::numbers::pi * settings_.filter_hz))),
+      origin_(settings_.origin) {
+  if (settings_.ideal) return;
+  Random once = Random::numbered(bench.seed(), kSixAxis, kPlace);
+  const auto off = [&once](double sigma) { return sigma * std::clamp(once.normal(), -3.0, 3.0); };
+  for (double& coordinate : origin_) coordinate += off(settings_.place_error);
+  Eigen::Vector3d turn;
+  for (double& angle : turn) angle = off(settings_.turn_error);
+  reference_R_platform_ = rotation_matrix(turn);
+}
 
 /// y' = (x - y) / tau, exact for an x that stays over a step.
 void SimulatedSixAxis::filter_to(double time) noexcept {
@@ -91,8 +103,9 @@ bool SimulatedSixAxis::next(SimulatedReading& reading) noexcept {
   if (ticks_.time() > bench_.newest()) return false;
   if (!settings_.ideal) filter_to(ticks_.time() - delay_);
   const Vector6 load = settings_.ideal ? bench_.felt(ticks_.time()) : filtered_;
-  const Eigen::Vector3d force = load.head<3>();
-  const Eigen::Vector3d torque = load.tail<3>() - settings_.origin.cross(force);
+  const Eigen::Vector3d force = reference_R_platform_ * load.head<3>();
+  const Eigen::Vector3d torque =
+      reference_R_platform_ * (load.tail<3>() - origin_.cross(load.head<3>()));
   reading = {};
   reading.time = ticks_.stamp();
   reading.axes = 6;

@@ -68,6 +68,8 @@ class SimulatedSixAxis {
   ReferenceTicks ticks_;
   Random random_;
   double delay_;            ///< s before the filter
+  Eigen::Vector3d origin_;  ///< where it really is
+  Eigen::Matrix3d reference_R_platform_ = Eigen::Matrix3d::Identity();
   double filtered_to_ = 0;  ///< s, true time of the load that the filter has taken
   Vector6 filtered_ = Vector6::Zero();
 };

@@ -61,6 +61,8 @@ std::string problem(const SixAxisSettings& s) {
                    outside(section, {{"noise_counts", s.noise_counts}}, 0, 1e5),
                    outside(section, {{"lag_ms", 1e3 * s.lag}}, 0, 1000),
                    outside(section, {{"origin_mm", 1e3 * s.origin.cwiseAbs().maxCoeff()}}, 0, 1e3),
+                   outside(section, {{"place_error_mm", 1e3 * s.place_error}}, 0, 10),
+                   outside(section, {{"turn_error_rad", s.turn_error}}, 0, 0.3),
                    problem(section, s.faults)});
 }
 
@@ -78,10 +80,12 @@ std::string problem(const BenchSettings& s, int tags) {
        outside("errors", {{"point_mm", 1e3 * e.point}, {"contact_mm", 1e3 * e.contact}}, 0, 10),
        outside("errors",
                {{"gravity_rad", e.gravity_rad},
+                {"lean_rad", e.lean_rad},
                 {"direction_rad", e.direction_rad},
                 {"sway_rad", e.sway_rad},
                 {"tremor", e.tremor}},
                0, 0.3),
+       outside("errors", {{"string_mn", 1e3 * e.string}}, 0, 100),
        outside("times", {{"swing_rad", t.swing_rad}}, 0, 0.3),
        outside("times",
                {{"reaction_s", t.reaction},

@@ -19,13 +19,15 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 /// The person and the masses. All `_error` are standard deviations of seeded normal errors, cut at
 /// three of them.
 struct BenchErrors {
-  double mass = 0.002;           ///< relative; the same each time that the same mass is hung
-  double point = 0.2e-3;         ///< of each coordinate of a point, m; the same at each use of it
-  double contact = 0.05e-3;      ///< and anew at each use: where in its dimple the load sits, m
-  double gravity_rad = 0.009;    ///< about each of the two axes that matter, anew at each mounting
-  double direction_rad = 0.009;  ///< of a push, about each of two axes, anew at each push
-  double sway_rad = 0.004;       ///< of a push's direction while it lasts, about each of two axes
-  double tremor = 0.02;          ///< of a hand's force, relative, at 8 to 12 Hz
+  double mass = 0.002;          ///< relative; the same each time that the same mass is hung
+  double point = 0.2e-3;        ///< of each coordinate of a point, m; the same at each use of it
+  double contact = 0.1e-3;      ///< and anew at each use: where in its dimple the load sits, m
+  double gravity_rad = 0.0087;  ///< about each of the two axes that matter, anew at each mounting
+  double lean_rad = 0.003;      ///< of a string that rubs, about each of two axes, anew at each use
+  double string = 0.3e-3;       ///< weight of string and knot, N, anew at each use
+  double direction_rad = 0.0087;  ///< of a push, about each of two axes, anew at each push
+  double sway_rad = 0.004;        ///< of a push's direction while it lasts, about each of two axes
+  double tremor = 0.02;           ///< of a hand's force, relative, at 8 to 12 Hz
 };
 
 struct BenchTimes {
@@ -73,7 +75,7 @@ struct LoadCellSettings {
 
 /// A six-axis sensor under the simulated one, after OptoForce's HEX-58-RE-400N.
 struct SixAxisSettings {
-  bool ideal = false;  ///< no noise, no steps, no filter, no lag, no saturation
+  bool ideal = false;  ///< no noise, no steps, no filter, no lag, no saturation, exactly in place
   double rate = 100;   ///< Hz
   std::array<double, 6> counts_per_unit{96.11,   95.64,   20.92,
                                         5425.36, 5524.60, 8103.25};  ///< per N, per N m
@@ -82,6 +84,8 @@ struct SixAxisSettings {
   double lag = 0.040;       ///< s in all at low frequency, the filter's share of it included
   std::array<double, 6> range{400, 400, 2000, 10, 10, 10};  ///< N, N m; beyond it is saturated
   Eigen::Vector3d origin{0, 0, -0.051};  ///< where its torque counts from, platform frame, m
+  double place_error = 0.3e-3;  ///< standard deviation of each coordinate of the origin, m; seeded
+  double turn_error = 0.003;    ///< how it is turned about each axis, rad; seeded
   ReferenceFaults faults;
 };
 

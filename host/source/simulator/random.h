@@ -89,6 +89,7 @@ enum Stream : std::uint64_t {
   kBenchHand,
   kLoadCell,
   kSixAxis,
+  kBenchString,
   kPrint = 100
 };
 

@@ -2,6 +2,8 @@
 // tracker with its noise looks at them, the guide leads, the fit finds the stiffness.
 #pragma once
 
+#include <Eigen/LU>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <random>
@@ -29,6 +31,23 @@ inline Matrix6 rough_stiffness() {
   return sim::stiffness(rough);
 }
 
+/// How the tracker's errors of scale and axes break the symmetry of the stiffness that it sees: as
+/// large as FitOptions::reciprocity says. Displacement seen = this times the displacement made.
+inline Matrix6 tracker_axes(const Matrix6& stiffness, std::uint64_t seed) {
+  std::mt19937 random(static_cast<unsigned>(seed + 1000));
+  std::normal_distribution<double> normal;
+  Matrix6 seen = stiffness;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < i; ++j) {
+      const double unit = std::sqrt(stiffness(i, i) * stiffness(j, j));
+      const double half = 0.5 * FitOptions{}.reciprocity * unit * normal(random);
+      seen(i, j) += half;
+      seen(j, i) -= half;
+    }
+  }
+  return seen.inverse() * stiffness;
+}
+
 class ClosedBench {
  public:
   ClosedBench(const std::string& plan, const sim::BenchSettings& settings, std::uint64_t seed,
@@ -38,6 +57,8 @@ class ClosedBench {
               const sim::Mechanics& mechanics = {})
       : plan_(plan),
         mechanics_(mechanics),
+        axes_(settings.perfect ? Matrix6(Matrix6::Identity())
+                               : tracker_axes(sim::stiffness(mechanics), seed)),
         bench_(settings, seed),
         still_(rest(), seed),
         motion_(mechanics, still_, 0, 1, &bench_),
@@ -76,8 +97,9 @@ class ClosedBench {
         data.observations, data.path,
         {.prior = rough_stiffness(), .try_richer = false, .zero_in_use = data.zero_in_use});
   }
+  /// As the tracker shows it.
   Vector6 noisy(const Vector6& displacement) {
-    Vector6 out = displacement;
+    Vector6 out = axes_ * displacement;
     for (int i = 0; i < 6; ++i) out[i] += tracker_noise()[i] * normal_(random_);
     return out;
   }
@@ -131,6 +153,7 @@ class ClosedBench {
 
   WrenchPlan plan_;
   sim::Mechanics mechanics_;
+  Matrix6 axes_;
   sim::Bench bench_;
   sim::TrajectoryPlayer still_;
   sim::PlatformMotion motion_;

@@ -62,26 +62,30 @@ std::string contents(const fs::path& path) {
 }
 
 TEST(Quantity, HasThreeDigitsAndAPrefix) {
-  EXPECT_EQ(load_text(0.0014, 0), "1.40 mN");
-  EXPECT_EQ(load_text(-12.34, 2), "−12.3 N");
-  EXPECT_EQ(load_text(3.21e-5, 4), "32.1 µN m");
-  EXPECT_EQ(load_text(0.99996, 0), "1.00 N");
+  EXPECT_EQ(load_text(0.0014, 0), "1.40\u00a0mN");
+  EXPECT_EQ(load_text(-12.34, 2), "−12.3\u00a0N");
+  EXPECT_EQ(load_text(3.21e-5, 4), "32.1\u00a0µN\u00a0m");
+  EXPECT_EQ(load_text(0.99996, 0), "1.00\u00a0N");
   EXPECT_EQ(load_text(std::numeric_limits<double>::quiet_NaN(), 0), "–");
-  EXPECT_EQ(range_text(-0.45, 0.46, 0), "±450 mN");
-  EXPECT_EQ(range_text(-0.0057, 0.0009, 5), "−5.70 to 0.900 mN m");
+  EXPECT_EQ(range_text(-0.45, 0.46, 0), "±450\u00a0mN");
+  EXPECT_EQ(range_text(-0.0057, 0.0009, 5), "−5.70\u00a0to\u00a00.90\u00a0mN\u00a0m");
+  EXPECT_EQ(range_text(-1.75, -0.0004, 0), "−1.75\u00a0to\u00a00.00\u00a0N");
+  EXPECT_EQ(range_text(-0.0004, 0.9996, 0), "0.00\u00a0to\u00a01.00\u00a0N");
   EXPECT_EQ(number_text(1234.5), "1234");
   EXPECT_EQ(number_text(0), "0");
-  EXPECT_EQ(percent_text(0.123), "0.12 %");
-  EXPECT_EQ(percent_text(-2.04), "−2.0 %");
-  EXPECT_EQ(percent_text(0.0004), "<0.01 %");
+  EXPECT_EQ(percent_text(0.123), "0.12\u00a0%");
+  EXPECT_EQ(percent_text(-2.04), "−2.0\u00a0%");
+  EXPECT_EQ(percent_text(0.0004), "<0.01\u00a0%");
 }
 
 TEST(CertificateHtml, SaysEveryFigureOfAnAxis) {
   const std::string page = html_of(example_certificate());
   for (const char* part :
-       {"No. 0123456789AB", "0.99987", "2.84 mN", "0.71 %", "95 %", "0.12 %", "0.080 %", "160 µN",
-        "40.0 µN/√Hz", "440 µN", "1.20 mN", "340", "sensor 41.2 ± 0.7 ms late", "34.5",
-        "aaaaaaaaaaaaaaaa…", "masses-three-mountings", "the reference lags by 41 ms"}) {
+       {"No. 0123456789AB", "0.99987", "2.84\u00a0mN", "0.71\u00a0%", "95\u00a0%", "0.12\u00a0%",
+        "0.080\u00a0%", "160\u00a0µN", "40.0\u00a0µN", "440\u00a0µN", "1.20\u00a0mN", "340",
+        "the readings come 41.2 ± 0.7 ms after the reference", "34.5", "of single readings",
+        "– not told by these data", "aaaaaaaaaaaaaaaa…", "masses-three-mountings",
+        "the reference lags by 41 ms"}) {
     EXPECT_TRUE(holds(page, part)) << part;
   }
 }
@@ -131,8 +135,14 @@ TEST(CertificateHtml, WhatTheTableSaysIsNotRepeated) {
 TEST(CertificateHtml, LoadsThatHangHaveNoLag) {
   Certificate c = example_certificate();
   c.analysis.reference_rate = 0;
-  EXPECT_FALSE(holds(html_of(c), "ms late"));
+  EXPECT_FALSE(holds(html_of(c), "ms after"));
   EXPECT_TRUE(holds(html_of(c), "hung still"));
+}
+
+TEST(CertificateHtml, NoRemarkIsSaidToBeNone) {
+  Certificate c = example_certificate();
+  c.analysis.warnings.clear();
+  EXPECT_TRUE(holds(html_of(c), "Remarks: None."));
 }
 
 TEST(CertificateHtml, RemarksThatDoNotFitAreCounted) {

@@ -185,8 +185,8 @@ TEST(InSitu, AZeroOnAnAxisWithoutARangeIsNotJudged) {
 }
 
 /// 0.5 N down at a point 10 mm off in x.
-KnownLoad load() {
-  KnownLoad l;
+ProofLoad load() {
+  ProofLoad l;
   l.known << 0, 0, -0.5, 0, 5e-3, 0;
   l.known_covariance.diagonal() << 1e-5, 1e-5, 6e-6, 2e-8, 2e-8, 2e-8;
   l.measured = l.known;
@@ -196,7 +196,7 @@ KnownLoad load() {
 }
 
 TEST(InSitu, AScaleWithinTwoPercentIsFine) {
-  KnownLoad l = load();
+  ProofLoad l = load();
   l.measured *= 1.015;
   const InSituFinding f = judge(l);
   EXPECT_TRUE(f.fine());
@@ -205,7 +205,7 @@ TEST(InSitu, AScaleWithinTwoPercentIsFine) {
 }
 
 TEST(InSitu, AScaleBeyondIsWrongIfItIsKnownWellEnough) {
-  KnownLoad l = load();
+  ProofLoad l = load();
   l.measured *= 0.96;
   EXPECT_EQ(judge(l).fault, Fault::scale_wrong);
   l.known_covariance += 0.0004 * l.known * l.known.transpose();  // 2 %
@@ -213,7 +213,7 @@ TEST(InSitu, AScaleBeyondIsWrongIfItIsKnownWellEnough) {
 }
 
 TEST(InSitu, ALoadThatHangsElsewhereIsNotAScale) {
-  KnownLoad l = load();
+  ProofLoad l = load();
   l.measured[4] = -5e-3;  // on the other side
   const InSituFinding f = judge(l);
   EXPECT_EQ(f.fault, Fault::load_elsewhere);
@@ -221,7 +221,7 @@ TEST(InSitu, ALoadThatHangsElsewhereIsNotAScale) {
 }
 
 TEST(InSitu, NothingKnownGivesNoScale) {
-  KnownLoad l = load();
+  ProofLoad l = load();
   l.known.setZero();
   EXPECT_EQ(judge(l).fault, Fault::not_known);
 }

@@ -98,6 +98,12 @@ TEST_F(Damage, NumbersThatCannotBeAreNotBelieved) {
       {"UPDATE frames SET bytes = NULL", false},
       {"UPDATE frames SET bytes = 'text'", false},
       {"UPDATE frames SET seq = 'text', dropped = -1", true},
+      // Times whose differences are beyond 64 bits.
+      {"UPDATE frames SET t_ns = CASE id WHEN (SELECT min(id) FROM frames) THEN "
+       "-9223372036854775807 ELSE 9223372036854775000 + id END WHERE id IN "
+       "((SELECT min(id) FROM frames), (SELECT max(id) FROM frames))",
+       true},
+      {"UPDATE samples SET output_ns = 9223372036854775807, origin_ns = 0", true},
   };
   for (const auto& [sql, delivered] : lies) {
     std::filesystem::remove(path("copy"));

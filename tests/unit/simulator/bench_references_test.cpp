@@ -181,7 +181,8 @@ TEST(SimulatedSixAxis, FeelsTheLoadAboutItsOwnOrigin) {
 TEST(SimulatedSixAxis, AnswersLateByItsLagAndRoundsOffByItsFilter) {
   BenchSettings settings = perfect();
   settings.perfect = false;
-  settings.errors = {0, 0, 0, 0, 0, 0, 0};
+  settings.errors = {0, 0, 0, 0, 0, 0, 0, 0, 0};
+  settings.six_axis.place_error = settings.six_axis.turn_error = 0;
   settings.times.swing_rad = 0;
   settings.times.load = 0.01;  // a step, to an instrument of 15 Hz
   settings.six_axis.noise_counts = 0;

@@ -72,7 +72,7 @@ TEST(Bench, APointThatMovesWithThePlatformIsWorthPercentsOfTheTorque) {
 TEST(Bench, AMassSwingsAsAPendulumUntilThatHasDecayed) {
   BenchSettings settings = perfect();
   settings.perfect = false;
-  settings.errors = {0, 0, 0, 0, 0, 0, 0};
+  settings.errors = {0, 0, 0, 0, 0, 0, 0, 0, 0};
   BenchRig rig(settings);
   rig.bench.hang(0.05, Eigen::Vector3d::Zero());
   rig.finish();

@@ -10,6 +10,7 @@
 
 #include "host/config_error.h"
 #include "host/study/analysis_report.h"
+#include "host/study/analysis_warnings.h"
 #include "tests/unit/study/loaded_platform.h"
 
 namespace tagwrench::test {
@@ -306,6 +307,68 @@ TEST(Analysis, PredictionsThatACalibrationBringsAreScoredAsTheyAre) {
   EXPECT_NEAR(a.axis[0].nonlinearity_percent, 0, 1e-6) << "% of range";
   EXPECT_TRUE(std::isnan(a.axis[0].hysteresis_percent)) << "one reading of a hold rises nowhere";
   EXPECT_TRUE(a.axis[0].noise.has_value());
+}
+
+TEST(Analysis, AFoldWhoseReferenceDoesNotChangeHasNoScore) {
+  Trial trial = LoadedPlatform().trial();
+  // Constant in the first of five blocks, and on another axis nothing but noise.
+  const Eigen::Index block = trial.reference.rows() / 5 + 60;
+  trial.reference.col(0).head(block).setConstant(0.3);
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0, 1e-3);
+  for (Eigen::Index i = 0; i < block; ++i) trial.reference(i, 1) = normal(random);
+  const Analysis a = analyze({trial}, {});
+  ASSERT_EQ(a.folds.size(), 5U);
+  EXPECT_TRUE(std::isnan(a.folds[0].r2[0]));
+  EXPECT_TRUE(std::isnan(a.folds[0].r2[1]));
+  EXPECT_GT(a.folds[0].r2[2], 0.9);
+  EXPECT_FALSE(std::isnan(a.folds[2].r2[0]));
+  EXPECT_TRUE(a.folds[0].lag_sought);
+  EXPECT_EQ(study::analysis_text(a).find("e+"), std::string::npos);
+}
+
+TEST(Analysis, LoadsThatHangHaveNoLagInAnyFold) {
+  Trial trial = steps(loads_in_turn(1), 1);
+  trial.held = true;
+  trial.step.resize(trial.time.size());
+  for (Eigen::Index i = 0; i < trial.time.size(); ++i) trial.step[i] = static_cast<int>(i / 50);
+  const Analysis a = analyze({trial}, {});
+  ASSERT_FALSE(a.folds.empty());
+  for (const study::Fold& fold : a.folds) {
+    EXPECT_FALSE(fold.lag_sought);
+    for (const double r2 : fold.r2) EXPECT_TRUE(std::isnan(r2)) << "one load a fold";
+  }
+}
+
+TEST(Analysis, AxesOfOneReasonShareALine) {
+  Analysis a;
+  for (const std::size_t k : {1U, 4U}) {
+    a.axis[k].calibrated = false;
+    a.axis[k].reason = "never loaded";
+  }
+  EXPECT_EQ(study::excitation_warnings(a),
+            std::vector<std::string>{"Fy My: not calibrated: never loaded"});
+  a.own_predictions = true;
+  EXPECT_EQ(study::excitation_warnings(a), std::vector<std::string>{"Fy My: never loaded"});
+}
+
+TEST(Analysis, IntervalsThatHoldTooFewErrorsAreSaid) {
+  Analysis a;
+  a.axis[0].coverage = 0.86;
+  EXPECT_TRUE(study::coverage_warnings(a).empty());
+  a.axis[0].coverage = 0.61;
+  a.axis[3].coverage = 0.8;
+  ASSERT_EQ(study::coverage_warnings(a).size(), 1U);
+  EXPECT_NE(study::coverage_warnings(a)[0].find("(Fx 61 %, Mx 80 %)"), std::string::npos);
+}
+
+TEST(Analysis, RangesShowFourDigitsOfWhatWasLoaded) {
+  Analysis a;
+  a.axis[3].range_low = -0.0078312;
+  a.axis[3].range_high = 0.0029;
+  a.axis[3].full_scale = 0.0078312;
+  EXPECT_NE(study::analysis_text(a).find("-0.007831  0.002900  N m"), std::string::npos)
+      << study::analysis_text(a);
 }
 
 TEST(Analysis, WhatIsHeldOutIsNotLearnedFrom) {

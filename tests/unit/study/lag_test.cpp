@@ -131,10 +131,16 @@ TEST(Lag, OutsideOfWhatIsUsualIsWarnedAbout) {
   lag.value = 0.040;
   EXPECT_EQ(study::lag_warning(lag), "");
   lag.value = -0.040;
-  EXPECT_NE(study::lag_warning(lag).find("-40.0 ms"), std::string::npos);
-  EXPECT_EQ(study::lag_warning(lag, -0.2, 0.2), "");
+  EXPECT_EQ(study::lag_warning(lag), "");
+  EXPECT_EQ(study::lag_text(lag), "the reference comes 40.0 +- 1.0 ms after the readings");
+  lag.value = -0.350;
+  EXPECT_EQ(study::lag_warning(lag).rfind(
+                "the reference comes 350.0 +- 1.0 ms after the readings, more than 200 ms", 0),
+            0U);
   lag.value = 0.350;
-  EXPECT_NE(study::lag_warning(lag).find("350.0 ms"), std::string::npos);
+  EXPECT_EQ(study::lag_warning(lag).rfind(
+                "the readings come 350.0 +- 1.0 ms after the reference, more than 200 ms", 0),
+            0U);
 }
 
 TEST(Lag, NothingToEstimateFromIsNotKnown) {

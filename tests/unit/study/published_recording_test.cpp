@@ -111,7 +111,7 @@ TEST_F(PublishedRecording, SaysWhatIsWrongWithIt) {
   EXPECT_NEAR(a.reference_rate, 100, 1) << "Hz, and not 125";
   EXPECT_FALSE(a.axis[5].calibrated);
   EXPECT_TRUE(warns(a, "Mz: not calibrated: hardly loaded"));
-  EXPECT_TRUE(warns(a, "Fz: the reference counts in steps of 0.048 N"));
+  EXPECT_TRUE(warns(a, ": the reference counts in steps of 0.048 N ("));
   EXPECT_TRUE(warns(a, "the combination -Fy +Mx was hardly excited"));
 }
 
