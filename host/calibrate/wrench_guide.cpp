@@ -16,11 +16,12 @@ using Line = GuideLine::Kind;
 constexpr double kOtherClock = 1.0;  // s between what a reading says and when it came
 constexpr double kSilence = 1.0;     // s
 constexpr double kKeep = 3.0;        // s of readings
-constexpr double kTouch = 0.1;       // of a push's force: it has begun
-constexpr double kFree = 0.05;       // of it: nobody pushes
-constexpr double kBegun = 0.05;      // of the range: a movement has begun
-constexpr double kExcited = 0.1;     // of the range, standard deviation over a movement
-constexpr double kLongest = 1.5;     // times its seconds: a movement ends, whatever it has shown
+constexpr double kWellCovered = 0.95;
+constexpr double kTouch = 0.1;    // of a push's force: it has begun
+constexpr double kFree = 0.05;    // of it: nobody pushes
+constexpr double kBegun = 0.05;   // of the range: a movement has begun
+constexpr double kExcited = 0.1;  // of the range, standard deviation over a movement
+constexpr double kLongest = 1.5;  // times its seconds: a movement ends, whatever it has shown
 
 }  // namespace
 
@@ -255,12 +256,11 @@ void WrenchGuide::accept(StepRecord record) {
   todo_.pop_front();
   recount();
   const StepRecord& latest = records_.back();
-  std::string text = "accepted: " + describe(plan_, latest.step);
+  say(Line::note, "accepted: " + describe(plan_, latest.step));
   if (step_of(latest).kind != StepKind::rest) {
-    text += "; " + coverage_bar(coverage_);
-    text += most_useful();
+    const bool open = coverage_.covered().minCoeff() < kWellCovered;
+    say(Line::note, "covered:  " + coverage_bar(coverage_) + (open ? most_useful() : ""));
   }
-  say(Line::note, text);
   ask();
 }
 

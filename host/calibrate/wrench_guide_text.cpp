@@ -9,7 +9,7 @@
 namespace tagwrench {
 
 std::string coverage_bar(const WrenchCoverage& coverage) {
-  constexpr int kLength = 10;
+  constexpr int kLength = 5;
   const Vector6 covered = coverage.covered();
   std::string out;
   for (int i = 0; i < 6; ++i) {
@@ -70,8 +70,8 @@ std::string WrenchGuide::waiting_for() const {
 
 std::string WrenchGuide::live() const {
   if (done()) return "done";
-  return fmt::format("step {}/{}  {}  {}", todo_.front() + 1, plan_.steps.size(),
-                     coverage_bar(coverage_), waiting_for());
+  return fmt::format("step {}/{}: {}  {}", todo_.front() + 1, plan_.steps.size(), waiting_for(),
+                     coverage_bar(coverage_));
 }
 
 }  // namespace tagwrench

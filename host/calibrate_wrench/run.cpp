@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -47,7 +48,10 @@ class Telling {
     if (!terminal_ || Clock::now() - shown_ < kLiveEvery) return;
     shown_ = Clock::now();
     wipe();
-    const std::string text = guide.live();
+    std::string text = guide.live();
+    winsize size{};  // a line that wraps could not be wiped
+    if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1)
+      text.resize(std::min<std::size_t>(text.size(), size.ws_col - 1u));
     [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
     open_ = true;
   }

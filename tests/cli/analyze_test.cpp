@@ -69,7 +69,8 @@ TEST_F(Analyze, OtherPeoplesFileGivesATableAndJson) {
   const Outcome text = run(mapped(file));
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("each of 5 blocks in time"), std::string::npos) << text.out;
-  EXPECT_NE(text.out.find("warning: Fz: not calibrated: never loaded"), std::string::npos);
+  EXPECT_NE(text.out.find("warning: Fy Fz Mx My: not calibrated: never loaded"), std::string::npos)
+      << text.out;
 
   const Outcome structured = run(mapped(file), {"--json", "-", "--series"});
   ASSERT_EQ(structured.status, 0) << structured.err;
