@@ -135,11 +135,7 @@ std::string now_utc() {
 
 /// Of what a measurement would have to begin anew for.
 std::string sensor_sha256(const SensorConfig& sensor) {
-  const SensorIdentity id = identity_of(sensor.camera, sensor.target, sensor.rest);
-  std::string text = fmt::format("{} {}x{}", id.target_sha256, id.image_px[0], id.image_px[1]);
-  for (const double number : id.lens_px.value_or(std::array<double, 4>{}))
-    text += fmt::format(" {:.6f}", number);
-  return sha256_hex(text);
+  return sha256_of(identity_of(sensor.camera, sensor.target, sensor.rest));
 }
 
 /// What was measured, and what is said of it.
@@ -188,6 +184,7 @@ void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject
                                     .require_all = options.require_all,
                                     .zero_in_use = data.zero_in_use});
   add_predictions(plan, fit, data);
+  data.trial.sensor = sensor_sha256(subject.sensor);
   write_calibration(subject.files, subject.sensor_text, options.sensor, subject.sensor, data,
                     calibration_of(plan, subject.sensor, measured, data, fit));
   std::error_code none;

@@ -8,8 +8,10 @@
 #include <cmath>
 #include <fstream>
 
+#include "host/config/sensor_identity.h"
 #include "host/config_error.h"
 #include "host/record/reader.h"
+#include "host/recording_sensor.h"
 #include "host/study/trial_csv.h"
 
 namespace tagwrench {
@@ -141,6 +143,8 @@ study::Trial recorded_trial(const std::filesystem::path& file, std::vector<std::
 
   study::Trial trial;
   trial.name = file.stem().string();
+  const SensorConfig sensor = recorded_sensor(recording.head(), name);
+  trial.sensor = sha256_of(identity_of(sensor.camera, sensor.target, sensor.rest));
   trial.feature_names = study::displacement_names();
   trial.time = column(tracks.time);
   trial.features = rows(tracks.value);

@@ -82,4 +82,12 @@ std::string difference(const SensorIdentity& its, const SensorIdentity& ours) {
   return "";
 }
 
+std::string sha256_of(const SensorIdentity& identity) {
+  std::string text =
+      fmt::format("{} {}x{}", identity.target_sha256, identity.image_px[0], identity.image_px[1]);
+  for (const double number : identity.lens_px.value_or(std::array<double, 4>{}))
+    text += fmt::format(" {:.6f}", number);
+  return sha256_hex(text);
+}
+
 }  // namespace tagwrench

@@ -31,4 +31,7 @@ SensorIdentity identity_of(const CameraModel& camera, const TargetDescription& t
 /// What one of them does not know does not differ.
 std::string difference(const SensorIdentity& its, const SensorIdentity& ours);
 
+/// One name for all of it: equal for data of one sensor, camera and target unchanged.
+std::string sha256_of(const SensorIdentity& identity);
+
 }  // namespace tagwrench

@@ -25,6 +25,22 @@ void check_options(const AnalysisOptions& options) {
     throw ConfigError("--lag-from and --lag-to: the first must be the smaller one");
 }
 
+/// Two of one would not hold anything out; those of two sensors have no stiffness in common.
+void check_apart(const Trial& a, const Trial& b) {
+  const bool same_shape =
+      a.time.size() == b.time.size() && a.reference.size() == b.reference.size();
+  if (same_shape && a.time == b.time && a.features == b.features && a.reference == b.reference) {
+    throw ConfigError(
+        fmt::format("{} and {}: are the same data twice; name each once", a.name, b.name));
+  }
+  if (!a.sensor.empty() && !b.sensor.empty() && a.sensor != b.sensor) {
+    throw ConfigError(fmt::format(
+        "{} and {}: are of different sensors, or of one whose camera or target was calibrated "
+        "between them; analyze them one by one",
+        a.name, b.name));
+  }
+}
+
 void check_features(const std::vector<Trial>& trials) {
   if (trials.empty()) throw ConfigError("nothing to analyze: name a file");
   for (const Trial& trial : trials) {
@@ -34,6 +50,9 @@ void check_features(const std::vector<Trial>& trials) {
                       trials[0].name, trial.name, fmt::join(trials[0].feature_names, " "),
                       fmt::join(trial.feature_names, " ")));
     }
+  }
+  for (std::size_t b = 1; b < trials.size(); ++b) {
+    for (std::size_t a = 0; a < b; ++a) check_apart(trials[a], trials[b]);
   }
 }
 

@@ -74,6 +74,7 @@ class TrialReader {
     trial_.name = file.stem().stem().string();
     for (const std::string& comment : text_.comments()) {
       if (comment.starts_with("name: ")) trial_.name = comment.substr(6);
+      if (comment.starts_with("sensor: ")) trial_.sensor = comment.substr(8);
       if (comment == "held: true") trial_.held = true;
     }
     find_columns();
@@ -251,6 +252,7 @@ std::string trial_to_csv(const Trial& trial) {
   const bool feature_sigmas = trial.feature_sigma.size() > 0;
   const bool load_sigmas = trial.reference_sigma.size() > 0;
   std::string text = fmt::format("# {}\n# name: {}\n", kFormat, one_line(trial.name));
+  if (!trial.sensor.empty()) text += fmt::format("# sensor: {}\n", one_line(trial.sensor));
   if (trial.held) text += "# held: true\n";
   text += "kind,t_s";
   if (steps) text += ",step";

@@ -418,6 +418,13 @@ TEST(Analysis, DataThatCannotBeAnalyzedAreRefusedByName) {
   bad = good;
   bad.feature_names[0] = "other";
   EXPECT_NE(complaint({good, bad}).find("features differ"), std::string::npos);
+  EXPECT_NE(complaint({good, good}).find("same data twice"), std::string::npos);
+  Trial ours = good;
+  ours.sensor = "a";
+  bad = good;
+  bad.time.array() += 1e-3;
+  bad.sensor = "b";
+  EXPECT_NE(complaint({ours, bad}).find("different sensors"), std::string::npos);
   platform.seconds = 0.1;
   bad = platform.trial();
   EXPECT_NE(complaint({bad}).find("record more"), std::string::npos) << complaint({bad});

@@ -65,6 +65,7 @@ TEST_F(TrialFiles, ATrialComesBackBitForBit) {
   trial.reference_sigma = Eigen::MatrixXd::Constant(trial.reference_time.size(), 6, 1e-3);
   trial.step = Eigen::VectorXi::LinSpaced(trial.time.size(), -1, 5);
   trial.held = true;
+  trial.sensor = "d00e";
   trial.predicted = Eigen::MatrixXd::Constant(trial.time.size(), 6, 0.1);
   trial.predicted.row(3).setConstant(std::nan(""));
   trial.predicted_sigma = 0.3 * trial.predicted;
@@ -79,6 +80,7 @@ TEST_F(TrialFiles, ATrialComesBackBitForBit) {
   EXPECT_EQ(back.reference_sigma, trial.reference_sigma);
   EXPECT_EQ(back.step, trial.step);
   EXPECT_TRUE(back.held);
+  EXPECT_EQ(back.sensor, trial.sensor);
   EXPECT_TRUE(back.predicted.row(3).array().isNaN().all());
   EXPECT_EQ(back.predicted.row(4), trial.predicted.row(4));
   EXPECT_EQ(back.predicted_sigma.row(4), trial.predicted_sigma.row(4));
