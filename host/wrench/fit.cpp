@@ -17,6 +17,7 @@ namespace {
 using fit::Judged;
 using fit::Problem;
 
+constexpr double kUnloaded = 0.5;  // share of an axis in the loads that are missing
 constexpr std::array<const char*, 6> kAxes{"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 constexpr double kInside95 = 1.96;
 constexpr double kCommonOff = 3;  // standard deviations: said
@@ -198,7 +199,11 @@ void set_axes(const Problem& problem, const Judged& judged, WrenchFit& out) {
     axis.gain_sigma = known[i].gain_sigma;
     axis.error_constant = judged.weighting.error.constant[row];
     axis.error_proportional = judged.weighting.error.proportional[row];
-    if (known[i].reached) {
+    // A load that was never there does not make an axis known, however small the error that what
+    // there was of it by chance would leave.
+    double unloaded = 0;
+    for (const Vector6& combination : missing) unloaded += combination[row] * combination[row];
+    if (known[i].reached && unloaded < kUnloaded) {
       axis.state = AxisState::calibrated;
       out.model.range[row] = axis.largest;
     } else {

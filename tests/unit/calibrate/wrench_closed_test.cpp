@@ -114,6 +114,22 @@ TEST(WrenchClosed, AWrongMassThatIsNotLeftOutIsNotPassedOverInSilence) {
   EXPECT_FALSE(bench.fit(bench.data()).warnings.empty());
 }
 
+TEST(WrenchClosed, AnAxisThatNoPushReachesIsMarkedHoweverCloseToNothingItWas) {
+  WrenchPlan plan = parse_plan(plan_text("load_cell"), "load_cell");
+  std::erase_if(plan.steps, [&](const PlanStep& step) {
+    return step.kind == StepKind::push &&
+           plan.points[static_cast<std::size_t>(step.point)].name.find("corner") !=
+               std::string::npos;
+  });
+  ClosedBench bench(plan, {}, 1);
+  bench.play();
+  const WrenchFit fit = bench.fit(bench.data());
+  EXPECT_EQ(fit.missing, std::vector<std::string>{"Mz"});
+  EXPECT_EQ(fit.axis[5].state, AxisState::spring_model);
+  EXPECT_EQ(fit.axis[5].reason, "no torque about z was applied");
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(fit.axis[i].state, AxisState::calibrated) << i;
+}
+
 TEST(WrenchClosed, ABumpIsRepeatedAndDoesNoHarm) {
   sim::BenchSettings settings;
   settings.faults.bump = 2;  // orders of the plan: hang, hang, let go, turn ...
