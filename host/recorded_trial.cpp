@@ -123,6 +123,16 @@ Eigen::VectorXi steps_of(const std::vector<record::Mark>& marks, TimePoint origi
   return step;
 }
 
+/// Empty where the recording's sensor cannot be read: its readings are still readings.
+std::string sensor_of(const record::Head& head, const std::string& name) {
+  try {
+    const SensorConfig sensor = recorded_sensor(head, name);
+    return sha256_of(identity_of(sensor.camera, sensor.target, sensor.rest));
+  } catch (const ConfigError&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 bool is_recording(const std::filesystem::path& file) {
@@ -143,8 +153,7 @@ study::Trial recorded_trial(const std::filesystem::path& file, std::vector<std::
 
   study::Trial trial;
   trial.name = file.stem().string();
-  const SensorConfig sensor = recorded_sensor(recording.head(), name);
-  trial.sensor = sha256_of(identity_of(sensor.camera, sensor.target, sensor.rest));
+  trial.sensor = sensor_of(recording.head(), name);
   trial.feature_names = study::displacement_names();
   trial.time = column(tracks.time);
   trial.features = rows(tracks.value);
