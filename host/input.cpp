@@ -11,7 +11,6 @@
 #include "host/config/scenario_config.h"
 #include "host/config_error.h"
 #include "host/record/reader.h"
-#include "host/recording_sensor.h"
 #include "host/source/images.h"
 #include "host/source/recording.h"
 #include "host/source/simulator/folder_export.h"
@@ -19,6 +18,7 @@
 #include "host/source/v4l2_source.h"
 #include "host/tell.h"
 #include "host/tracker/appearance_check.h"
+#include "host/verbs/recording_sensor.h"
 
 namespace tagwrench {
 namespace {

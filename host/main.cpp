@@ -10,23 +10,23 @@
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 
-#include "host/analyze_command.h"
 #include "host/bandwidth/command.h"
 #include "host/board/command.h"
-#include "host/calibrate_command.h"
-#include "host/certificate_command.h"
-#include "host/check_command.h"
 #include "host/config/scenario_config.h"
 #include "host/config_error.h"
-#include "host/design_command.h"
 #include "host/doctor.h"
-#include "host/export_command.h"
-#include "host/record_command.h"
-#include "host/run_command.h"
 #include "host/source/simulator/folder_export.h"
-#include "host/tags_command.h"
 #include "host/tell.h"
-#include "host/zero_command.h"
+#include "host/verbs/analyze_command.h"
+#include "host/verbs/calibrate_command.h"
+#include "host/verbs/certificate_command.h"
+#include "host/verbs/check_command.h"
+#include "host/verbs/design_command.h"
+#include "host/verbs/export_command.h"
+#include "host/verbs/record_command.h"
+#include "host/verbs/run_command.h"
+#include "host/verbs/tags_command.h"
+#include "host/verbs/zero_command.h"
 
 namespace {
 

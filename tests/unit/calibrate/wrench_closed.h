@@ -13,10 +13,10 @@
 
 #include "host/calibrate/wrench_guide.h"
 #include "host/calibrate/wrench_observations.h"
-#include "host/calibrate_wrench/simulated_person.h"
 #include "host/config/plan_config.h"
 #include "host/source/simulator/bench_references.h"
 #include "host/source/simulator/mechanics.h"
+#include "host/verbs/calibrate_wrench/simulated_person.h"
 #include "tests/unit/calibrate/wrench_bench.h"
 
 namespace tagwrench::test {

@@ -1,0 +1,125 @@
+#include "host/verbs/calibrate_wrench/result.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "host/config/sensor_edit.h"
+#include "host/config/sha256.h"
+#include "host/study/trial_csv.h"
+#include "host/verbs/zero_command.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// As sensor.yaml names it: relative to itself where they share a folder.
+std::string name_from(const fs::path& sensor, const fs::path& file) {
+  const fs::path folder = fs::absolute(sensor).lexically_normal().parent_path();
+  const fs::path full = fs::absolute(file).lexically_normal();
+  const fs::path written = full.parent_path() == folder ? full.filename() : full;
+  std::string name = "'";
+  for (const char c : written.string()) name += c == '\'' ? std::string("''") : std::string(1, c);
+  return name + "'";
+}
+
+/// How well the loads of the held-out predictions were known themselves, rms, N and N m.
+Vector6 known_to(const WrenchData& data, const WrenchFit& fit) {
+  Vector6 sum = Vector6::Zero();
+  for (const HeldOut& h : fit.held_out) {
+    const Observation& o = data.observations[h.observation];
+    sum += o.wrench_covariance.diagonal();
+    for (const CommonError& error : o.common) sum += error.effect.cwiseAbs2();
+  }
+  if (!fit.held_out.empty()) sum /= static_cast<double>(fit.held_out.size());
+  return sum.cwiseSqrt();
+}
+
+std::string axis_line(int i, const AxisFit& axis, double range, double reference, double inside) {
+  const double milli = 1e3;
+  const char* name_of_axis = kWrenchAxes[static_cast<std::size_t>(i)];
+  const char* unit = i < 3 ? "mN" : "mN m";
+  if (axis.state != AxisState::calibrated) {
+    return fmt::format("{}    NOT calibrated, {}: {}", name_of_axis, name(axis.state), axis.reason);
+  }
+  return fmt::format("{} {:9.1f} {:4} {:9.2f} {:4} {:6.2f} % {:9.2f} {:4} {:8.0f} %", name_of_axis,
+                     milli * axis.largest, unit, milli * axis.held_out_rmse, unit,
+                     100 * axis.held_out_rmse / range, milli * reference, unit, 100 * inside);
+}
+
+/// All that were tried, the best of each kind, in one line.
+std::string trials_line(const std::vector<ModelTrial>& trials) {
+  std::string tried;
+  std::string_view adopted = "linear";
+  for (const ModelTrial& trial : trials) {
+    if (trial.adopted) adopted = name(trial.features.kind);
+    const bool best = std::none_of(trials.begin(), trials.end(), [&](const ModelTrial& t) {
+      return t.features.kind == trial.features.kind && t.score < trial.score;
+    });
+    if (!best) continue;
+    tried += fmt::format("{}{} {:.2f} +- {:.2f}", tried.empty() ? "" : ", ",
+                         name(trial.features.kind), trial.score, trial.score_sigma);
+  }
+  return fmt::format("model: {} (held-out squared error, linear = 1: {})", adopted, tried);
+}
+
+}  // namespace
+
+CalibrationFiles files_of(const fs::path& calibration) {
+  fs::path data = calibration;
+  data.replace_extension(".data.csv");
+  return {calibration, data, fs::path(calibration) += ".partial",
+          fs::path(calibration) += ".before"};
+}
+
+void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
+                       const fs::path& sensor_file, const SensorConfig& sensor,
+                       const WrenchData& data, Calibration calibration) {
+  const std::string csv = study::trial_to_csv(data.trial);
+  calibration.record.data_file = files.data.filename().string();
+  calibration.record.data_sha256 = sha256_hex(csv);
+  std::vector<YamlEntry> entries = {{"calibration", name_from(sensor_file, files.calibration)}};
+  for (const YamlEntry& entry : without_zero(sensor)) entries.push_back(entry);
+  std::error_code none;
+  if (fs::exists(files.calibration, none))
+    write_atomically(files.before, read_text(files.calibration));
+  if (fs::exists(files.data, none))
+    write_atomically(fs::path(files.data) += ".before", read_text(files.data));
+  write_atomically(files.data, csv);
+  save_calibration(files.calibration, calibration);
+  write_sensor(sensor_text, {{"wrench", entries}}, sensor_file);
+}
+
+std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,
+                                  const WrenchFit& fit, const Vector6& range) {
+  std::vector<std::string> lines = {
+      "     loads up to   error held out   of range   loads known to   within 95 %"};
+  const Vector6 reference = known_to(data, fit);
+  for (int i = 0; i < 6; ++i) {
+    const auto axis = static_cast<std::size_t>(i);
+    lines.push_back(axis_line(i, fit.axis[axis], range[i], reference[i], fit.inside_95[axis]));
+  }
+  lines.push_back(
+      "error held out: rms, each step predicted by the others. The load's own uncertainty is in it "
+      "(loads known to: rms), so where the two are alike the reference limits, not the sensor");
+  lines.push_back(
+      "within 95 %: how many of these errors their stated 95 % interval holds; 90 to 99 % is good");
+  if (!fit.trials.empty()) lines.push_back(trials_line(fit.trials));
+  if (data.lag.known) {
+    // The study counts from the reference to the reading; people ask how late the reference is.
+    lines.push_back(fmt::format("the reference comes {:.1f} +- {:.1f} ms after the camera",
+                                -1e3 * data.lag.value, 1e3 * data.lag.sigma));
+    if (const std::string warning = study::lag_warning(data.lag, -0.2, 0.2); !warning.empty())
+      lines.push_back(warning);
+  }
+  for (const std::string& missing : fit.missing)
+    lines.push_back("completed from the spring model: " + missing);
+  for (const std::string& warning : fit.warnings) lines.push_back(warning);
+  lines.push_back(
+      fmt::format("{} loads and rests of plan {}", data.observations.size(), plan.name));
+  return lines;
+}
+
+}  // namespace tagwrench

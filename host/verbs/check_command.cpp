@@ -1,0 +1,222 @@
+#include "host/verbs/check_command.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iostream>
+#include <numbers>
+
+#include "host/config_error.h"
+#include "host/link/cell_calibration.h"
+#include "host/tell.h"
+#include "host/tracker/rotation.h"
+#include "host/verbs/check_text.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr int kOff = 1;
+constexpr Duration kPatience = std::chrono::seconds(20);
+constexpr Duration kPatienceForMass = std::chrono::seconds(60);
+constexpr Duration kLeastPush = std::chrono::seconds(8);
+constexpr double kKnownScale = 0.004;  // standard deviation at which pushing may end
+constexpr double kShortest = 1e-9;     // of a direction
+
+Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
+
+CLI::Validator finite() {
+  return {[](std::string& text) {
+            double value = 0;
+            const bool usable = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
+            return usable ? std::string() : "'" + text + "' is not a number";
+          },
+          "NUMBER"};
+}
+
+int stopped() {
+  tell("stopped");
+  return kOff;
+}
+
+/// Prints the findings; whether all are fine.
+bool print(const std::vector<InSituFinding>& findings) {
+  bool fine = true;
+  for (const InSituFinding& finding : findings) {
+    std::cout << text(finding) << '\n';
+    // One tag alone cannot be compared, ever: that is no fault of today.
+    const bool by_design = finding.subject == Subject::tags && finding.fault == Fault::not_known;
+    fine = fine && (finding.fine() || by_design);
+  }
+  std::cout.flush();
+  return fine;
+}
+
+/// M = r x F, where r is where the point has gone with the platform; and what is not known of mass,
+/// point and direction.
+void set_known(const CheckOptions& options, const Vector6& displacement, ProofLoad& load) {
+  const Eigen::Vector3d point = vector3(options.at_mm) * 1e-3;
+  const double force = *options.mass_g * 1e-3 * link::kStandardGravity;
+  const Eigen::Vector3d f = force * vector3(options.gravity).normalized();
+  const Eigen::Vector3d r =
+      displacement.head<3>() + rotation_from_vector(displacement.tail<3>()) * point;
+  load.known << f, r.cross(f);
+  const double turn = options.direction_sigma_deg * std::numbers::pi / 180;
+  const double shift = options.at_sigma_mm * 1e-3;
+  const double size = options.mass_sigma_percent * 1e-2;
+  Matrix6 covariance = size * size * load.known * load.known.transpose();
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d e = Eigen::Vector3d::Unit(i);
+    Vector6 turned, shifted;
+    turned << e.cross(f), r.cross(e.cross(f));
+    shifted << Eigen::Vector3d::Zero(), e.cross(f);
+    covariance +=
+        turn * turn * turned * turned.transpose() + shift * shift * shifted * shifted.transpose();
+  }
+  load.known_covariance = covariance;
+}
+
+/// How far the wrench must go before the load is taken to be there, of the range.
+double least_change(const CheckOptions& options, const Vector6& range) {
+  ProofLoad load;
+  set_known(options, Vector6::Zero(), load);
+  return 0.3 * load.known.cwiseQuotient(range).cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+CheckCommand::CheckCommand(CLI::App& app)
+    : verb_(app.add_subcommand(
+          "check", "say line by line whether a calibrated sensor still measures what it did")) {
+  verb_->add_option("--sensor", options_.sensor, "sensor.yaml of this sensor")->required();
+  verb_
+      ->add_option("--source", options_.source,
+                   "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
+      ->required();
+  add_load_options();
+}
+
+void CheckCommand::add_load_options() {
+  const auto vector = [&](const char* name, std::vector<double>& value, const char* help) {
+    return verb_->add_option(name, value, help)->delimiter(',')->expected(3)->check(finite());
+  };
+  auto* mass = verb_->add_option("--mass-g", options_.mass_g, "a known mass to hang on, g")
+                   ->check(CLI::Range(0.1, 1e5));
+  auto* at = vector("--at", options_.at_mm,
+                    "x,y,z: where a load takes hold, mm, platform frame (origin between the tags, "
+                    "axes as the camera's)");
+  vector("--gravity", options_.gravity,
+         "x,y,z: which way masses pull, camera axes; 0,0,-1 when the camera looks up");
+  verb_
+      ->add_option("--mass-sigma-percent", options_.mass_sigma_percent,
+                   "how well the mass is known, 1 standard deviation")
+      ->check(CLI::Range(0.0, 50.0));
+  verb_->add_option("--at-sigma-mm", options_.at_sigma_mm, "how well the point is known")
+      ->check(CLI::Range(0.0, 50.0));
+  auto* board = verb_->add_option("--board", options_.board,
+                                  "a load cell of this board to push with: its port, or auto");
+  auto* direction = vector("--direction", options_.direction,
+                           "x,y,z: of the force on the platform when the cell is pushed");
+  verb_
+      ->add_option("--cells", options_.cells,
+                   "calibration file of its load cells; without it the one kept for this board")
+      ->needs(board);
+  verb_->add_option("--channel", options_.channel, "of the load cell")
+      ->check(CLI::Range(0, 3))
+      ->needs(board);
+  mass->needs(at);
+  board->needs(at);
+  board->needs(direction);
+  direction->needs(board);
+  mass->excludes(board);
+}
+
+int CheckCommand::run() const {
+  if (!(vector3(options_.gravity).norm() > kShortest))
+    throw ConfigError("--gravity: has no length; give a direction such as 0,0,-1");
+  if (!options_.direction.empty() && !(vector3(options_.direction).norm() > kShortest))
+    throw ConfigError("--direction: has no length; give a direction such as 0,0,-1");
+  std::unique_ptr<RunBoard> board;
+  if (!options_.board.empty()) {
+    BoardOptions board_options;
+    board_options.port = options_.board == "auto" ? "" : options_.board;
+    board_options.cells_file = options_.cells;
+    board = std::make_unique<RunBoard>(board_options);
+    if (!board->connected()) return stopped();
+  }
+  BenchInput at;
+  if (board) {
+    at.input = open_input({options_.sensor, options_.source, false});  // a board has its own time
+  } else {
+    at = open_at_bench({options_.sensor, options_.source, true});
+  }
+  Input& input = at.input;
+  check_size(input);
+  check_calibrated_rest(input.sensor, "check");
+  const UniqueFd stop = signals_as_fd();
+  if (board && !board->settle_light(input, stop)) return stopped();
+  HandsOff hands_off(input.sensor, std::chrono::seconds(2),
+                     options_.mass_g ? kPatienceForMass : kPatience);
+  tell("source: " + input.source->format().description);
+  tell("hands off for some seconds");
+  const Seen seen = watch(*input.source, stop, hands_off);
+  if (seen == Seen::stopped) return stopped();
+  if (const std::string why = why_nothing(seen, hands_off); !why.empty()) {
+    tell(why);
+    return kOff;
+  }
+  bool fine = print(judge(hands_off.result()));
+  if (options_.mass_g) fine = by_mass(at, stop, hands_off) && fine;
+  if (board) fine = by_cell(input, stop, *board) && fine;
+  if (signalled(stop)) return stopped();
+  return fine ? 0 : kOff;
+}
+
+bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off) const {
+  ProofLoad load;
+  load.range = at.input.sensor.wrench.range;
+  const Vector6 before = hands_off.result().wrench;
+  hands_off.wait_for_change(least_change(options_, load.range));
+  tell(fmt::format("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest",
+                   *options_.mass_g, options_.at_mm[0], options_.at_mm[1], options_.at_mm[2]));
+  if (at.bench) at.bench->hang(*options_.mass_g * 1e-3, vector3(options_.at_mm) * 1e-3);
+  const Seen loaded = watch(*at.input.source, stop, hands_off);
+  InSituFinding scale{.subject = Subject::scale, .fault = Fault::not_known};
+  if (loaded == Seen::enough && hands_off.result().held) {
+    load.measured = hands_off.result().wrench - before;
+    load.measured_covariance = hands_off.wrench_sigma().cwiseAbs2().asDiagonal();
+    set_known(options_, hands_off.displacement(), load);
+    scale = judge(load);
+  }
+  return loaded != Seen::stopped && print({scale});
+}
+
+/// Until the scale is known well, or patience is lost.
+bool CheckCommand::by_cell(Input& input, const UniqueFd& stop, RunBoard& board) const {
+  SensorConfig& sensor = input.sensor;
+  sensor.reference = ReferenceLine{options_.channel, vector3(options_.at_mm) * 1e-3,
+                                   vector3(options_.direction).normalized()};
+  const std::unique_ptr<Output> cell = board.output(sensor, "");
+  Tracker tracker(sensor.camera, sensor.target, sensor.rest);
+  WrenchEstimator wrench(sensor.wrench);
+  tell("now push with the load cell, slowly, on and off, for some seconds");
+  std::optional<TimePoint> begin;
+  while (true) {
+    Frame frame;
+    const Next next = next_frame(*input.source, stop, frame);
+    if (next == Next::stopped) return false;
+    if (next == Next::end) break;
+    if (const std::string_view news = cell->service(); !news.empty()) tell(news);
+    if (next != Next::frame) continue;
+    if (!begin) begin = frame.capture_time;
+    Sample sample{.capture_time = frame.capture_time, .latency_origin = frame.latency_origin};
+    const Track track = tracker.track(frame);
+    wrench.estimate(track, sample);
+    cell->send(sample);
+    const Duration pushed = frame.capture_time - *begin;
+    const bool known = board.monitor().scale_sigma() < kKnownScale;
+    if (pushed >= kPatience || (known && pushed >= kLeastPush)) break;
+  }
+  return print({judge(board.monitor())});
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,30 @@
+// `tagwrench run`: from what the user asked for to the objects of the data path, and the run
+// itself.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/verbs/recording.h"
+
+namespace tagwrench {
+
+struct RunOptions {
+  std::string sensor;  ///< path; empty: what the source suggests
+  std::string source;  ///< SRC; empty: a camera that sees the tags, else the simulated sensor
+  std::vector<std::string>
+      outputs;  ///< OUT; empty: terminal and every device that can be made here
+  std::optional<long> frames;
+  std::optional<double> seconds;
+  bool fast = false;
+  std::string board;                    ///< its port; empty: there is none
+  bool no_zero_tracking = false;        ///< the zero stays what sensor.yaml says
+  std::optional<RecordOptions> record;  ///< what is to be kept of the run
+  std::string cells;  ///< calibration file of its load cells; empty: by the board's id
+};
+
+/// Returns the exit status. Throws ConfigError if the run cannot start.
+int run(const RunOptions& options);
+
+}  // namespace tagwrench
