@@ -8,6 +8,7 @@
 
 #include "host/config_error.h"
 #include "host/wrench/fit_axes.h"
+#include "host/wrench/fit_consistency.h"
 #include "host/wrench/fit_errors.h"
 #include "host/wrench/fit_select.h"
 
@@ -18,9 +19,9 @@ using fit::Judged;
 using fit::Problem;
 
 constexpr double kUnloaded = 0.5;  // share of an axis in the loads that are missing
-constexpr std::array<const char*, 6> kAxes{"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 constexpr double kInside95 = 1.96;
-constexpr double kCommonOff = 3;  // standard deviations: said
+constexpr double kGrossError = 0.2;    // of full load: the model's own
+constexpr double kFalseAlarms = 1e-3;  // healthy calibrations in which some common error is told of
 
 Matrix6 stiffness_of(const Eigen::VectorXd& unknowns) {
   return Eigen::Map<const Matrix6>(unknowns.data());
@@ -40,28 +41,6 @@ void assume_reciprocity(Problem& problem, const FitOptions& options) {
     if ((stiffness.diagonal().array() <= 0).any()) return;
   }
   problem.reciprocity = fit::prior_sigma_of(stiffness, options.reciprocity);
-}
-
-/// The pair of axes that breaks it most, and by how many standard deviations; empty if none does.
-std::string broken_reciprocity(const Problem& problem, const Matrix6& K) {
-  constexpr double kBroken = 3;
-  double most = kBroken;
-  std::string out;
-  for (std::size_t i = 0; i < 6; ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      const auto row = static_cast<int>(i), column = static_cast<int>(j);
-      if (problem.reciprocity(row, column) == 0) continue;
-      const double off =
-          std::abs(K(row, column) - K(column, row)) / problem.reciprocity(row, column);
-      if (off <= most) continue;
-      most = off;
-      out = fmt::format(
-          "K is not symmetric by {:.0f} standard deviations ({} and {}), as springs' is; fitted "
-          "without that assumption: check points and directions of the plan, and that nothing rubs",
-          off, kAxes[j], kAxes[i]);
-    }
-  }
-  return out;
 }
 
 /// Of the offset that the sensor will be used with.
@@ -128,16 +107,19 @@ void set_held_out(const Problem& problem, const Judged& judged, WrenchFit& out) 
   }
 }
 
-/// Load shown over load applied, in natural scales.
+/// Load shown over load applied: of forces, as torques also tell where they act; of torques where
+/// there is no force.
 double load_ratio(const Problem& problem, const std::vector<fit::Prediction>& block) {
-  double shown = 0, applied = 0;
+  Vector6 shown = Vector6::Zero(), applied = Vector6::Zero();
   for (const fit::Prediction& p : block) {
     const Vector6 wrench = problem.rows[p.row].wrench.cwiseQuotient(problem.scale);
     const Vector6 error = p.error.cwiseQuotient(problem.scale);
-    shown += wrench.dot(wrench - error);
-    applied += wrench.squaredNorm();
+    shown += wrench.cwiseProduct(wrench - error);
+    applied += wrench.cwiseAbs2();
   }
-  return applied > 1e-6 * static_cast<double>(block.size()) ? shown / applied : 0;
+  const double least = 1e-6 * static_cast<double>(block.size());
+  if (applied.head<3>().sum() > least) return shown.head<3>().sum() / applied.head<3>().sum();
+  return applied.sum() > least ? shown.sum() / applied.sum() : 0;
 }
 
 std::string remark_on(const BlockFit& block) {
@@ -214,12 +196,16 @@ void set_axes(const Problem& problem, const Judged& judged, WrenchFit& out) {
 }
 
 void set_common(const Problem& problem, const Judged& judged, WrenchFit& out) {
+  // Each of n is looked at, and a normal variable exceeds z with a probability below exp(-z^2 / 2)
+  // (Chernoff), so that this z is exceeded by any (Bonferroni) in kFalseAlarms at the most.
+  const auto n = static_cast<double>(problem.common_names.size());
+  const double most = std::sqrt(2 * std::log(std::max(n, 1.0) / kFalseAlarms));
   for (std::size_t c = 0; c < problem.common_names.size(); ++c) {
     const int at = problem.common_at(static_cast<int>(c));
     CommonEstimate common{.name = problem.common_names[c],
                           .value = judged.solution.unknowns[at],
                           .sigma = std::sqrt(judged.solution.covariance(at, at))};
-    if (std::abs(common.value) > kCommonOff) {
+    if (std::abs(common.value) > most) {
       out.warnings.push_back(
           fmt::format("{}: off by {:.1f} times its stated uncertainty, if the other steps are "
                       "right; measure it again",
@@ -229,11 +215,32 @@ void set_common(const Problem& problem, const Judged& judged, WrenchFit& out) {
   }
 }
 
+/// What is off by so much is no calibration, however honestly it says so. Where no axis is
+/// calibrated, they say why themselves.
+void refuse_gross_errors(const Problem& problem, const WrenchFit& fitted) {
+  if (std::none_of(fitted.axis.begin(), fitted.axis.end(),
+                   [](const AxisFit& axis) { return axis.state == AxisState::calibrated; })) {
+    return;
+  }
+  for (std::size_t i = 0; i < 6; ++i) {
+    const AxisFit& axis = fitted.axis[i];
+    const double off = std::hypot(axis.error_constant, axis.error_proportional) /
+                       problem.scale[static_cast<int>(i)];
+    if (axis.largest == 0 || off < kGrossError) continue;
+    throw ConfigError(fmt::format(
+        "calibration: the steps contradict each other by {:.0f} % of full load in {}, whichever "
+        "few are left out; check masses, points and directions of the plan, then take the steps "
+        "again",
+        100 * off, fit::kAxisNames[i]));
+  }
+}
+
 void require_all(const WrenchFit& fitted) {
   std::vector<std::string> lacking;
   for (std::size_t i = 0; i < 6; ++i) {
     if (fitted.axis[i].state != AxisState::calibrated)
-      lacking.push_back(fmt::format("{} is not calibrated ({})", kAxes[i], fitted.axis[i].reason));
+      lacking.push_back(
+          fmt::format("{} is not calibrated ({})", fit::kAxisNames[i], fitted.axis[i].reason));
   }
   if (lacking.empty()) return;
   throw ConfigError(
@@ -247,20 +254,20 @@ WrenchFit fit_wrench(std::span<const Observation> observations, std::span<const 
                      const FitOptions& options) {
   Problem problem = fit::make_problem(observations, path, {}, options.prior, options.prior_width);
   assume_reciprocity(problem, options);
-  Judged judged = fit::judge(problem);
   WrenchFit out;
-  const std::string broken = broken_reciprocity(problem, stiffness_of(judged.solution.unknowns));
-  if (!broken.empty()) {
-    out.warnings.push_back(broken);
-    problem.reciprocity.setZero();
-    judged = fit::judge(problem);
+  const fit::Explanation explanation = fit::explain(problem);
+  Judged judged = fit::judge_explained(problem, explanation, out.warnings);
+  if (!explanation.found) {
+    out.warnings.push_back(
+        "the steps contradict each other, and no few of them explain it: the errors below are what "
+        "they disagree by; check masses, points and directions of the plan");
   }
   if (options.try_richer) {
     out.trials = fit::try_richer(problem, judged, observations, path);
     for (const ModelTrial& trial : out.trials) {
       if (!trial.adopted) continue;
       problem = fit::with_features(problem, observations, path, trial.features);
-      judged = fit::judge(problem);
+      judged = fit::judge(problem, explanation.left_out);
       break;
     }
   }
@@ -269,6 +276,7 @@ WrenchFit fit_wrench(std::span<const Observation> observations, std::span<const 
   set_blocks(problem, judged, out);
   set_axes(problem, judged, out);
   set_common(problem, judged, out);
+  refuse_gross_errors(problem, out);
   if (options.require_all) require_all(out);
   return out;
 }

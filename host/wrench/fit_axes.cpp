@@ -11,7 +11,6 @@
 namespace tagwrench::fit {
 namespace {
 
-constexpr std::array<const char*, 6> kAxis{"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 constexpr double kReachedRatio = 0.25;  // standard deviation after over before
 constexpr double kReachedError = 0.10;  // of full load, in all six numbers together
 constexpr double kMissing = 0.02;       // singular value over the largest
@@ -83,7 +82,7 @@ std::string missing_name(const Vector6& combination) {
   std::vector<std::string> names;
   for (int i = 0; i < 6; ++i) {
     if (std::abs(combination[i]) > kTakesPart)
-      names.emplace_back(kAxis[static_cast<std::size_t>(i)]);
+      names.emplace_back(kAxisNames[static_cast<std::size_t>(i)]);
   }
   return names.size() == 1 ? names[0]
                            : fmt::format("{} apart from each other", fmt::join(names, " and "));
@@ -109,7 +108,7 @@ std::string missing_reason(int axis, const std::vector<Vector6>& missing, double
     std::vector<std::string> others;
     for (int i = 0; i < 6; ++i) {
       if (std::abs((*where)[i]) > kTakesPart)
-        others.emplace_back(kAxis[static_cast<std::size_t>(i)]);
+        others.emplace_back(kAxisNames[static_cast<std::size_t>(i)]);
     }
     return fmt::format("{} were only applied together", fmt::join(others, " and "));
   }

@@ -9,6 +9,8 @@
 
 namespace tagwrench::fit {
 
+inline constexpr std::array<const char*, 6> kAxisNames{"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
+
 struct AxisKnowledge {
   bool reached = false;   ///< the answer to a load along this axis is known
   double coverage = 0;    ///< 1 - standard deviation after over before

@@ -15,21 +15,11 @@ constexpr double kStudent = 4;              // degrees of freedom of the robust 
 constexpr int kRobustRounds = 5;
 constexpr int kRounds = 4;
 
-/// Mean of e^T (V + error)^-1 e / 6 over each block.
-std::vector<double> block_chi2(const Problem& problem,
-                               const std::vector<std::vector<Prediction>>& held_out,
-                               const ErrorModel& error) {
-  std::vector<double> out;
-  for (const std::vector<Prediction>& block : held_out) {
-    double sum = 0;
-    for (const Prediction& p : block) {
-      Matrix6 S = p.covariance;
-      S.diagonal() += error.variance(problem.rows[p.row].load);
-      sum += p.error.dot(S.llt().solve(p.error)) / 6;
-    }
-    out.push_back(sum / static_cast<double>(block.size()));
-  }
-  return out;
+/// RMS over a block, of the axis that is off most, of full load.
+double largest_error(const Problem& problem, const std::vector<Prediction>& block) {
+  Vector6 squares = Vector6::Zero();
+  for (const Prediction& p : block) squares += p.error.cwiseQuotient(problem.scale).cwiseAbs2();
+  return std::sqrt(squares.maxCoeff() / static_cast<double>(block.size()));
 }
 
 double median(std::vector<double> values) {
@@ -153,36 +143,49 @@ double dispersion(const Problem& problem, const Solution& solution, const Weight
   return std::max(1.0, weighting.dispersion * found / expected);
 }
 
-/// RMS over a block, of the axis that is off most, of full load.
-double largest_error(const Problem& problem, const std::vector<Prediction>& block) {
-  Vector6 squares = Vector6::Zero();
-  for (const Prediction& p : block) squares += p.error.cwiseQuotient(problem.scale).cwiseAbs2();
-  return std::sqrt(squares.maxCoeff() / static_cast<double>(block.size()));
-}
-
 /// False if so many blocks disagree that it is not they that are wrong.
 bool reject(const Problem& problem, const std::vector<std::vector<Prediction>>& held_out,
-            const std::vector<double>& chi2, std::vector<double>& weight) {
+            const std::vector<double>& chi2, const std::vector<bool>& left_out,
+            std::vector<double>& weight) {
   std::size_t rejected = 0;
   for (std::size_t b = 0; b < chi2.size(); ++b) {
-    const bool off =
-        chi2[b] > kOutlierChi2 && largest_error(problem, held_out[b]) > kWorthRejecting;
+    const bool off = left_out[b] || is_outlier(problem, held_out[b], chi2[b]);
     weight[b] = off ? 0.0 : 1.0;
     if (off) ++rejected;
   }
   const auto most =
       static_cast<std::size_t>(kMostRejected * static_cast<double>(problem.blocks.size()));
   if (rejected <= most) return true;
-  std::fill(weight.begin(), weight.end(), 1.0);
+  for (std::size_t b = 0; b < weight.size(); ++b) weight[b] = left_out[b] ? 0.0 : 1.0;
   return false;
 }
 
 }  // namespace
 
-Judged judge(const Problem& problem) {
+std::vector<double> block_chi2(const Problem& problem,
+                               const std::vector<std::vector<Prediction>>& held_out,
+                               const ErrorModel& error) {
+  std::vector<double> out;
+  for (const std::vector<Prediction>& block : held_out) {
+    double sum = 0;
+    for (const Prediction& p : block) {
+      Matrix6 S = p.covariance;
+      S.diagonal() += error.variance(problem.rows[p.row].load);
+      sum += p.error.dot(S.llt().solve(p.error)) / 6;
+    }
+    out.push_back(sum / static_cast<double>(block.size()));
+  }
+  return out;
+}
+
+bool is_outlier(const Problem& problem, const std::vector<Prediction>& held_out, double chi2) {
+  return chi2 > kOutlierChi2 && largest_error(problem, held_out) > kWorthRejecting;
+}
+
+Judged judge(const Problem& problem, const std::vector<bool>& left_out) {
   Judged out;
-  out.weighting.block.assign(problem.blocks.size(), 1.0);
   std::vector<double>& weight = out.weighting.block;
+  for (const bool out_of_it : left_out) weight.push_back(out_of_it ? 0.0 : 1.0);
   Eigen::VectorXd start;
   const auto solve_again = [&] {
     out.solution = solve(problem, out.weighting, start);
@@ -196,10 +199,10 @@ Judged judge(const Problem& problem) {
     // Student's weights for six dimensions (Lange, Little and Taylor, J. Am. Stat. Assoc. 84, 881,
     // 1989).
     for (std::size_t b = 0; b < weight.size(); ++b)
-      weight[b] = (kStudent + 6) / (kStudent + 6 * out.chi2[b]);
+      weight[b] = left_out[b] ? 0.0 : (kStudent + 6) / (kStudent + 6 * out.chi2[b]);
   }
   for (int round = 0; round < kRounds; ++round) {
-    out.too_many_outliers = !reject(problem, out.held_out, out.chi2, weight);
+    out.too_many_outliers = !reject(problem, out.held_out, out.chi2, left_out, weight);
     solve_again();
     out.weighting.error = likely_error(problem, out.held_out, weight);
     out.weighting.dispersion = dispersion(problem, out.solution, out.weighting);

@@ -17,6 +17,15 @@ struct Judged {
   bool too_many_outliers = false;  ///< so many steps disagree that none was rejected
 };
 
-Judged judge(const Problem& problem);
+/// `left_out`: blocks that are not used whatever they say.
+Judged judge(const Problem& problem, const std::vector<bool>& left_out);
+
+/// Mean of e^T (V + error)^-1 e / 6 over each block.
+std::vector<double> block_chi2(const Problem& problem,
+                               const std::vector<std::vector<Prediction>>& held_out,
+                               const ErrorModel& error);
+
+/// A block that the others contradict, by more than what model errors are for.
+bool is_outlier(const Problem& problem, const std::vector<Prediction>& held_out, double chi2);
 
 }  // namespace tagwrench::fit
