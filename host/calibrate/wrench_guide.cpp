@@ -52,6 +52,7 @@ void WrenchGuide::ask() {
   asked_at_.reset();
   asked_time_.reset();
   complaint_.clear();
+  steady_since_.reset();
   taking_ = {};
   reminded_ = now_;
   if (todo_.empty()) return;
@@ -155,17 +156,23 @@ void WrenchGuide::reading(const ReferenceSample& sample) {
 
 // ---- Pushes and movements ----
 
-void WrenchGuide::watch_push(double time) {
+/// What a push or a movement counts from; nullptr, and said, where there is nothing to count from
+/// or to be counted.
+const StepRecord* WrenchGuide::rest_of_reference(double time) {
   const StepRecord* rest = last_rest();
   if (rest == nullptr) {
     leave_out("there is no rest to count it from");
-    return;
+    return nullptr;
   }
-  if (!last_reading_ || time - last_reading_->time > kSilence) {
-    phase_ = Phase::waiting;
-    complain_of_silence();
-    return;
-  }
+  if (last_reading_ && time - last_reading_->time <= kSilence) return rest;
+  phase_ = Phase::waiting;
+  complain_of_silence();
+  return nullptr;
+}
+
+void WrenchGuide::watch_push(double time) {
+  const StepRecord* rest = rest_of_reference(time);
+  if (rest == nullptr) return;
   const double force = std::abs(last_reading_->value[0] - mean_reading(*rest)[0]);
   if (phase_ == Phase::waiting) {
     let_go_ = let_go_ || force < kFree * step().force;
@@ -177,16 +184,8 @@ void WrenchGuide::watch_push(double time) {
 }
 
 void WrenchGuide::watch_movement(double time) {
-  const StepRecord* rest = last_rest();
-  if (rest == nullptr) {
-    leave_out("there is no rest to count it from");
-    return;
-  }
-  if (!last_reading_ || time - last_reading_->time > kSilence) {
-    phase_ = Phase::waiting;
-    complain_of_silence();
-    return;
-  }
+  const StepRecord* rest = rest_of_reference(time);
+  if (rest == nullptr) return;
   const Vector6 zero = mean_of(*rest).displacement;
   const TrackedFrame& frame = hold_.frames().back();
   if (phase_ == Phase::waiting) {

@@ -80,6 +80,7 @@ class WrenchGuide {
   void watch_hold();
   void watch_rest(const Hold& hold);
   void watch_mass(const Hold& hold);
+  const StepRecord* rest_of_reference(double time);
   void watch_push(double time);
   void watch_movement(double time);
   void put_before(double time);
@@ -129,6 +130,7 @@ class WrenchGuide {
   std::deque<ReferenceSample> readings_;  ///< of the last seconds
   std::optional<double> first_frame_;     ///< s
   double now_ = 0;                        ///< s, of the latest frame
+  std::optional<double> steady_since_;    ///< s, of the hold that is watched
 };
 
 /// "Fx 92 %  Fy 90 % ..." as a bar of ten per axis.

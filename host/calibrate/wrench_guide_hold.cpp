@@ -17,6 +17,9 @@ constexpr int kMostBumps = 6;    // unattended
 constexpr double kOwnWeight = 0.03;  // of the range: less does not tell how the sensor lies
 constexpr double kTimeToAct = 8.0;   // s that a person has before it is said, or taken as done
 constexpr double kSilence = 1.0;     // s
+// All loads count from the rests: what is steady must have become so before the second that is
+// taken began, else the last of a push or of a swing is in it.
+constexpr double kSettled = 0.5;  // s
 
 /// Part of `felt` along `expected`, and the cosine between them.
 struct Likeness {
@@ -63,13 +66,18 @@ void WrenchGuide::watch_hold() {
     return;
   }
   const bool moved = has_moved(hold);
-  if (!hold.steady) return;
+  if (!hold.steady) {
+    steady_since_.reset();
+    return;
+  }
+  if (!steady_since_) steady_since_ = now_;
   if (step().kind == StepKind::mass) {
     if (moved) watch_mass(hold);
     return;
   }
   // The first rest of a mounting comes after the sensor was turned, but for the very first one.
-  if (last_rest() != nullptr || moved || asks_ == 1) watch_rest(hold);
+  const bool settled = now_ - *steady_since_ >= kSettled;
+  if (settled && (last_rest() != nullptr || moved || asks_ == 1)) watch_rest(hold);
 }
 
 void WrenchGuide::watch_rest(const Hold& hold) {

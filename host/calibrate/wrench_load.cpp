@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 
 #include "host/wrench/known_load.h"
 
@@ -87,6 +88,15 @@ void set_push(const WrenchPlan& plan, int step, const CellForce& force, const Ve
                  .contact_sigma = kContact,
                  .contact_name = fmt::format("contact of push {}", step + 1)},
                 observation);
+  // A force that leans at a point that lies elsewhere: the torque e_k x w_i of either way w_i
+  // across the line and an arm along each axis e_k, which sums up to I + u u^T. Microns times
+  // milliradians are no unknowns of their own: as products of errors that a push shares, they made
+  // the fit sure of how all lines are turned together.
+  observation.products.clear();
+  const double place = std::hypot(point.sigma, kContact);
+  const double apart = std::hypot(kHandLean, plan.line_sigma) * place * force.value;
+  observation.wrench_covariance.bottomRightCorner<3, 3>() +=
+      apart * apart * (Eigen::Matrix3d::Identity() + s.direction * s.direction.transpose());
 }
 
 Vector6 six_axis_wrench(const WrenchPlan& plan, const Vector6& value) {

@@ -21,8 +21,9 @@ struct WrenchData {
   int zero_in_use = 0;  ///< of the first mounting, in which the sensor is used
 };
 
-/// Rests and masses give one observation each, the mean over the hold; pushes and movements one for
-/// each frame (of long ones, for as many as are useful), with what the reference said `lag` before.
+/// Rests and masses give one observation each, the mean over the hold; pushes one a second, frames
+/// and what the reference said `lag` before them averaged alike; movements one for each frame (of
+/// long ones, for as many as are useful).
 /// What displacement and reference drift between two rests is taken out, linearly in time.
 /// `cell_gain_sigma`: relative, of the load cell's calibration. Throws ConfigError if nothing was
 /// recorded but rests, or a reference and the platform have nothing to do with each other at any
@@ -32,7 +33,7 @@ WrenchData collect(const WrenchPlan& plan, const std::vector<StepRecord>& record
 
 /// Fills `predicted` of the data's trial: what the fit, without the step in question, says of each
 /// reading. The readings of a hold share its prediction and differ by their own displacement; of a
-/// push or a movement those frames have one that were observations.
+/// push or a movement those frames have one that were observations or in the middle of one.
 void add_predictions(const WrenchPlan& plan, const WrenchFit& fit, WrenchData& data);
 
 }  // namespace tagwrench

@@ -95,7 +95,11 @@ void add_calibration(const CalibrationRecord& record, study::Analysis& analysis)
                                           : fmt::format("{}: {}", name(axis.state), axis.reason);
     } else if (!report.calibrated && analysis.own_predictions && report.full_scale > 0) {
       report.calibrated = true;
-      remarks.push_back(fmt::format("{}: calibrated, but {}", study::kAxisNames[i], report.reason));
+      // The fit has all readings together and judges the axis; one reading's score cannot.
+      remarks.push_back(fmt::format(
+          "{}: calibrated, its answer known to {:.1f} %; the scores on held-out readings hold the "
+          "reference's own noise, which the load exceeds {:.0f} times only",
+          study::kAxisNames[i], std::max(0.1, 100 * axis.gain_sigma), report.excitation));
     }
   }
   for (const std::string& line : axis_warnings(analysis)) remarks.push_back(line);
