@@ -41,13 +41,14 @@ void Database::fail(int code) const {
   const int error = handle_ ? sqlite3_system_errno(handle_.get()) : 0;
   const bool of_the_system = (code & 0xff) == SQLITE_IOERR || (code & 0xff) == SQLITE_CANTOPEN;
   if (error != 0 && of_the_system) what += std::string(", ") + std::strerror(error);
+  if (error == 0 && of_the_system) what += " (SQLite " + std::to_string(code) + ")";
   // It may quote what a damaged file holds.
   constexpr std::size_t kLongest = 200;
   what = what.substr(0, kLongest);
   for (char& c : what) {
     if (static_cast<unsigned char>(c) < ' ' || static_cast<unsigned char>(c) > '~') c = ' ';
   }
-  throw DatabaseError(what, code);
+  throw DatabaseError(what, code, of_the_system ? error : 0);
 }
 
 void Database::run(const char* sql) {

@@ -15,15 +15,19 @@ struct sqlite3_stmt;
 
 namespace tagwrench::record {
 
-/// What SQLite or the disk said.
+/// What SQLite or the disk said, or what a row holds that cannot be.
 class DatabaseError : public std::runtime_error {
  public:
-  DatabaseError(const std::string& what, int code) : std::runtime_error(what), code_(code) {}
+  DatabaseError(const std::string& what, int code, int system_errno = 0)
+      : std::runtime_error(what), code_(code), system_errno_(system_errno) {}
   /// SQLite's extended result code.
   int code() const noexcept { return code_; }
+  /// The system's errno where it was the disk; 0: not known.
+  int system_errno() const noexcept { return system_errno_; }
 
  private:
   int code_;
+  int system_errno_;
 };
 
 class Database {

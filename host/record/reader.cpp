@@ -4,112 +4,18 @@
 #include <sqlite3.h>
 
 #include <algorithm>
-#include <bit>
 #include <charconv>
-#include <cstring>
 #include <system_error>
 
 #include "host/config_error.h"
 #include "host/record/database.h"
+#include "host/record/rows.h"
 #include "host/record/schema.h"
 
 namespace tagwrench::record {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "blobs are copied as they are");
-
-constexpr int kLargest_px = 16384;
-constexpr std::size_t kLongestText = 1 << 20;
-
-/// ns, so that a damaged file's times can be subtracted and added; 95 years.
-constexpr std::int64_t kLongest_ns = 3'000'000'000'000'000'000;
-
-Duration duration(std::int64_t ns) { return Duration(std::clamp(ns, -kLongest_ns, kLongest_ns)); }
-
-TimePoint time_point(std::int64_t ns) { return TimePoint(duration(ns)); }
-
-std::optional<Status> status_of(std::string_view text) {
-  for (const Status s :
-       {Status::ok, Status::acquiring, Status::lost, Status::doubtful, Status::saturated}) {
-    if (text == name(s)) return s;
-  }
-  return std::nullopt;
-}
-
-std::optional<EventKind> kind_of(std::string_view text) {
-  for (int k = 0; k <= static_cast<int>(EventKind::lost); ++k) {
-    if (text == name(static_cast<EventKind>(k))) return static_cast<EventKind>(k);
-  }
-  return std::nullopt;
-}
-
-std::optional<Keep> keep_of(std::string_view text) {
-  for (const Keep keep : {Keep::raw, Keep::region, Keep::none}) {
-    if (text == name(keep)) return keep;
-  }
-  return std::nullopt;
-}
-
-Vector6 vector6(const Statement& row, int at) {
-  Vector6 v;
-  for (int i = 0; i < 6; ++i) v[i] = row.real(at + i);
-  return v;
-}
-
-/// A part of the picture; empty if the numbers are none.
-Region region(const Statement& row, int at, int width, int height) {
-  std::int64_t n[4];
-  for (int i = 0; i < 4; ++i) n[i] = row.integer(at + i);
-  if (n[0] < 0 || n[1] < 0 || n[2] <= 0 || n[3] <= 0 || n[0] > width || n[1] > height ||
-      n[2] > width - n[0] || n[3] > height - n[1])
-    return {};
-  return {static_cast<int>(n[0]), static_cast<int>(n[1]), static_cast<int>(n[2]),
-          static_cast<int>(n[3])};
-}
-
-std::vector<double> doubles(std::span<const std::uint8_t> blob) {
-  std::vector<double> numbers(blob.size() / sizeof(double));
-  if (!numbers.empty()) std::memcpy(numbers.data(), blob.data(), numbers.size() * sizeof(double));
-  return numbers;
-}
-
-void read_covariance(const std::vector<double>& numbers, Matrix6& covariance) {
-  if (numbers.size() != 21) return;
-  std::size_t n = 0;
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column)
-      covariance(row, column) = covariance(column, row) = numbers[n++];
-  }
-}
-
-void read_corners(const std::vector<double>& numbers, Track& track) {
-  const std::size_t tags = std::min(numbers.size() / 9, track.corners.size());
-  for (std::size_t t = 0; t < tags; ++t) {
-    const double id = numbers[9 * t];
-    if (!(id >= 0 && id < 1e6)) return;
-    track.corners[t].id = static_cast<int>(id);
-    std::copy_n(&numbers[9 * t + 1], 8, track.corners[t].px.begin());
-    track.corner_count = static_cast<std::uint8_t>(t + 1);
-  }
-}
-
-constexpr const char* kFrames =
-    "SELECT f.id, f.seq, f.t_ns, f.dropped, f.fourcc, f.stride,"
-    " f.first_x, f.first_y, f.first_width, f.first_height,"
-    " f.all_x, f.all_y, f.all_width, f.all_height,"
-    " s.output_ns - s.origin_ns, s.touched, f.bytes"
-    " FROM frames f LEFT JOIN samples s ON s.id = f.id ORDER BY f.id";
-constexpr const char* kTroubles =
-    "SELECT e.id, e.kind, e.t_ns, e.text, s.output_ns - s.origin_ns"
-    " FROM events e LEFT JOIN samples s ON s.id = e.id"
-    " WHERE e.kind IN ('missing', 'disconnected', 'reconnected') ORDER BY e.id";
-constexpr const char* kTracks =
-    "SELECT t.id, f.t_ns, t.status, t.hint, t.x, t.y, t.z, t.rx, t.ry, t.rz, t.covariance,"
-    " t.residual_px, t.residual_part, t.blur_px2, t.tags_held, t.corners"
-    " FROM tracks t JOIN frames f ON f.id = t.id ORDER BY t.id";
-constexpr const char* kSamples = "SELECT * FROM samples ORDER BY id";
-constexpr const char* kReferences = "SELECT * FROM reference ORDER BY id";
-constexpr const char* kEvents = "SELECT id, t_ns, kind, step, value, text FROM events ORDER BY id";
+constexpr int kMostKeys = 1000;
 
 /// A crash leaves FILE-wal beside the file. Where nobody else has it open and the folder can be
 /// written, it becomes one file again.
@@ -137,25 +43,49 @@ void withdraw(const Mark& lost, std::vector<Mark>& marks) {
 
 }  // namespace
 
+namespace {
+
+/// Walks through rows whose first column is their id.
+class Walk {
+ public:
+  explicit Walk(const char* sql) : sql_(sql) {}
+
+  /// The next row; false after the last. Throws DatabaseError. In a damaged tree of pages one may
+  /// lead to itself: that ends here, because ids must grow.
+  bool step(Database& database) {
+    if (!rows_) rows_.emplace(database, sql_);
+    if (ended_ || !rows_->step()) {
+      ended_ = true;
+      return false;
+    }
+    const std::int64_t id = rows_->integer(0);
+    if (last_ && id <= *last_) throw DatabaseError("its rows are not in order", SQLITE_CORRUPT);
+    last_ = id;
+    return true;
+  }
+  const Statement& row() const { return *rows_; }
+
+ private:
+  const char* sql_;
+  std::optional<Statement> rows_;
+  std::optional<std::int64_t> last_;
+  bool ended_ = false;
+};
+
+}  // namespace
+
 struct RecordingReader::Cursors {
   explicit Cursors(const std::filesystem::path& path) : database(path, Database::Mode::read) {}
 
-  Statement& cursor(std::optional<Statement>& which, const char* sql) {
-    if (!which) which.emplace(database, sql);
-    return *which;
-  }
-
   Database database;
-  std::optional<Statement> frames;
-  std::optional<Statement> troubles;
-  std::optional<Statement> tracks;
-  std::optional<Statement> samples;
-  std::optional<Statement> references;
-  std::optional<Statement> events;
+  Walk frames{kFrames};
+  Walk troubles{kTroubles};
+  Walk tracks{kTracks};
+  Walk samples{kSamples};
+  Walk references{kReferences};
+  Walk events{kEvents};
   bool frame_waits = false;    ///< `frames` stands on a row that was not handed out
   bool trouble_waits = false;  ///< likewise `troubles`
-  bool frames_ended = false;
-  bool troubles_ended = false;
 };
 
 RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path) {
@@ -188,6 +118,10 @@ RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path
 }
 
 RecordingReader::~RecordingReader() = default;
+
+std::string_view RecordingReader::unclosed() const noexcept {
+  return head_.closed ? "" : "was not closed: its last seconds may be missing";
+}
 
 void RecordingReader::damaged(const std::string& what) const {
   throw ConfigError(fmt::format(
@@ -230,7 +164,8 @@ void RecordingReader::read_head() {
   std::int64_t period = 0;
   std::string keep;
   Statement meta(database, "SELECT key, CAST(value AS TEXT) FROM meta");
-  while (meta.step()) {
+  for (int keys = 0; meta.step(); ++keys) {
+    if (keys == kMostKeys) damaged("its head does not end");
     const std::string key(meta.text(0).substr(0, kLongestText));
     const std::string value(meta.text(1).substr(0, kLongestText));
     std::int64_t number = 0;
@@ -264,7 +199,8 @@ void RecordingReader::read_head() {
   head_.keep = *keep_of(keep);
 
   Statement files(database, "SELECT role, name, content FROM files");
-  while (files.step()) {
+  for (int roles = 0; files.step(); ++roles) {
+    if (roles == kMostKeys) damaged("its files do not end");
     const std::string role(files.text(0));
     const auto bytes = files.blob(2);
     std::string content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -297,146 +233,50 @@ void RecordingReader::check_times() {
 
 bool RecordingReader::next(Entry& entry) try {
   Cursors& c = *cursors_;
-  Statement& frames = c.cursor(c.frames, kFrames);
-  Statement& troubles = c.cursor(c.troubles, kTroubles);
   // The rows that were handed out are left only now: their bytes were still in use.
-  if (!c.frame_waits && !c.frames_ended) {
-    c.frame_waits = frames.step();
-    c.frames_ended = !c.frame_waits;
-  }
-  if (!c.trouble_waits && !c.troubles_ended) {
-    c.trouble_waits = troubles.step();
-    c.troubles_ended = !c.trouble_waits;
-  }
+  if (!c.frame_waits) c.frame_waits = c.frames.step(c.database);
+  if (!c.trouble_waits) c.trouble_waits = c.troubles.step(c.database);
   if (!c.frame_waits && !c.trouble_waits) return false;
-  entry = {};
-  if (c.frame_waits && (!c.trouble_waits || frames.integer(0) <= troubles.integer(0))) {
+  if (c.frame_waits &&
+      (!c.trouble_waits || c.frames.row().integer(0) <= c.troubles.row().integer(0))) {
     c.frame_waits = false;
-    entry.id = frames.integer(0);
-    entry.sequence = static_cast<std::uint64_t>(frames.integer(1));
-    entry.time = time_point(frames.integer(2));
-    entry.dropped = static_cast<std::uint32_t>(
-        std::clamp<std::int64_t>(frames.integer(3), 0, std::numeric_limits<std::uint32_t>::max()));
-    const std::string_view code = frames.text(4);
-    for (std::size_t i = std::min<std::size_t>(code.size(), 4); i-- > 0;)
-      entry.raw.fourcc = entry.raw.fourcc << 8 | static_cast<std::uint8_t>(code[i]);
-    const std::int64_t stride = frames.integer(5);
-    entry.raw.stride = stride < 0 || stride > 8 * kLargest_px ? 0 : static_cast<int>(stride);
-    entry.first = region(frames, 6, head_.width, head_.height);
-    entry.all = region(frames, 10, head_.width, head_.height);
-    if (!frames.is_null(14)) entry.latency = duration(frames.integer(14));
-    entry.touched = frames.integer(15) != 0;
-    entry.raw.bytes = frames.blob(16);
-    entry.crop = code == "CROP";
-    const auto area =
-        static_cast<std::size_t>(entry.all.width) * static_cast<std::size_t>(entry.all.height);
-    if (entry.crop && (entry.first.empty() || !entry.all.contains(entry.first) ||
-                       entry.raw.bytes.size() != area)) {
-      entry.raw.bytes = {};
-    }
-    return true;
+    entry = frame_entry(c.frames.row(), head_);
+  } else {
+    c.trouble_waits = false;
+    entry = trouble_entry(c.troubles.row());
   }
-  c.trouble_waits = false;
-  entry.id = troubles.integer(0);
-  const auto kind = kind_of(troubles.text(1));
-  entry.kind = kind == EventKind::missing        ? Entry::Kind::missing
-               : kind == EventKind::disconnected ? Entry::Kind::disconnected
-                                                 : Entry::Kind::reconnected;
-  entry.time = time_point(troubles.integer(2));
-  entry.text = std::string(troubles.text(3).substr(0, kLongestText));
-  if (!troubles.is_null(4)) entry.latency = duration(troubles.integer(4));
   return true;
 } catch (const DatabaseError& e) {
   damaged(e.what());
 }
 
-bool RecordingReader::next(TrackRecord& record) try {
-  Statement& row = cursors_->cursor(cursors_->tracks, kTracks);
-  if (!row.step()) return false;
-  record = {};
-  record.id = row.integer(0);
-  record.time = time_point(row.integer(1));
-  const auto status = status_of(row.text(2));
-  if (!status) damaged(fmt::format("track {} has an unknown status", record.id));
-  Track& track = record.track;
-  track.status = *status;
-  const std::int64_t hint = row.integer(3);
-  if (hint >= 0 && hint <= static_cast<std::int64_t>(Hint::rest_elsewhere))
-    track.hint = static_cast<Hint>(hint);
-  track.displacement = vector6(row, 4);
-  read_covariance(doubles(row.blob(10)), track.covariance);
-  track.residual_px = row.real(11);
-  track.residual_part = row.real(12);
-  track.blur_px2 = row.real(13);
-  track.tags_held = static_cast<std::uint8_t>(std::clamp<std::int64_t>(row.integer(14), 0, 255));
-  read_corners(doubles(row.blob(15)), track);
+bool RecordingReader::next(TrackRecord& track) try {
+  if (!cursors_->tracks.step(cursors_->database)) return false;
+  track = track_record(cursors_->tracks.row());
   return true;
 } catch (const DatabaseError& e) {
   damaged(e.what());
 }
 
 bool RecordingReader::next(Sample& sample) try {
-  Statement& row = cursors_->cursor(cursors_->samples, kSamples);
-  if (!row.step()) return false;
-  sample = {};
-  sample.sequence = static_cast<std::uint64_t>(row.integer(1));
-  sample.capture_time = time_point(row.integer(2));
-  sample.latency_origin = time_point(row.integer(3));
-  sample.output_time = time_point(row.integer(4));
-  sample.dropped = static_cast<std::uint32_t>(
-      std::clamp<std::int64_t>(row.integer(5), 0, std::numeric_limits<std::uint32_t>::max()));
-  const auto status = status_of(row.text(6));
-  if (!status) damaged(fmt::format("sample {} has an unknown status", row.integer(0)));
-  sample.status = *status;
-  sample.displacement = vector6(row, 7);
-  sample.displacement_sigma = vector6(row, 13);
-  sample.wrench = vector6(row, 19);
-  sample.wrench_sigma = vector6(row, 25);
-  sample.zero = vector6(row, 31);
-  sample.motion = vector6(row, 37);
-  sample.zero_state = static_cast<ZeroState>(
-      std::clamp<std::int64_t>(row.integer(43), 0, static_cast<int>(ZeroState::following)));
-  sample.touched = row.integer(44) != 0;
+  if (!cursors_->samples.step(cursors_->database)) return false;
+  sample = sample_record(cursors_->samples.row());
   return true;
 } catch (const DatabaseError& e) {
   damaged(e.what());
 }
 
 bool RecordingReader::next(ReferenceRecord& reading) try {
-  Statement& row = cursors_->cursor(cursors_->references, kReferences);
-  if (!row.step()) return false;
-  reading = {};
-  reading.id = row.integer(0);
-  reading.time = time_point(row.integer(1));
-  reading.time_sigma = duration(row.integer(2));
-  reading.channel = static_cast<int>(std::clamp<std::int64_t>(row.integer(3), 0, 255));
-  reading.axes = row.integer(4) == 6 ? 6 : 1;
-  reading.saturated = row.integer(5) != 0;
-  reading.lost_before = static_cast<std::uint32_t>(
-      std::clamp<std::int64_t>(row.integer(6), 0, std::numeric_limits<std::uint32_t>::max()));
-  for (int i = 0; i < 6; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    reading.counts[at] = row.real(7 + i);
-    reading.value[at] = row.real(13 + i);
-    reading.sigma[at] = row.real(19 + i);
-  }
+  if (!cursors_->references.step(cursors_->database)) return false;
+  reading = reference_record(cursors_->references.row());
   return true;
 } catch (const DatabaseError& e) {
   damaged(e.what());
 }
 
 bool RecordingReader::next(EventRecord& event) try {
-  Statement& row = cursors_->cursor(cursors_->events, kEvents);
-  if (!row.step()) return false;
-  event = {};
-  event.id = row.integer(0);
-  event.time = time_point(row.integer(1));
-  const auto kind = kind_of(row.text(2));
-  if (!kind) damaged(fmt::format("event {} is of an unknown kind", event.id));
-  event.kind = *kind;
-  event.step = static_cast<int>(std::clamp<std::int64_t>(row.integer(3), -1, 1'000'000));
-  event.value = row.integer(4);
-  event.text = std::string(row.text(5).substr(0, kLongestText));
+  if (!cursors_->events.step(cursors_->database)) return false;
+  event = event_record(cursors_->events.row());
   return true;
 } catch (const DatabaseError& e) {
   damaged(e.what());
@@ -444,21 +284,13 @@ bool RecordingReader::next(EventRecord& event) try {
 
 std::vector<Mark> RecordingReader::marks() const try {
   std::vector<Mark> marks;
-  Statement row(cursors_->database,
-                "SELECT t_ns, step, value, id FROM events WHERE kind = 'mark' ORDER BY id");
-  while (row.step()) {
-    const std::int64_t step = row.integer(1);
-    if (step < 0 || step > 1'000'000) damaged(fmt::format("a mark is of step {}", step));
-    const std::int64_t value = row.integer(2);
-    if (value < kMarkWithdrawn || value > 1'000'000)
-      damaged(fmt::format("a mark has the value {}", value));
-    const Mark mark{static_cast<int>(step), value >= kMarkBegins, time_point(row.integer(0)),
-                    row.integer(3),
-                    static_cast<int>(std::max<std::int64_t>(value - kMarkBegins, 0))};
-    if (value == kMarkWithdrawn)
-      withdraw(mark, marks);
+  Walk walk(kMarks);
+  while (walk.step(cursors_->database)) {
+    const MarkRecord record = mark_record(walk.row());
+    if (record.withdrawn)
+      withdraw(record.mark, marks);
     else
-      marks.push_back(mark);
+      marks.push_back(record.mark);
   }
   return marks;
 } catch (const DatabaseError& e) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host/record/records.h"
@@ -59,6 +60,9 @@ class RecordingReader {
 
   const std::filesystem::path& path() const noexcept { return path_; }
   const Head& head() const noexcept { return head_; }
+  /// For people, without the file's name: what may be missing because the writer did not come to
+  /// its end. Empty: it did.
+  std::string_view unclosed() const noexcept;
   /// Of all frames; they grow.
   const std::vector<TimePoint>& frame_times() const noexcept { return times_; }
 

@@ -5,10 +5,12 @@
 
 #include <cerrno>
 #include <cstring>
+#include <system_error>
 
 #include "host/config_error.h"
 #include "host/os/unique_fd.h"
 #include "host/record/schema.h"
+#include "host/record/trouble.h"
 
 namespace tagwrench::record {
 namespace {
@@ -58,12 +60,21 @@ Database prepared(const std::filesystem::path& path) {
   return database;
 }
 
+/// What was made of a file that cannot be written goes, so that its name is free again.
+ConfigError not_begun(const std::filesystem::path& path, const DatabaseError& error) {
+  const std::string line = write_trouble(path, error, "nothing was recorded");
+  for (const char* part : {"", "-wal", "-shm", "-journal"}) {
+    std::error_code ignored;
+    std::filesystem::remove(path.string() + part, ignored);
+  }
+  return ConfigError(line);
+}
+
 Database open_new(const std::filesystem::path& path) {
   try {
     return prepared(path);
   } catch (const DatabaseError& e) {
-    throw ConfigError(fmt::format("{}: cannot be written: {}; choose another disk or folder",
-                                  path.string(), e.what()));
+    throw not_begun(path, e);
   }
 }
 
@@ -91,8 +102,7 @@ Sink::Sink(const std::filesystem::path& path, const Head& head)
     write_head(head);
     commit();
   } catch (const DatabaseError& e) {
-    throw ConfigError(fmt::format("{}: cannot be written: {}; choose another disk or folder",
-                                  path.string(), e.what()));
+    throw not_begun(path, e);
   }
 }
 

@@ -6,12 +6,13 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstring>
 #include <new>
 #include <system_error>
+#include <utility>
 
 #include "host/config_error.h"
 #include "host/record/sink.h"
+#include "host/record/trouble.h"
 
 namespace tagwrench::record {
 namespace {
@@ -47,6 +48,12 @@ ByteRing taken_ring(const WriterOptions& options, const Head& head) try {
       "{}: no memory for a buffer of {} MB; close other programs, or ask the camera for "
       "a smaller picture",
       options.path.string(), buffer_bytes(options, head) >> 20));
+}
+
+/// From here on a limit on the size of files is an error, not a signal that kills.
+std::unique_ptr<Sink> new_sink(const WriterOptions& options, const Head& head) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  return std::make_unique<Sink>(options.path, head);
 }
 
 std::uint64_t size_of(const std::filesystem::path& path) {
@@ -90,9 +97,8 @@ RecordingWriter::RecordingWriter(const WriterOptions& options, const Head& head)
     : options_(options),
       keep_(head.keep),
       ring_(taken_ring(options, head)),
-      sink_(std::make_unique<Sink>(options.path, head)) {
-  // A disk that is full shall be an error, not a signal; and signals are for the loop's thread.
-  std::signal(SIGXFSZ, SIG_IGN);
+      sink_(new_sink(options, head)) {
+  // Signals are for the loop's thread.
   sigset_t all;
   sigset_t before;
   sigfillset(&all);
@@ -257,8 +263,7 @@ void RecordingWriter::write() noexcept {
     } catch (const std::exception& e) {
       transaction = {};
       sink_->roll_back();
-      const auto* database = dynamic_cast<const DatabaseError*>(&e);
-      fail(database != nullptr ? database->code() : 0, e.what());
+      fail(e);
     }
   }
   close();
@@ -280,6 +285,10 @@ void RecordingWriter::drain(Transaction& transaction, bool all) {
     transaction.bytes += record.size();
     transaction.within_frame = item.kind == ItemKind::frame || item.kind == ItemKind::track;
     take(item);
+    if (item.kind == ItemKind::frame) {
+      transaction.last = static_cast<const Filled<FrameRow>&>(item).row.capture_time;
+      if (kept_frames_ + transaction.frames++ == 0) first_kept_ = transaction.last;
+    }
   }
   const Duration patience =
       transaction.within_frame ? 2 * options_.commit_period : options_.commit_period;
@@ -313,8 +322,10 @@ void RecordingWriter::take(const Item& item) {
 }
 
 void RecordingWriter::commit(Transaction& transaction) {
-  transaction = {};
+  const Transaction ended = std::exchange(transaction, {});
   sink_->commit();
+  kept_frames_ += ended.frames;
+  if (ended.frames > 0) last_kept_ = ended.last;
   const std::uint64_t log = size_of(options_.path.string() + "-wal");
   bytes_ = size_of(options_.path) + log;
   std::error_code error;
@@ -322,18 +333,22 @@ void RecordingWriter::commit(Transaction& transaction) {
   if (error) return;
   disk_free_ = space.available;
   // Ended while the log can still be moved into the file.
-  if (space.available < log + kDiskReserve) fail(SQLITE_FULL, "");
+  if (space.available < log + kDiskReserve) throw DatabaseError("disk full", SQLITE_FULL);
 }
 
-void RecordingWriter::fail(int code, const char* what) noexcept {
+/// What of the recording is on the disk.
+std::string RecordingWriter::kept() const {
+  if (kept_frames_ == 0) return "none of its frames is kept";
+  if (kept_frames_ == 1) return "its first frame is kept";
+  return fmt::format("its first {} frames, {:.3g} s, are kept", kept_frames_,
+                     std::chrono::duration<double>(last_kept_ - first_kept_).count());
+}
+
+void RecordingWriter::fail(const std::exception& error) noexcept {
   try {
-    const bool full =
-        (code & 0xff) == SQLITE_FULL || std::strstr(what, "File too large") != nullptr;
-    std::string line = fmt::format(
-        "{}: {}; what was recorded until then is kept; {}", options_.path.string(),
-        full ? "the disk is full" : fmt::format("cannot be written: {}", what),
-        full ? "free some space, choose another disk, or keep less of each frame (--keep region)"
-             : "look at the disk, and choose another file");
+    const auto* database = dynamic_cast<const DatabaseError*>(&error);
+    std::string line = write_trouble(
+        options_.path, database != nullptr ? *database : DatabaseError(error.what(), 0), kept());
     const std::scoped_lock lock(mutex_);
     if (failure_.empty()) failure_ = std::move(line);
   } catch (const std::exception&) {
@@ -342,14 +357,17 @@ void RecordingWriter::fail(int code, const char* what) noexcept {
   failed_.store(true, std::memory_order_release);
 }
 
+/// What failed on the way is not marked as closed: its end is missing.
 void RecordingWriter::close() noexcept {
-  try {
-    sink_->begin();
-    sink_->meta("closed", "1");
-    sink_->commit();
-  } catch (const DatabaseError& e) {
-    sink_->roll_back();
-    fail(e.code(), e.what());
+  if (!failed_) {
+    try {
+      sink_->begin();
+      sink_->meta("closed", "1");
+      sink_->commit();
+    } catch (const DatabaseError& e) {
+      sink_->roll_back();
+      fail(e);
+    }
   }
   sink_->close();
 }

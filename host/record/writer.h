@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -82,6 +83,8 @@ class RecordingWriter {
     bool open = false;
     TimePoint began{};
     std::size_t bytes = 0;
+    std::uint64_t frames = 0;
+    TimePoint last{};           ///< of those
     bool within_frame = false;  ///< its track or sample may still come
 
     Duration age() const noexcept {
@@ -100,7 +103,8 @@ class RecordingWriter {
   void take(const Item& item);
   void drain(Transaction& transaction, bool all);
   void commit(Transaction& transaction);
-  void fail(int code, const char* what) noexcept;
+  void fail(const std::exception& error) noexcept;
+  std::string kept() const;
   void close() noexcept;
 
   WriterOptions options_;
@@ -110,6 +114,10 @@ class RecordingWriter {
   std::int64_t id_ = 0;        ///< of what was handed over last
   std::int64_t frame_id_ = 0;  ///< of the last frame
   std::uint64_t lost_told_ = 0;
+  // Of the writing thread: what has been committed.
+  std::uint64_t kept_frames_ = 0;
+  TimePoint first_kept_{};
+  TimePoint last_kept_{};
 
   std::atomic<std::uint64_t> frames_{0};
   std::atomic<std::uint64_t> lost_frames_{0};

@@ -34,9 +34,12 @@ RecordingSource::RecordingSource(std::unique_ptr<record::RecordingReader> record
   const std::vector<TimePoint>& times = recording_->frame_times();
   first_ = times.front();
   const double seconds = std::chrono::duration<double>(times.back() - first_).count();
-  format_.description = fmt::format("{}: {} frames in {:.4g} s, {}x{}, of {} ({}){}", file,
-                                    times.size(), seconds, head.width, head.height, head.source,
-                                    head.created, fast ? ", as fast as they can go" : "");
+  format_.description =
+      fmt::format("{}: {} {} in {:.4g} s, {}x{}, of {} ({}){}", file, times.size(),
+                  times.size() == 1 ? "frame" : "frames", seconds, head.width, head.height,
+                  head.source, head.created, fast ? ", as fast as they can go" : "");
+  if (const auto unclosed = recording_->unclosed(); !unclosed.empty())
+    format_.description += fmt::format("; it {}", unclosed);
   picture_.resize(static_cast<std::size_t>(head.width) * static_cast<std::size_t>(head.height));
   if (fast) return;
   timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));

@@ -128,6 +128,8 @@ int ExportCommand::run() const {
     throw ConfigError(
         "export: nothing was asked for; give --csv, --paper, --frames, --references or --events");
   }
+  if (const record::RecordingReader reader(recording_); !reader.unclosed().empty())
+    tell(fmt::format("{} {}", recording_, reader.unclosed()));
   if (!csv_.empty()) export_samples(recording_, csv_, force_);
   if (!references_.empty()) export_references(recording_, references_, force_);
   if (!events_.empty()) export_events(recording_, events_, force_);

@@ -14,6 +14,7 @@
 #include "host/config_error.h"
 #include "host/source/recording.h"
 #include "host/tell.h"
+#include "host/verbs/count_text.h"
 #include "host/verbs/export_command.h"
 #include "host/verbs/recording_sensor.h"
 
@@ -126,7 +127,7 @@ void export_frames(const std::string& recording, const std::string& folder) {
   write(partial.path() / "frames.csv", times, nullptr, 0);
   write_recorded_sensor(head, partial.path());
   partial.finish();
-  tell(fmt::format("{} frames in {}{}", count, folder,
+  tell(fmt::format("{} in {}{}", count_text(static_cast<std::uint64_t>(count), "frame"), folder,
                    head.keep == record::Keep::region
                        ? ", black where nothing was kept: replay the recording itself for samples"
                        : ""));

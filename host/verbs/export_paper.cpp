@@ -16,6 +16,7 @@
 
 #include "host/config_error.h"
 #include "host/tell.h"
+#include "host/verbs/count_text.h"
 #include "host/verbs/export_command.h"
 #include "host/verbs/recording_sensor.h"
 
@@ -173,7 +174,7 @@ std::size_t export_reference(const std::string& recording, const std::string& pa
 void export_paper(const std::string& recording, const std::string& prefix, bool force) {
   const std::size_t tags = export_tags(recording, prefix + "_arucotagData.csv", force);
   const std::size_t readings = export_reference(recording, prefix + "_optoforceData.csv", force);
-  tell(fmt::format("{} rows of tags, {}", tags,
+  tell(fmt::format("{} of tags, {}", count_text(tags, "row"),
                    readings > 0 ? fmt::format("{} of the reference", readings)
                                 : "none of a reference: no six-axis sensor was recorded"));
 }

@@ -14,6 +14,7 @@
 
 #include "host/config/sensor_edit.h"
 #include "host/config_error.h"
+#include "host/verbs/count_text.h"
 #include "host/verbs/recording_sensor.h"
 
 namespace tagwrench {
@@ -146,8 +147,8 @@ std::string Recording::progress() {
   last_line_ = now;
   std::string line = fmt::format("recording: {:.1f} frames/s, {} dropped", rate, dropped_);
   if (state.lost_frames > 0 || state.lost_others > 0) {
-    line += fmt::format(", {} frames and {} other rows lost by a slow disk", state.lost_frames,
-                        state.lost_others);
+    line += fmt::format(", {} and {} lost by a slow disk", count_text(state.lost_frames, "frame"),
+                        count_text(state.lost_others, "other row"));
   }
   line += fmt::format(", {} at {}/s, {} left on the disk ({})",
                       bytes_text(static_cast<double>(state.bytes)), bytes_text(speed),
@@ -167,13 +168,12 @@ std::string Recording::progress() {
 
 std::string Recording::summary() const {
   const record::WriterState state = writer_.state();
-  std::string line = fmt::format("{}: {} frames, {}", file_, state.frames,
+  std::string line = fmt::format("{}: {}, {}", file_, count_text(state.frames, "frame"),
                                  bytes_text(static_cast<double>(state.bytes)));
   if (state.lost_frames > 0 || state.lost_others > 0) {
-    line += fmt::format(
-        "; the disk was too slow for {} frames and {} other rows; --keep region "
-        "keeps less",
-        state.lost_frames, state.lost_others);
+    line += fmt::format("; the disk was too slow for {} and {}; --keep region keeps less",
+                        count_text(state.lost_frames, "frame"),
+                        count_text(state.lost_others, "other row"));
   }
   return line;
 }

@@ -25,6 +25,7 @@
 #include "host/source/region_source.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/tell.h"
+#include "host/verbs/count_text.h"
 
 namespace tagwrench {
 namespace {
@@ -283,9 +284,10 @@ bool end_recording(std::unique_ptr<Output> output) {
 
 std::string summary(const RunReport& report, const SensorConfig& sensor) {
   const double seconds = std::chrono::duration<double>(report.elapsed).count();
-  std::string line = fmt::format(
-      "{} frames in {:.2f} s ({:.1f} Hz), {} with numbers, {} dropped by the source", report.frames,
-      seconds, seconds > 0 ? report.frames / seconds : 0.0, report.with_numbers, report.dropped);
+  std::string line =
+      fmt::format("{} in {:.2f} s ({:.1f} Hz), {} with numbers, {} dropped by the source",
+                  count_text(static_cast<std::uint64_t>(report.frames), "frame"), seconds,
+                  seconds > 0 ? report.frames / seconds : 0.0, report.with_numbers, report.dropped);
   if (report.skipped > 0)
     line += fmt::format(", {} samples not taken by slow readers", report.skipped);
   if (report.frames > 0 && report.with_numbers == 0) {

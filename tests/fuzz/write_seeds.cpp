@@ -1,9 +1,11 @@
 // write_seeds DIR: one example of every message kind as first inputs of the fuzzers, in DIR/frames,
-// DIR/messages, DIR/streams and DIR/board.
+// DIR/messages, DIR/streams and DIR/board; and recordings that are as they should be, in
+// DIR/recordings.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 
+#include "tests/fuzz/recording_rows.h"
 #include "tests/unit/protocol/messages.h"
 
 namespace {
@@ -21,6 +23,55 @@ void write(const std::filesystem::path& path, const Bytes& bytes) {
 
 void append(Bytes& stream, const Bytes& frame) {
   stream.insert(stream.end(), frame.begin(), frame.end());
+}
+
+using namespace tagwrench::fuzz;
+
+/// A frame with its track and sample.
+void add_frame(RowWriter& rows, Word fourcc) {
+  rows.row(Table::frames).next().same().same().same().small(0).words(fourcc).small(8);
+  for (int region = 0; region < 2; ++region) rows.small(0).small(0).small(8).small(6);
+  rows.blob(Bytes(48, 40));
+  rows.row(Table::tracks).same().words(Word::ok).small(0);
+  for (int i = 0; i < 6; ++i) rows.real(1e-3 * i);
+  rows.reals(21, 1e-6).real(0.2).real(0.1).real(1).small(2).reals(18, 5);
+  rows.row(Table::samples).same().same().same().same().same().small(0).words(Word::ok);
+  for (int i = 0; i < 36; ++i) rows.real(1e-3 * i);
+  rows.small(1).small(0);
+}
+
+/// A recording with something in every table: three frames, one that is missing, readings, a step
+/// that was withdrawn and done again.
+RowWriter recording() {
+  RowWriter rows;
+  for (const Word fourcc : {Word::grey, Word::grey, Word::crop}) add_frame(rows, fourcc);
+  for (const int axes : {1, 6}) {
+    rows.row(Table::reference).next().next().small(100).small(0).small(axes).small(0).small(0);
+    for (int i = 0; i < 18; ++i) rows.real(i);
+  }
+  for (const Word kind : {Word::missing, Word::disconnected, Word::reconnected, Word::note})
+    rows.row(Table::events).next().next().words(kind).small(-1).small(0).words(Word::note);
+  for (const int value : {1, 0, -1, 2})
+    rows.row(Table::events).next().next().words(Word::mark).small(0).small(value).null();
+  rows.row(Table::files).words(Word::appearance).words(Word::note).blob(Bytes(20, 1));
+  return rows;
+}
+
+/// Numbers that no recording has; in the order of a frame's rows: frame, track, sample.
+RowWriter impossible() {
+  constexpr int kFrame = 2;
+  constexpr int kTrack = 1;
+  constexpr int kSample = 0;
+  constexpr std::uint8_t kLowest = 0;  // of kEdges
+  constexpr std::uint8_t kHighest = 1;
+  RowWriter rows = recording();
+  add_frame(rows, Word::grey);
+  rows.change(kSample, 3).edge(kLowest).change(kSample, 4).edge(kHighest);  // a latency
+  add_frame(rows, Word::grey);
+  rows.change(kTrack, 14).reals(9 * 20, 5).change(kTrack, 9).reals(200, 1);  // corners, covariance
+  add_frame(rows, Word::crop);
+  rows.change(kFrame, 15).blob(Bytes(7, 1));  // fewer bytes than pixels
+  return rows;
 }
 
 }  // namespace
@@ -51,6 +102,10 @@ int main(int argc, char** argv) try {
   write(dir / "streams" / "requests", requests);
   write(dir / "streams" / "reports", reports);
   write(dir / "board" / "requests", board);
+  write(dir / "recordings" / "whole", recording().bytes());
+  write(dir / "recordings" / "impossible", impossible().bytes());
+  write(dir / "recordings" / "damaged",
+        recording().change(6, 1).null().damage(100, 0).damage(3000, 0xff).bytes());
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "write_seeds: " << error.what() << '\n';

@@ -1,7 +1,11 @@
 // A disk that is full ends a recording, and what was there stays readable.
+#include <sqlite3.h>
 #include <sys/resource.h>
 
+#include <cerrno>
+
 #include "host/record/database.h"
+#include "host/record/trouble.h"
 #include "tests/unit/record/recorded.h"
 
 namespace tagwrench::record::test {
@@ -24,13 +28,18 @@ TEST_F(DiskFull, EndsWithOneLineAndKeepsWhatWasThere) {
   limit(3 << 20);
   int frames = 0;
   for (; !writer.state().failed; frames += 10) write_frames(writer, frames, frames + 10);
+  limit(before_.rlim_cur);  // as if somebody had made room: the end is missing all the same
   const std::string line = writer.finish();
-  limit(before_.rlim_cur);
   EXPECT_NE(line.find("r.twr"), std::string::npos) << line;
-  EXPECT_NE(line.find("what was recorded until then is kept"), std::string::npos) << line;
+  EXPECT_NE(line.find("could not grow: files may have 3.15 MB here"), std::string::npos) << line;
   EXPECT_EQ(line.find('\n'), std::string::npos);
 
   RecordingReader reader(path());
+  EXPECT_FALSE(reader.head().closed) << "its end is missing";
+  EXPECT_NE(reader.unclosed(), "");
+  EXPECT_NE(line.find("its first " + std::to_string(reader.frame_times().size()) + " frames, "),
+            std::string::npos)
+      << reader.frame_times().size() << " frames; " << line;
   EXPECT_GT(reader.frame_times().size(), 50U);
   EXPECT_LT(reader.frame_times().size(), static_cast<std::size_t>(frames));
   int read = 0;
@@ -44,6 +53,27 @@ TEST_F(DiskFull, EndsWithOneLineAndKeepsWhatWasThere) {
   Statement check(database, "PRAGMA integrity_check");
   ASSERT_TRUE(check.step());
   EXPECT_EQ(check.text(0), "ok");
+}
+
+TEST_F(DiskFull, WhatCannotBeBegunLeavesNoFile) {
+  limit(40 << 10);
+  const std::string line =
+      refusal([&] { RecordingWriter writer({.path = path(), .lossless = true}, head()); });
+  limit(before_.rlim_cur);
+  EXPECT_NE(line.find("could not grow"), std::string::npos) << line;
+  EXPECT_NE(line.find("nothing was recorded"), std::string::npos) << line;
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST_F(DiskFull, TheCauseIsNamed) {
+  const auto trouble = [&](int code, int system_errno) {
+    return write_trouble(path(), DatabaseError("disk I/O error", code, system_errno), "all kept");
+  };
+  EXPECT_NE(trouble(SQLITE_FULL, 0).find("the disk is full; all kept; free"), std::string::npos);
+  EXPECT_NE(trouble(SQLITE_IOERR_WRITE, EFBIG).find("no larger files (FAT"), std::string::npos);
+  EXPECT_NE(trouble(SQLITE_IOERR_WRITE, EDQUOT).find("your quota"), std::string::npos);
+  EXPECT_NE(trouble(SQLITE_IOERR_SHMSIZE, ENOSPC).find("the disk is full"), std::string::npos);
+  EXPECT_EQ(trouble(SQLITE_IOERR_WRITE, EIO).find("could not grow"), std::string::npos);
 }
 
 TEST_F(DiskFull, ALoopThatGoesOnIsNotHeldUp) {

@@ -67,6 +67,8 @@ TEST_F(RoundTrip, EverythingReadsBackToTheSameBits) {
   EventRecord event;
   ASSERT_TRUE(reader.next(event));
   EXPECT_EQ(event.text, "a note");
+  EXPECT_EQ(reader.marks()[0].id, event.id + 1);
+  EXPECT_EQ(reader.marks()[1].id, event.id + 2);
 }
 
 TEST_F(RoundTrip, AMissingFrameAndALostCameraKeepTheirPlaces) {
