@@ -25,19 +25,24 @@ void check_options(const AnalysisOptions& options) {
     throw ConfigError("--lag-from and --lag-to: the first must be the smaller one");
 }
 
+/// The file, where it came from one: two files may bear one name.
+const std::string& called(const Trial& trial) {
+  return trial.file.empty() ? trial.name : trial.file;
+}
+
 /// Two of one would not hold anything out; those of two sensors have no stiffness in common.
 void check_apart(const Trial& a, const Trial& b) {
   const bool same_shape =
       a.time.size() == b.time.size() && a.reference.size() == b.reference.size();
   if (same_shape && a.time == b.time && a.features == b.features && a.reference == b.reference) {
     throw ConfigError(
-        fmt::format("{} and {}: are the same data twice; name each once", a.name, b.name));
+        fmt::format("{} and {}: are the same data twice; name each once", called(a), called(b)));
   }
   if (!a.sensor.empty() && !b.sensor.empty() && a.sensor != b.sensor) {
     throw ConfigError(fmt::format(
         "{} and {}: are of different sensors, or of one whose camera or target was calibrated "
         "between them; analyze them one by one",
-        a.name, b.name));
+        called(a), called(b)));
   }
 }
 
@@ -47,7 +52,7 @@ void check_features(const std::vector<Trial>& trials) {
     if (trial.feature_names != trials[0].feature_names) {
       throw ConfigError(
           fmt::format("{} and {}: their features differ ({} and {}); analyze them one by one",
-                      trials[0].name, trial.name, fmt::join(trials[0].feature_names, " "),
+                      called(trials[0]), called(trial), fmt::join(trials[0].feature_names, " "),
                       fmt::join(trial.feature_names, " ")));
     }
   }

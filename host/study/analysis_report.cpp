@@ -21,14 +21,27 @@ std::string percent(double value) {
   return std::isfinite(value) ? fmt::format("{:.2f}", value) : "-";
 }
 
-std::string score(double value) {
-  return std::isfinite(value) ? fmt::format("{:.4f}", value) : "-";
+/// How far below nothing a prediction is does not matter in the end.
+std::string score(double value, int decimals) {
+  if (value < -10) return "<-10";
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "-";
 }
 
-/// Decimals that show a range to four digits of its larger end.
-int range_decimals(double full_scale) {
-  return full_scale > 0 ? std::clamp(3 - static_cast<int>(std::floor(std::log10(full_scale))), 0, 7)
-                        : 0;
+/// Before the point; 0.07 has -1.
+int digits(double value) { return static_cast<int>(std::floor(std::log10(value))) + 1; }
+
+/// Of all ranges, so that they can be compared down the column: enough for four digits of the
+/// smallest full scale, if that leaves room for the largest.
+int range_decimals(const Analysis& a) {
+  constexpr int kRoom = 9;  // digits
+  int decimals = 0;
+  int most = kRoom;
+  for (const AxisReport& axis : a.axis) {
+    if (axis.full_scale <= 0) continue;
+    if (axis.calibrated) decimals = std::max(decimals, 4 - digits(axis.full_scale));
+    most = std::min(most, kRoom - digits(axis.full_scale));
+  }
+  return std::clamp(decimals, 0, std::clamp(most, 0, 7));
 }
 
 std::string times(double value) { return value > 1000 ? ">1000" : fmt::format("{:.3g}", value); }
@@ -51,22 +64,22 @@ void add_head(Out out, const Analysis& a) {
 }
 
 void add_scores(Out out, const Analysis& a) {
-  fmt::format_to(out, "{:<5}{:>10}{:>10}  {:<4}{:>8}{:>8}{:>11}{:>7}{:>8}{:>7}{:>9}{:>8}\n", "axis",
+  fmt::format_to(out, "{:<5}{:>12}{:>12}  {:<4}{:>8}{:>8}{:>11}{:>7}{:>8}{:>7}{:>9}{:>8}\n", "axis",
                  "from", "to", "", "R2 in", "R2 held", "RMSE", "% FS", "non-lin", "hyst.",
                  "excited", "alone");
   // Predictions that a calibration brought have figures, whatever these data alone could show.
   const char* not_calibrated = a.own_predictions ? "  see below" : "  not calibrated";
+  const int decimals = range_decimals(a);
   for (std::size_t k = 0; k < 6; ++k) {
     const AxisReport& x = a.axis[k];
-    const int decimals = range_decimals(x.full_scale);
-    fmt::format_to(out, "{:<5}{:>10.{}f}{:>10.{}f}  {:<4}", kAxisNames[k], x.range_low, decimals,
+    fmt::format_to(out, "{:<5}{:>12.{}f}{:>12.{}f}  {:<4}", kAxisNames[k], x.range_low, decimals,
                    x.range_high, decimals, kAxisUnits[k]);
     if (x.full_scale == 0) {
       fmt::format_to(out, "  not calibrated\n");
       continue;
     }
     fmt::format_to(out, "{:>8}{:>8}{:>11.3g}{:>7.2f}{:>8}{:>7}{:>9}{:>8}{}\n",
-                   score(x.r2_in_sample), score(x.r2), x.rmse, x.rmse_percent,
+                   score(x.r2_in_sample, 4), score(x.r2, 4), x.rmse, x.rmse_percent,
                    percent(x.nonlinearity_percent), percent(x.hysteresis_percent),
                    times(x.excitation), times(x.independent), x.calibrated ? "" : not_calibrated);
   }
@@ -118,8 +131,7 @@ void add_folds(Out out, const Analysis& a) {
                    !fold.lag_sought ? "-"
                    : fold.lag.known ? fmt::format("{:.1f}", 1e3 * fold.lag.value)
                                     : "?");
-    for (const double r2 : fold.r2)
-      fmt::format_to(out, "{:>9}", std::isfinite(r2) ? fmt::format("{:.3f}", r2) : "-");
+    for (const double r2 : fold.r2) fmt::format_to(out, "{:>9}", score(r2, 3));
     fmt::format_to(out, "\n");
   }
   fmt::format_to(out, "- where no lag was looked for, or the reference did no more than waver\n");

@@ -26,6 +26,8 @@ constexpr std::array kLoadUnits{Unit{"N", 1},      Unit{"mN", 1e-3},  Unit{"Nm",
                                 Unit{"mNm", 1e-3}, Unit{"Nmm", 1e-3}, Unit{"gf", 9.80665e-3}};
 constexpr std::array kTimeUnits{Unit{"s", 1}, Unit{"ms", 1e-3}, Unit{"us", 1e-6}, Unit{"ns", 1e-9}};
 
+constexpr double kLeastWeight = 1e-6;  // of a smoothing that can be undone
+
 template <std::size_t N>
 const Unit* find_unit(const std::array<Unit, N>& units, std::string_view name) {
   const auto at =
@@ -66,7 +68,7 @@ Rows rows_in_order(const DelimitedText& text, const std::string& column, double 
   std::size_t repeated = 0;
   double before = 0;
   for (std::size_t row = 0; row < text.rows(); ++row) {
-    const double time = text.number(row, found[0]) * unit;
+    const double time = text.number(row, found[0], DelimitedText::kLargest / unit) * unit;
     if (row > 0 && time < before) {
       throw ConfigError(
           fmt::format("{}: time runs backwards, {} s after {} s; put the rows in "
@@ -84,8 +86,8 @@ Rows rows_in_order(const DelimitedText& text, const std::string& column, double 
     times.push_back(time);
   }
   if (repeated > 0) {
-    notes.push_back(fmt::format("{}: {} rows with the time of the row before them left out",
-                                text.name(), repeated));
+    notes.push_back(fmt::format("{}: {} with the time of the row before left out", text.name(),
+                                repeated == 1 ? "1 row" : fmt::format("{} rows", repeated)));
   }
   if (times.size() < 2) {
     throw ConfigError(
@@ -231,10 +233,10 @@ FeatureColumns parse_feature_columns(const std::string& text, const std::string&
                part.find_first_not_of("xyz", 6) == std::string::npos) {
       columns.euler = part.substr(6);
     } else if (part.starts_with("unsmooth=")) {
-      if (!parse_number(part.substr(9), columns.unsmooth) || columns.unsmooth <= 0 ||
+      if (!parse_number(part.substr(9), columns.unsmooth) || columns.unsmooth < kLeastWeight ||
           columns.unsmooth > 1)
-        throw ConfigError(
-            fmt::format("{} {}: the weight of a smoothing is above 0 and at most 1", option, text));
+        throw ConfigError(fmt::format("{} {}: the weight of a smoothing is from {:g} to 1", option,
+                                      text, kLeastWeight));
     } else {
       throw unknown(option, text, part,
                     names(kFeatureUnits) + " euler euler=ORDER unsmooth=WEIGHT");
@@ -256,9 +258,12 @@ LoadColumns parse_load_columns(const std::string& text, const std::string& optio
     } else if (part.starts_with("counts=")) {
       for (const std::string& one : split(std::string_view(part).substr(7), ',')) {
         double value = 0;
-        if (!parse_number(one, value) || value == 0)
-          throw ConfigError(
-              fmt::format("{} {}: counts per unit are numbers other than 0", option, text));
+        if (!parse_number(one, value) || std::abs(value) < 1 / DelimitedText::kLargest ||
+            std::abs(value) > DelimitedText::kLargest) {
+          throw ConfigError(fmt::format("{} {}: counts per unit are numbers from {:g} to {:g}",
+                                        option, text, 1 / DelimitedText::kLargest,
+                                        DelimitedText::kLargest));
+        }
         columns.counts_per_unit.push_back(value);
       }
     } else if (part.starts_with("axes=")) {
@@ -285,6 +290,7 @@ MappedTrial read_mapped(const CsvMapping& mapping) {
   MappedTrial mapped;
   Trial& trial = mapped.trial;
   trial.name = mapping.readings.stem().string();
+  trial.file = mapping.readings.string();
   const DelimitedText readings(mapping.readings, mapping.separator, mapping.skip_lines);
   const Rows rows = rows_in_order(readings, mapping.reading_time, mapping.time_unit,
                                   mapping.skip_readings, mapped.notes);

@@ -135,16 +135,22 @@ std::string DelimitedText::place(std::size_t row) const {
   return fmt::format("{}:{}", name_, lines_[row]);
 }
 
-double DelimitedText::number(std::size_t row, std::size_t column) const {
+double DelimitedText::number(std::size_t row, std::size_t column, double largest) const {
   double value = 0;
   const std::string_view text = field(row, column);
-  if (parse_number(text, value)) return value;
+  const bool finite = parse_number(text, value);
+  if (finite && std::abs(value) <= largest) return value;
   const std::string which = header_.empty()
                                 ? fmt::format("column {}", column + 1)
                                 : fmt::format("column {} ({})", column + 1, shown(header_[column]));
   if (text.empty()) {
     throw ConfigError(
         fmt::format("{}: {} is empty; leave the row out or fill it in", place(row), which));
+  }
+  if (finite) {
+    throw ConfigError(fmt::format(
+        "{}: {} is '{}', which no instrument reads (at most {:g}); mend it or leave the row out",
+        place(row), which, shown(text), largest));
   }
   const bool comma = text.find(',') != std::string_view::npos;
   throw ConfigError(fmt::format(

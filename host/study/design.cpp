@@ -12,6 +12,7 @@ namespace {
 constexpr double kShear = 79e9;      // of spring steel, Pa
 constexpr double kEndCoils = 2;      // closed ends
 constexpr double kNearStill = 0.15;  // of the frame rate: an alias that passes for slow motion
+constexpr double kFarForce = 1e9;    // N, beyond what any spring's numbers here make
 constexpr double kSharedEdges = 4;   // standard deviations of the point spread, in a cell
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
@@ -37,7 +38,8 @@ bool in_view(const Instrument& instrument, const Vector6& displacement) {
     const double half = 0.5 * tag.size + tag.border;
     for (const double x : {-half, half}) {
       for (const double y : {-half, half}) {
-        const Eigen::Vector3d corner = motion * (tag.camera_T_tag * Eigen::Vector3d(x, y, 0));
+        const Eigen::Vector3d corner =
+            tag.seen(motion * (tag.camera_T_tag * Eigen::Vector3d(x, y, 0)));
         if (!corner_in_view(instrument.picture, corner)) return false;
       }
     }
@@ -57,15 +59,18 @@ double force_in_view(const Instrument& instrument, const Vector6& per_newton, do
   return std::min(force, most);
 }
 
-std::optional<double> force_to_solid(const Instrument& instrument, const Vector6& per_newton) {
+/// Largest force, N, at most `most`, under which no spring closes; empty: the springs' numbers do
+/// not go together.
+std::optional<double> force_to_solid(const Instrument& instrument, const Vector6& per_newton,
+                                     double most) {
   std::optional<double> least;
   for (const Spring& spring : instrument.springs) {
     const double room = spring.free_length - solid_length(spring);
     if (room <= 0) return {};
     const Eigen::Vector3d r = per_newton.tail<3>();
     const double closing = std::abs(per_newton.z() + r.cross(spring.top).z());
-    const double force = closing > 0 ? room / closing : kMostForce;
-    least = std::min(least.value_or(kMostForce), force);
+    const double force = closing > 0 ? room / closing : most;
+    least = std::min(least.value_or(most), force);
   }
   return least;
 }
@@ -145,8 +150,8 @@ void warn_of_modes(const Instrument& instrument, Design& design) {
 
 void warn_of_cells(const Instrument& instrument, Design& design) {
   for (const SeenTag& tag : instrument.tags) {
-    const double cell_px =
-        instrument.picture.fx_px * tag.size / tag.cells / tag.camera_T_tag.translation().z();
+    const double cell_px = instrument.picture.fx_px * tag.size / tag.cells /
+                           tag.seen(tag.camera_T_tag.translation()).z();
     if (cell_px > kSharedEdges * instrument.picture.blur_px) continue;
     design.warnings.push_back(
         fmt::format("cells of {:.1f} px under a point spread of {:.1f} px: edges run into each "
@@ -194,8 +199,9 @@ std::array<Reach, 3> reach(const Instrument& instrument, double most) {
   const Matrix6 compliance = instrument.stiffness.inverse();
   std::array<Reach, 3> result;
   for (int axis = 0; axis < 3; ++axis) {
-    result[static_cast<std::size_t>(axis)] = {force_in_view(instrument, compliance.col(axis), most),
-                                              force_to_solid(instrument, compliance.col(axis))};
+    result[static_cast<std::size_t>(axis)] = {
+        force_in_view(instrument, compliance.col(axis), most),
+        force_to_solid(instrument, compliance.col(axis), most)};
   }
   return result;
 }
@@ -207,11 +213,16 @@ Design design(const Instrument& instrument, const std::vector<double>& ranges) {
                      .diagonal()
                      .cwiseSqrt();
   result.modes = natural_frequencies(instrument.stiffness, instrument.platform);
-  result.reach = reach(instrument, kMostForce);
+  // The rows of the table scale with it, so it is looked for until it is found.
+  result.reach = reach(instrument, kFarForce);
   result.rows.push_back(row(instrument, result, instrument.range, 1));
-  double least = kMostForce;
+  double least = kFarForce;
   for (const Reach& axis : result.reach) least = std::min(least, axis.least());
-  if (least > 0) {
+  if (least >= kFarForce) {
+    result.warnings.push_back(fmt::format(
+        "no force up to {:g} N moves the tags out of view: no table of ranges; check the stiffness",
+        kFarForce));
+  } else if (least > 0) {
     for (const double range : ranges) {
       result.rows.push_back(row(instrument, result, range, range / least));
     }

@@ -49,14 +49,33 @@ CountedSteps counted_steps(const CountedPixels& design);
 /// of the travel.
 double counted_force(double range, double travel_px, double counts_per_px);
 
+/// A mirror that stands still: the points p with normal . p = distance, camera frame.
+struct MirrorPlane {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< of unit length
+  double distance = 0;                                ///< m
+
+  /// Where a point seems to be.
+  Eigen::Vector3d behind(const Eigen::Vector3d& p) const {
+    return p - 2 * (normal.dot(p) - distance) * normal;
+  }
+  /// Householder: what seems to become of a small motion.
+  Eigen::Matrix3d reflection() const {
+    return Eigen::Matrix3d::Identity() - 2 * normal * normal.transpose();
+  }
+};
+
 /// A tag where it sits at rest, seen by the camera.
 struct SeenTag {
   Eigen::Isometry3d camera_T_tag = Eigen::Isometry3d::Identity();  ///< x right, y down, z into the
                                                                    ///< paper
   double size = 0;                                                 ///< edge of the black square, m
   double border = 0;                                               ///< white around it, m
-  int cells = 0;                    ///< along one side of the black square
-  std::vector<std::uint8_t> white;  ///< cells x cells, row by row from the top left
+  int cells = 0;                        ///< along one side of the black square
+  std::vector<std::uint8_t> white;      ///< cells x cells, row by row from the top left
+  std::optional<MirrorPlane> mirror{};  ///< in which alone the camera sees it
+
+  /// Where a point of the camera frame is for the camera.
+  Eigen::Vector3d seen(const Eigen::Vector3d& p) const { return mirror ? mirror->behind(p) : p; }
 };
 
 /// A pinhole, and what is between an ideal picture and the one delivered.
@@ -76,6 +95,7 @@ struct SeenPicture {
 /// between ink and paper with the perspective derivative of each; gain and offset of each tag are
 /// unknowns beside the six. Left out: the papers' outer edges, grain, and that edges nearer to each
 /// other than a few s share their information.
+/// A mirror stands still while the tag moves: its picture moves as the tag's reflection does.
 /// Not finite where the tags do not determine all six.
 Matrix6 displacement_bound(const std::vector<SeenTag>& tags, const Eigen::Vector3d& origin,
                            const SeenPicture& picture);
@@ -132,7 +152,8 @@ struct Reach {
   double least() const { return to_solid ? std::min(in_view, *to_solid) : in_view; }
 };
 
-inline constexpr double kMostForce = 1000;  ///< N, how far design() looks
+/// N. A design that stands more is said to stand more than this.
+inline constexpr double kMostForce = 1000;
 
 /// Along camera x, y, z at the platform's origin. Up to `most` (N). Small angles.
 std::array<Reach, 3> reach(const Instrument& instrument, double most);
@@ -158,7 +179,8 @@ struct Design {
 };
 
 /// Everything above. The rows after the first have springs that just keep the papers in view and
-/// their coils apart under +-ranges[i] (N).
+/// their coils apart under +-ranges[i] (N); there are none, and a warning, where no force ends
+/// either.
 Design design(const Instrument& instrument, const std::vector<double>& ranges);
 
 }  // namespace tagwrench::study

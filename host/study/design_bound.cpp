@@ -18,12 +18,15 @@ Eigen::Vector2d project(const SeenPicture& picture, const Eigen::Vector3d& p) {
           picture.fy_px * p.y() / p.z() + picture.cy_px};
 }
 
-/// px per m and rad of the displacement about `origin`, of a point of the platform.
-Jacobian image_motion(const SeenPicture& picture, const Eigen::Vector3d& p,
+/// px per m and rad of the displacement about `origin`, of a point of the tag (camera frame, where
+/// it is and not where it is seen).
+Jacobian image_motion(const SeenPicture& picture, const SeenTag& tag, const Eigen::Vector3d& p,
                       const Eigen::Vector3d& origin) {
+  const Eigen::Vector3d at = tag.seen(p);
   Eigen::Matrix<double, 2, 3> by_point;
-  by_point << picture.fx_px / p.z(), 0, -picture.fx_px * p.x() / (p.z() * p.z()),  //
-      0, picture.fy_px / p.z(), -picture.fy_px * p.y() / (p.z() * p.z());
+  by_point << picture.fx_px / at.z(), 0, -picture.fx_px * at.x() / (at.z() * at.z()),  //
+      0, picture.fy_px / at.z(), -picture.fy_px * at.y() / (at.z() * at.z());
+  if (tag.mirror) by_point *= tag.mirror->reflection();
   const Eigen::Vector3d arm = p - origin;
   Eigen::Matrix3d by_rotation;  // d (r x arm) / dr
   by_rotation << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
@@ -85,7 +88,7 @@ double area_px(const SeenTag& tag, const SeenPicture& picture, double half) {
   const double x[] = {-half, half, half, -half};
   const double y[] = {-half, -half, half, half};
   for (int i = 0; i < 4; ++i)
-    corners[i] = project(picture, tag.camera_T_tag * Eigen::Vector3d(x[i], y[i], 0));
+    corners[i] = project(picture, tag.seen(tag.camera_T_tag * Eigen::Vector3d(x[i], y[i], 0)));
   double twice = 0;
   for (int i = 0; i < 4; ++i) {
     const Eigen::Vector2d& a = corners[i];
@@ -115,12 +118,14 @@ void add_tag(const SeenTag& tag, const Eigen::Vector3d& origin, const SeenPictur
     const auto in_camera = [&](const Eigen::Vector2d& p) -> Eigen::Vector3d {
       return tag.camera_T_tag * Eigen::Vector3d(p.x(), p.y(), 0);
     };
-    const Eigen::Vector2d along =
-        project(picture, in_camera(piece.to)) - project(picture, in_camera(piece.from));
+    const Eigen::Vector2d along = project(picture, tag.seen(in_camera(piece.to))) -
+                                  project(picture, tag.seen(in_camera(piece.from)));
     const double length = along.norm();
-    const Eigen::RowVector2d normal(along.y() / length, -along.x() / length);  // towards paper
+    const double paper_side = tag.mirror ? -1 : 1;  // left is right in a mirror
+    const Eigen::RowVector2d normal =
+        paper_side / length * Eigen::RowVector2d(along.y(), -along.x());  // towards paper
     const Eigen::Matrix<double, 1, 6> shift =
-        normal * image_motion(picture, in_camera(0.5 * (piece.from + piece.to)), origin);
+        normal * image_motion(picture, tag, in_camera(0.5 * (piece.from + piece.to)), origin);
     information.topLeftCorner<6, 6>() += per_length * length * shift.transpose() * shift;
     // Sums of the slope, -contrast per px of shift across the edge, against the level and
     // against 1.

@@ -10,6 +10,7 @@ namespace tagwrench::study {
 /// Readings and reference have their own times on one clock (s); both grow. SI units.
 struct Trial {
   std::string name;
+  std::string file;               ///< it was read from, for messages; empty: none
   std::string sensor;             ///< which: the same text for the same one; empty: not known
   Eigen::VectorXd time;           ///< n, s
   Eigen::MatrixXd features;       ///< n x p: displacement (p = 6; m, rad), or whatever a CSV held

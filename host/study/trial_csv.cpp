@@ -72,6 +72,7 @@ class TrialReader {
  public:
   explicit TrialReader(const std::filesystem::path& file) : text_(ours(file), ',') {
     trial_.name = file.stem().stem().string();
+    trial_.file = file.string();
     for (const std::string& comment : text_.comments()) {
       if (comment.starts_with("name: ")) trial_.name = comment.substr(6);
       if (comment.starts_with("sensor: ")) trial_.sensor = comment.substr(8);

@@ -26,10 +26,9 @@ char known_separator(const std::string& text) {
   throw ConfigError(fmt::format("--separator: '{}' is none; use ; , tab or auto", text));
 }
 
-/// That `out` can be written, and is none of the files that are read.
-void check_output(const char* option, const std::filesystem::path& out,
+/// That `out` can be written, is none of the files that are read, and replaces nothing unasked.
+void check_output(const char* option, const std::filesystem::path& out, bool force,
                   const std::vector<std::filesystem::path>& inputs) {
-  check_replaceable(out);
   for (const std::filesystem::path& input : inputs) {
     std::error_code none;
     if (std::filesystem::equivalent(out, input, none)) {
@@ -37,6 +36,12 @@ void check_output(const char* option, const std::filesystem::path& out,
           fmt::format("{} {}: is what is to be read; name another file", option, out.string()));
     }
   }
+  std::error_code none;
+  if (!force && std::filesystem::exists(std::filesystem::symlink_status(out, none))) {
+    throw ConfigError(fmt::format("{} {}: is there already; name another file, or --force", option,
+                                  out.string()));
+  }
+  check_replaceable(out);
 }
 
 }  // namespace
@@ -54,9 +59,11 @@ AnalyzeCommand::AnalyzeCommand(CLI::App& app)
       "files", files_,
       "FILE.data.csv as calibrations leave them, or recordings with a six-axis reference;\n"
       "of several each is held out once");
-  verb_->add_option("--json", json_, "also as JSON to FILE; - is standard output, instead of text");
+  verb_->add_option("--json", json_,
+                    "also as JSON to FILE, a new one; - is standard output, instead of text");
   verb_->add_flag("--series", series_, "with the held-out time series in the JSON")
       ->needs(verb_->get_option("--json"));
+  verb_->add_flag("--force", force_, "replace files that are there");
   add_analysis_options();
   add_mapping_options();
 }
@@ -110,7 +117,7 @@ void AnalyzeCommand::add_mapping_options() {
   add("--skip-references", m.skip_references, "rows left out at the start");
   add("--rest-readings", m.rest_readings, "rows from whose mean euler counts; 10 without it");
   add("--zero-rows", m.zero_rows, "first rows of the reference whose mean is zero");
-  add("--data", data_, "write what was read as FILE.data.csv");
+  add("--data", data_, "write what was read as FILE.data.csv, a new one");
 }
 
 study::CsvMapping AnalyzeCommand::mapping() const {
@@ -136,8 +143,10 @@ int AnalyzeCommand::run() const {
     throw ConfigError("analyze: name a data file, or --readings of another program's CSV");
   std::vector<std::filesystem::path> inputs(files_.begin(), files_.end());
   if (mapped) inputs.insert(inputs.end(), {mapping_.readings, mapping_.reference});
-  if (!json_.empty() && json_ != "-") check_output("--json", json_, inputs);
-  if (!data_.empty()) check_output("--data", data_, inputs);
+  if (!json_.empty() && json_ != "-") check_output("--json", json_, force_, inputs);
+  if (!data_.empty()) check_output("--data", data_, force_, inputs);
+  if (!data_.empty() && json_ == data_)
+    throw ConfigError(fmt::format("--data {}: is where --json goes; name another file", data_));
 
   std::vector<study::Trial> trials;
   std::vector<std::string> notes;

@@ -25,6 +25,7 @@ class AnalyzeCommand {
   CLI::App* verb_;
   std::vector<std::filesystem::path> files_;
   std::string json_;
+  bool force_ = false;
   bool series_ = false;
   study::AnalysisOptions options_;
 

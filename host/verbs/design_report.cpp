@@ -65,9 +65,9 @@ std::string bandwidth(const Instrument& i, const Design& d) {
       0.5 * i.frame_rate, i.frame_rate, modes, 100 * kFlat, std::min(flat, 0.5 * i.frame_rate));
 }
 
-/// Three digits: "1.58 N", "312 N"; "> 1000 N" for what was not reached.
+/// Three digits: "1.58 N", "312 N"; "beyond 1000 N".
 std::string force(double newtons) {
-  if (newtons >= study::kMostForce) return fmt::format("> {:g} N", study::kMostForce);
+  if (newtons > study::kMostForce) return fmt::format("beyond {:g} N", study::kMostForce);
   const int decimals = newtons >= 99.95 ? 0 : newtons >= 9.995 ? 1 : newtons >= 0.9995 ? 2 : 3;
   return fmt::format("{:.{}f} N", newtons, decimals);
 }
@@ -77,7 +77,7 @@ std::string reach(const Design& d) {
   std::string text = "\nlargest force    tags in view    springs not closed\n";
   for (int a = 0; a < 3; ++a) {
     const study::Reach& reach = d.reach[static_cast<std::size_t>(a)];
-    text += fmt::format("  along {:<10}{:>10}      {}\n", axes[a], force(reach.in_view),
+    text += fmt::format("  along {:<9}{:>13}    {}\n", axes[a], force(reach.in_view),
                         reach.to_solid ? force(*reach.to_solid) : "not known");
   }
   return text;

@@ -12,6 +12,7 @@
 #include "host/config_error.h"
 #include "host/record/reader.h"
 #include "host/study/trial_csv.h"
+#include "host/verbs/count_text.h"
 #include "host/verbs/recording_sensor.h"
 
 namespace tagwrench {
@@ -20,6 +21,10 @@ namespace {
 double seconds_since(TimePoint from, TimePoint to) {
   return std::chrono::duration<double>(to - from).count();
 }
+
+constexpr double kLargest = 1e12;  // that an instrument may read; squares of it are finite
+
+bool believable(const Vector6& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargest; }
 
 /// Rows of numbers that grow in time.
 struct Table {
@@ -58,7 +63,8 @@ Table read_tracks(record::RecordingReader& recording, TimePoint origin, const st
   std::size_t without = 0;
   for (record::TrackRecord record; recording.next(record);) {
     const Track& track = record.track;
-    const bool usable = carries_numbers(track.status) && track.displacement.allFinite() &&
+    const bool usable = carries_numbers(track.status) && believable(track.displacement) &&
+                        believable(track.covariance.diagonal()) &&
                         track.covariance.diagonal().minCoeff() >= 0;
     if (!usable || !table.add(seconds_since(origin, record.time), track.displacement,
                               track.covariance.diagonal().cwiseSqrt()))
@@ -69,7 +75,8 @@ Table read_tracks(record::RecordingReader& recording, TimePoint origin, const st
         fmt::format("{}: the target was never held in it; see `tagwrench doctor`", name));
   }
   if (without > 0)
-    notes.push_back(fmt::format("{}: {} frames without the target left out", name, without));
+    notes.push_back(
+        fmt::format("{}: {} without the target left out", name, count_text(without, "frame")));
   return table;
 }
 
@@ -87,7 +94,7 @@ Table read_references(record::RecordingReader& recording, TimePoint origin, cons
     const Vector6 value = vector(record.value);
     if (record.saturated) {
       ++saturated;
-    } else if (!value.allFinite() ||
+    } else if (!believable(value) ||
                !table.add(seconds_since(origin, record.time), value, vector(record.sigma))) {
       ++useless;
     }
@@ -100,13 +107,13 @@ Table read_references(record::RecordingReader& recording, TimePoint origin, cons
                    : "; record with one, or analyze a calibration's data file"));
   }
   if (saturated > 0)
-    notes.push_back(
-        fmt::format("{}: {} saturated rows of the reference left out", name, saturated));
+    notes.push_back(fmt::format("{}: {} of the reference left out", name,
+                                count_text(saturated, "saturated row")));
   if (useless > 0) {
     notes.push_back(
-        fmt::format("{}: {} rows of the reference without newtons, or not later than "
+        fmt::format("{}: {} of the reference without newtons, or not later than "
                     "the one before, left out",
-                    name, useless));
+                    name, count_text(useless, "row")));
   }
   return table;
 }
@@ -147,12 +154,15 @@ study::Trial recorded_trial(const std::filesystem::path& file, std::vector<std::
   const std::string name = file.string();
   if (recording.frame_times().empty())
     throw ConfigError(fmt::format("{}: no frames in it; record anew", name));
+  if (!recording.unclosed().empty())
+    notes.push_back(fmt::format("{} {}", name, recording.unclosed()));
   const TimePoint origin = recording.frame_times().front();
   const Table tracks = read_tracks(recording, origin, name, notes);
   const Table references = read_references(recording, origin, name, notes);
 
   study::Trial trial;
   trial.name = file.stem().string();
+  trial.file = name;
   trial.sensor = sensor_of(recording.head(), name);
   trial.feature_names = study::displacement_names();
   trial.time = column(tracks.time);
@@ -161,7 +171,8 @@ study::Trial recorded_trial(const std::filesystem::path& file, std::vector<std::
   trial.reference_time = column(references.time);
   trial.reference = rows(references.value);
   trial.reference_sigma = rows(references.sigma);
-  if (!trial.reference_sigma.allFinite()) trial.reference_sigma.resize(0, 0);
+  const auto sigmas = trial.reference_sigma.array();
+  if (!(sigmas >= 0 && sigmas <= kLargest).all()) trial.reference_sigma.resize(0, 0);
   trial.step = steps_of(recording.marks(), origin, trial.time);
   return trial;
 }

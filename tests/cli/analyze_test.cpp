@@ -182,10 +182,37 @@ TEST_F(Analyze, WhatIsReadIsNotWrittenOver) {
   }
 }
 
+TEST_F(Analyze, FilesThatAreThereAreReplacedOnlyByForce) {
+  const fs::path file = readings();
+  const fs::path there = folder_ / "there";
+  for (const char* option : {"--json", "--data"}) {
+    std::ofstream(there) << "somebody's";
+    expect_refused(run(mapped(file), {option, there}), "there: is there already; name another");
+    EXPECT_EQ(read_file(there), "somebody's");
+    const Outcome forced = run(mapped(file), {option, there, "--force"});
+    EXPECT_EQ(forced.status, 0) << forced.err;
+    EXPECT_GT(read_file(there).size(), 100U);
+  }
+  fs::remove(there);
+  expect_refused(run(mapped(file), {"--json", there, "--data", there}), "is where --json goes");
+  EXPECT_FALSE(fs::exists(there));
+}
+
+TEST_F(Analyze, TheSameDataTwiceAreNamedByTheirFiles) {
+  const fs::path one = folder_ / "one.data.csv";
+  const fs::path other = folder_ / "other.data.csv";
+  ASSERT_EQ(run(mapped(readings()), {"--data", one}).status, 0);
+  fs::copy_file(one, other);
+  expect_refused(run({"analyze", one, other}),
+                 one.string() + " and " + other.string() + ": are the same data twice");
+}
+
 TEST_F(Analyze, ABrokenRowIsNamed) {
   const fs::path file = readings();
   std::ofstream(file, std::ios::app) << "8000;1;NaN;1;1\n";
   expect_refused(run(mapped(file)), "other.csv:402: column 3 (turn) is 'NaN'");
+  std::ofstream(readings(), std::ios::app) << "8000;1;1;1e308;1\n";
+  expect_refused(run(mapped(file)), "other.csv:402: column 4 (fx) is '1e308', which no");
 }
 
 }  // namespace

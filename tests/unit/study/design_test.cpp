@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -128,6 +129,70 @@ TEST(DisplacementBound, TiltedTagsTellMoreAboutDepthAndTilt) {
   EXPECT_LT(roof[4], 0.5 * flat[4]) << "about y";
 }
 
+/// A tag that faces -x, seen at 45 degrees in a mirror beside the lens' axis.
+SeenTag in_mirror() {
+  SeenTag tag = chequers(0);
+  tag.white[0] = 1;  // no symmetry that would hide a picture the wrong way round
+  tag.camera_T_tag.linear() << 0, 0, 1, 0, 1, 0, -1, 0, 0;
+  tag.camera_T_tag.rotate(Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.3, -0.5, 0.8).normalized()));
+  tag.camera_T_tag.translation() = Eigen::Vector3d(6e-3, 0.4e-3, 19e-3);
+  const Eigen::Vector3d normal(std::sqrt(0.5), 0, -std::sqrt(0.5));
+  tag.mirror = MirrorPlane{normal, normal.dot(Eigen::Vector3d(2e-3, 0, 19e-3))};
+  return tag;
+}
+
+/// What the camera takes it for: the reflected tag, printed the wrong way round.
+SeenTag virtual_tag(const SeenTag& tag) {
+  SeenTag out = tag;
+  out.mirror.reset();
+  const Eigen::Matrix3d h = tag.mirror->reflection();
+  out.camera_T_tag.linear() =
+      h * tag.camera_T_tag.linear() * Eigen::Vector3d(-1, 1, 1).asDiagonal();
+  out.camera_T_tag.translation() = tag.mirror->behind(tag.camera_T_tag.translation());
+  for (std::size_t row = 0; row < 6; ++row) {
+    const auto begin = out.white.begin() + static_cast<std::ptrdiff_t>(6 * row);
+    std::reverse(begin, begin + 6);
+  }
+  return out;
+}
+
+TEST(Mirror, ShowsAPointWhereReflectionPutsIt) {
+  const MirrorPlane mirror = *in_mirror().mirror;
+  const Eigen::Vector3d p(5e-3, 1e-3, 18e-3);
+  const Eigen::Vector3d seen = mirror.behind(p);
+  EXPECT_NEAR(mirror.normal.dot(seen) + mirror.normal.dot(p), 2 * mirror.distance, 1e-15);
+  EXPECT_LT((seen - p).cross(mirror.normal).norm(), 1e-15);
+  const Eigen::Vector3d step(1e-6, -2e-6, 3e-6);
+  EXPECT_LT((mirror.behind(p + step) - seen - mirror.reflection() * step).norm(), 1e-15);
+}
+
+TEST(Mirror, TellsWhatTheReflectedTagTellsOfTheReflectedMotion) {
+  const SeenTag tag = in_mirror();
+  const Eigen::Vector3d origin(1e-3, -0.5e-3, 20e-3);
+  const Matrix6 bound = displacement_bound({tag}, origin, SeenPicture{});
+  const Matrix6 reflected =
+      displacement_bound({virtual_tag(tag)}, tag.mirror->behind(origin), SeenPicture{});
+  // In a mirror a translation t is H t, a turn r (an axial vector) is -H r.
+  Matrix6 to = Matrix6::Zero();
+  to.topLeftCorner<3, 3>() = tag.mirror->reflection();
+  to.bottomRightCorner<3, 3>() = -tag.mirror->reflection();
+  const Vector6 scale = bound.diagonal().cwiseSqrt().cwiseInverse();
+  const Matrix6 difference = bound - to * reflected * to.transpose();
+  EXPECT_LT((scale.asDiagonal() * difference * scale.asDiagonal()).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(Mirror, SidewaysTagTellsItsOwnDepth) {
+  SeenTag flat = chequers(0);
+  flat.camera_T_tag.translation().x() = -2e-3;
+  const SeenTag sideways = in_mirror();
+  const auto depth_at = [&](const std::vector<SeenTag>& tags, const Eigen::Vector3d& point) {
+    return std::sqrt(displacement_bound(tags, point, SeenPicture{})(2, 2));  // m
+  };
+  const double with = depth_at({flat, sideways}, sideways.camera_T_tag.translation());
+  const double without = depth_at({flat, chequers(0, 3e-3)}, {0, 1.5e-3, 20e-3});
+  EXPECT_LT(with, 0.3 * without);
+}
+
 TEST(Springs, SolidLengthIsThatOfTheCoils) {
   Spring spring;
   spring.coils = 20;
@@ -174,6 +239,28 @@ TEST(Table, StiffnessGrowsWithTheRangeAndForcesWithIt) {
   EXPECT_NEAR(forty.travel_lateral, one.travel_lateral, 1e-9);
   EXPECT_TRUE(forty.bound.isApprox(40 * one.bound, 1e-9));
   EXPECT_NEAR(forty.lowest / one.lowest, std::sqrt(40.0), 1e-9);
+}
+
+TEST(Table, DoesNotDependOnHowStiffTheGivenSpringsAre) {
+  const Design soft = design(instrument(), {1, 40});
+  Instrument hard = instrument();
+  hard.stiffness *= 3e4;  // holds the tags in view far beyond kMostForce
+  const Design stiff = design(hard, {1, 40});
+  EXPECT_GT(stiff.reach[1].in_view, 10 * kMostForce);
+  for (std::size_t i : {1U, 2U}) {
+    // The search goes in steps of 1 %.
+    EXPECT_NEAR(stiff.rows[i].lateral / soft.rows[i].lateral, 1, 0.011);
+    EXPECT_NEAR(stiff.rows[i].travel_lateral / soft.rows[i].travel_lateral, 1, 0.011);
+  }
+}
+
+TEST(Table, IsLeftOutWhereNoForceMovesTheTags) {
+  Instrument rigid = instrument();
+  rigid.stiffness *= 1e12;
+  const Design table = design(rigid, {1, 40});
+  EXPECT_EQ(table.rows.size(), 1U);
+  ASSERT_FALSE(table.warnings.empty());
+  EXPECT_NE(table.warnings[0].find("no table of ranges"), std::string::npos) << table.warnings[0];
 }
 
 TEST(Table, WarnsOfWhatWillNotWork) {

@@ -180,6 +180,35 @@ TEST_F(TrialFiles, BadRowsOfOthersAreNamedByFileAndLine) {
   EXPECT_SAYS(map_complaint("t;x;f\n"), "no rows");
 }
 
+TEST_F(TrialFiles, NumbersThatNoInstrumentReadsAreNamedByFileLineAndColumn) {
+  EXPECT_SAYS(map_complaint("0;1;2\n1;1e308;2\n"), "x.csv:2: column 2 is '1e308', which no");
+  EXPECT_SAYS(map_complaint("0;1;2\n1;1;-2e12\n"), "x.csv:2: column 3 is '-2e12'");
+  EXPECT_SAYS(map_complaint("0;1;2\n1e308;1;2\n"), "x.csv:2: column 1 is '1e308'");
+  EXPECT_EQ(map_complaint("0;1;2\n1;1e12;2\n"), "no complaint");
+  const std::string head =
+      "# tagwrench-data-1\nkind,t_s,dx_m,Fx_N,Fy_N,Fz_N,Mx_Nm,My_Nm,Mz_Nm\n"
+      "reading,0.1,1e-6,,,,,,\n";
+  EXPECT_SAYS(read_complaint(head + "reference,0.2,,0,0,1e300,0,0,0\n"),
+              "x.data.csv:4: column 6 (Fz_N) is '1e300'");
+}
+
+TEST_F(TrialFiles, TimesInNanosecondsSince1970AreNoAbsurdNumbers) {
+  study::CsvMapping mapping;
+  mapping.readings = write("r.csv", "1700000000000000000,1,2\n1700000000500000000,1,2\n");
+  mapping.time_unit = study::parse_time_unit("ns", "--time-unit");
+  mapping.features = {study::parse_feature_columns("2", "--features")};
+  mapping.loads = {study::parse_load_columns("3", "--load")};
+  const study::Trial trial = study::read_mapped(mapping).trial;
+  EXPECT_NEAR(trial.time[1] - trial.time[0], 0.5, 1e-6) << "s";
+}
+
+TEST_F(TrialFiles, ATrialKnowsItsFile) {
+  LoadedPlatform platform;
+  platform.seconds = 1;
+  const fs::path file = write("a.data.csv", study::trial_to_csv(platform.trial()));
+  EXPECT_EQ(study::read_trial(file).file, file.string());
+}
+
 TEST_F(TrialFiles, RowsOfOneTimeAreLeftOutAndSaid) {
   study::CsvMapping mapping;
   mapping.readings = write("r.csv", "0,1,2\n1,1,2\n1,1,3\n2,1,4\n");
@@ -188,13 +217,14 @@ TEST_F(TrialFiles, RowsOfOneTimeAreLeftOutAndSaid) {
   const study::MappedTrial mapped = study::read_mapped(mapping);
   EXPECT_EQ(mapped.trial.time.size(), 3);
   ASSERT_EQ(mapped.notes.size(), 1U);
-  EXPECT_SAYS(mapped.notes[0], "1 rows with the time of the row before");
+  EXPECT_SAYS(mapped.notes[0], "1 row with the time of the row before left out");
 }
 
 TEST_F(TrialFiles, DescriptionsThatMakeNoSenseAreRefused) {
-  for (const char* text : {"3:furlong", "3:unsmooth=0", "3:unsmooth=2", "3:euler=abc"})
+  for (const char* text :
+       {"3:furlong", "3:unsmooth=0", "3:unsmooth=1e-300", "3:unsmooth=2", "3:euler=abc"})
     EXPECT_THROW(study::parse_feature_columns(text, "--features"), ConfigError) << text;
-  for (const char* text : {"3:m", "3:counts=0", "3:counts=a", "3:axes=Fw"})
+  for (const char* text : {"3:m", "3:counts=0", "3:counts=1e-300", "3:counts=a", "3:axes=Fw"})
     EXPECT_THROW(study::parse_load_columns(text, "--load"), ConfigError) << text;
   EXPECT_THROW(study::parse_time_unit("h", "--time-unit"), ConfigError);
   study::CsvMapping mapping;
