@@ -7,14 +7,12 @@
 #include <csignal>
 #include <cstdlib>
 #include <exception>
-#include <iostream>
 #include <opencv2/core/utility.hpp>
 
 #include "host/bandwidth/command.h"
 #include "host/board/command.h"
 #include "host/config/scenario_config.h"
 #include "host/config_error.h"
-#include "host/doctor.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/tell.h"
 #include "host/verbs/analyze_command.h"
@@ -22,6 +20,7 @@
 #include "host/verbs/certificate_command.h"
 #include "host/verbs/check_command.h"
 #include "host/verbs/design_command.h"
+#include "host/verbs/doctor_command.h"
 #include "host/verbs/export_command.h"
 #include "host/verbs/record_command.h"
 #include "host/verbs/run_command.h"
@@ -129,8 +128,7 @@ int dispatch(int argc, char** argv) {
   tagwrench::CertificateCommand certificate(app);
   tagwrench::DesignCommand design(app);
 
-  CLI::App* doctor = app.add_subcommand(
-      "doctor", "say line by line what works here and what to do about the rest");
+  tagwrench::DoctorCommand doctor(app, duration);
 
   try {
     app.parse(argc, argv);
@@ -152,7 +150,7 @@ int dispatch(int argc, char** argv) {
   if (zero.parsed()) return zero.run();
   if (certificate.parsed()) return certificate.run();
   if (design.parsed()) return design.run();
-  if (doctor->parsed()) return tagwrench::run_doctor(std::cout);
+  if (doctor.parsed()) return doctor.run();
   if (sim->parsed()) {
     const tagwrench::sim::Scenario described =
         scenario.empty() ? tagwrench::sim::Scenario{} : tagwrench::load_scenario(scenario);

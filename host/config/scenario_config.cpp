@@ -1,11 +1,13 @@
 #include "host/config/scenario_config.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <string_view>
 #include <vector>
 
 #include "host/config/bench_config.h"
 #include "host/config/disturbance_config.h"
+#include "host/config/hardware_config.h"
 #include "host/config/yaml_section.h"
 #include "host/config_error.h"
 
@@ -161,8 +163,16 @@ void read_compression(YamlSection s, sim::Compression& c) {
   s.finish();
 }
 
+/// The sensor that `hardware: FILE` names, seen from the scenario, or the published one.
+sim::Scenario base_of(YamlReader& root) {
+  if (!root.has("hardware")) return {};
+  const auto folder = std::filesystem::path(root.file()).parent_path();
+  return runnable_scenario_of(
+      load_buildable((folder / root.text("hardware")).lexically_normal().string()));
+}
+
 sim::Scenario read_scenario(YamlReader root) {
-  sim::Scenario scenario;
+  sim::Scenario scenario = base_of(root);
   scenario.seed = static_cast<std::uint64_t>(root.integer_or("seed", 0, 2'147'483'647, 1));
   const auto section = [&root](const char* key, auto read, auto& into) {
     if (root.has(key)) read(YamlSection(root.child(key)), into);
@@ -209,6 +219,7 @@ sim::Scenario parse_scenario(const std::string& text, const std::string& name) {
 }
 
 sim::Scenario load_scenario(const std::string& path) {
+  if (is_hardware(path)) return runnable_scenario_of(load_buildable(path));
   const YamlReader root = YamlReader::from_file(path);
   const sim::Scenario scenario = read_scenario(root);
   const std::string problem = sim::problem(scenario);

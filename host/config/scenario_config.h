@@ -8,6 +8,8 @@
 
 namespace tagwrench {
 
+/// A file of hardware/sensors is a scenario too: that sensor, as built. In others `hardware: FILE`
+/// (seen from the scenario) puts that sensor in the place of the defaults.
 /// Throws ConfigError with file, line and key.
 sim::Scenario load_scenario(const std::string& path);
 sim::Scenario parse_scenario(const std::string& text, const std::string& name);

@@ -7,11 +7,14 @@
 #include <iostream>
 #include <numbers>
 
+#include "host/config/hardware_config.h"
 #include "host/config/sensor_config.h"
 #include "host/config_error.h"
 #include "host/tell.h"
 #include "host/tracker/tag_patterns.h"
 #include "host/verbs/design_report.h"
+#include "host/verbs/hardware_design.h"
+#include "host/verbs/hardware_instrument.h"
 #include "host/wrench/spring_model.h"
 
 namespace tagwrench {
@@ -95,9 +98,21 @@ DesignCommand::DesignCommand(CLI::App& app)
   verb_->add_option(
       "--sensor", sensor_,
       "sensor.yaml: its camera, tags, rest pose and stiffness instead of those below");
-  verb_->add_option("--range-n", range_n_, "wanted, +- along each axis, N")
-      ->capture_default_str()
-      ->check(within(1e-06, 1000));
+  CLI::Option* hardware =
+      verb_->add_option("--hardware", hardware_,
+                        "a file of hardware/sensors: the sensor as it will be printed, instead of "
+                        "the options below");
+  CLI::Option* check = verb_->add_option(
+      "--check", check_, "a file of hardware/sensors: only whether it can be built, and why not");
+  verb_
+      ->add_option("--export", export_,
+                   "folder for what follows from --hardware: parameters.scad for the parts, "
+                   "sensor.yaml, scenario.yaml for the simulator")
+      ->needs(hardware);
+  check->excludes(hardware);
+  range_given_ = verb_->add_option("--range-n", range_n_, "wanted, +- along each axis, N")
+                     ->capture_default_str()
+                     ->check(within(1e-06, 1000));
   verb_->add_option("--ranges", ranges_, "rows of the table, +- N")
       ->delimiter(',')
       ->capture_default_str()
@@ -105,6 +120,11 @@ DesignCommand::DesignCommand(CLI::App& app)
   add_picture_options();
   add_tag_options();
   add_spring_options();
+  for (CLI::Option* said : {camera_given_, distance_given_, size_given_, paper_given_,
+                            tag_px_given_, image_given_, axial_given_, lateral_given_}) {
+    hardware->excludes(said);
+    check->excludes(said);
+  }
 }
 
 void DesignCommand::add_picture_options() {
@@ -304,6 +324,11 @@ study::Instrument DesignCommand::instrument() const {
   result.picture.contrast_counts = contrast_counts_;
   study::CountedPixels& counted = result.counted;
   counted.counts_per_px = counts_per_px_;
+  if (!hardware_.empty()) {
+    take_hardware(load_buildable(hardware_), result);
+    if (range_given_->count() > 0) result.range = range_n_;
+    return result;
+  }
   if (sensor_.empty()) {
     std::tie(counted.frame_width_px, counted.frame_height_px) = size_px("--camera", camera_);
     std::tie(counted.image_width_px, counted.image_height_px) = size_px("--image-px", image_);
@@ -331,7 +356,9 @@ study::Instrument DesignCommand::instrument() const {
 }
 
 int DesignCommand::run() const {
+  if (!check_.empty()) return check_hardware(check_);
   const study::Instrument asked = instrument();
+  if (!export_.empty()) export_hardware(hardware_, export_);
   const study::Design design = study::design(asked, ranges_);
   std::cout << design_report(asked, design) << std::flush;
   for (const std::string& warning : design.warnings) tell(warning);

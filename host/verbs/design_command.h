@@ -32,6 +32,7 @@ class DesignCommand {
   study::Instrument instrument() const;
 
   CLI::App* verb_;
+  CLI::Option* range_given_ = nullptr;
   CLI::Option* tag_px_given_ = nullptr;
   CLI::Option* distance_given_ = nullptr;
   CLI::Option* size_given_ = nullptr;
@@ -41,6 +42,9 @@ class DesignCommand {
   CLI::Option* axial_given_ = nullptr;
   CLI::Option* lateral_given_ = nullptr;
   std::string sensor_;
+  std::string hardware_;
+  std::string check_;
+  std::string export_;
   std::string camera_ = "640x480";
   double fps_ = 25;
   double lens_distance_mm_ = 21;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "host/config/hardware_config.h"
 #include "host/config/sensor_config.h"
 #include "host/config_error.h"
 #include "host/print/sheets.h"
@@ -19,7 +20,7 @@ constexpr double kFinestCell_mm = 0.1;
 constexpr double kUsualMarker = 0.75;  // of its square
 
 /// Metres as written in a file of millimetres.
-double in_mm(double metres) { return std::round(1e9 * metres) * 1e-6; }
+double in_mm(double metres) { return std::round(1e9 * metres) / 1e6; }
 
 TagFamily known_family(const std::string& option, const std::string& text) {
   const std::optional<TagFamily> family = family_from_name(text);
@@ -72,6 +73,10 @@ void TagsCommand::add_tag_options() {
   sensor_given_ = verb_->add_option(
       "--sensor", sensor_,
       "sensor.yaml: the tags of this sensor; options below overrule what it says");
+  hardware_given_ = verb_->add_option(
+      "--hardware", hardware_,
+      "a file of hardware/sensors: the tags of this sensor to be built; options below overrule it");
+  sensor_given_->excludes(hardware_given_);
   family_given_ = verb_->add_option(
       "--family", family_,
       "aruco_original (default), aruco_4x4_50 ... aruco_7x7_1000, apriltag_16h5 ... "
@@ -84,7 +89,8 @@ void TagsCommand::add_tag_options() {
       "--board", board_,
       "charuco or checkerboard, for `calibrate camera`; or all of it in one word: "
       "charuco:COLUMNSxROWS:SQUAREmm:MARKERmm:DICTIONARY, checkerboard:COLUMNSxROWS:SQUAREmm");
-  for (CLI::Option* tags : {sensor_given_, family_given_, ids_given_, size_given_, border_given_}) {
+  for (CLI::Option* tags :
+       {sensor_given_, hardware_given_, family_given_, ids_given_, size_given_, border_given_}) {
     board_given_->excludes(tags);
   }
 }
@@ -115,6 +121,13 @@ TagsCommand::Sheet TagsCommand::tags() const {
     sheet.border_mm = in_mm(target.border);
     sheet.ids.clear();
     for (const Tag& tag : target.tags) sheet.ids.push_back(tag.id);
+  }
+  if (!hardware_.empty()) {
+    const hardware::TargetChoice target = load_buildable(hardware_).target;
+    sheet.family = *family_from_name(target.family);
+    sheet.size_mm = in_mm(target.tag_size);
+    sheet.border_mm = in_mm(target.border);
+    sheet.ids = target.ids;
   }
   if (family_given_->count() > 0) sheet.family = known_family("--family", family_);
   if (ids_given_->count() > 0) sheet.ids = ids_;

@@ -22,6 +22,7 @@ class TagsCommand {
 
   CLI::App* verb_;
   CLI::Option* sensor_given_ = nullptr;
+  CLI::Option* hardware_given_ = nullptr;
   CLI::Option* family_given_ = nullptr;
   CLI::Option* ids_given_ = nullptr;
   CLI::Option* size_given_ = nullptr;
@@ -33,6 +34,7 @@ class TagsCommand {
   std::string paper_ = "a4";
   int copies_ = 0;
   std::string sensor_;
+  std::string hardware_;
   std::string family_;
   std::vector<int> ids_;
   double size_mm_ = 0;

@@ -112,5 +112,39 @@ TEST_F(TagsInput, SensorFileSaysWhatToPrintAndOptionsOverruleIt) {
   EXPECT_NE(missing.err.find("none.yaml"), std::string::npos) << missing.err;
 }
 
+TEST_F(TagsInput, HardwareFileSaysWhatToPrintAndOptionsOverruleIt) {
+  const std::string text = read_file(TAGWRENCH_SENSORS "/paper.yaml");
+  const std::string ids = "ids: [5, 2]", size = "tag_size_mm: 3.8", border = "border_mm: 0.35";
+  const std::string family = "family: aruco_original";
+  const auto with = [&](const std::string& from, const std::string& to, std::string in) {
+    const std::size_t at = in.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return in.replace(at, from.size(), to);
+  };
+  const std::filesystem::path sensors = temporary_ / "sensors";
+  std::filesystem::create_directories(sensors);
+  std::filesystem::create_symlink(TAGWRENCH_SENSORS "/../cameras", temporary_ / "cameras");
+  const std::string file = sensors / "mine.yaml";
+  std::string mine = with(ids, "ids: [7, 3]", with(size, "tag_size_mm: 3.6", text));
+  mine = with(border, "border_mm: 0.4", with(family, "family: aruco_4x4_50", mine));
+  write_file(file, mine);
+  const auto same = [&](const Outcome& outcome, const std::vector<std::string>& options) {
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    ASSERT_EQ(tags(options, "options.svg").status, 0);
+    EXPECT_TRUE(read_file(temporary_ / "hardware.svg") == read_file(temporary_ / "options.svg"));
+  };
+  const std::string out = "hardware.svg";
+  same(tags({"--hardware", file}, out),
+       {"--family", "aruco_4x4_50", "--ids", "7,3", "--size-mm", "3.6", "--border-mm", "0.4"});
+  same(tags({"--hardware", file, "--ids", "9"}, out),
+       {"--family", "aruco_4x4_50", "--ids", "9", "--size-mm", "3.6", "--border-mm", "0.4"});
+}
+
+TEST_F(TagsInput, HardwareThatCannotBeBuiltHasNoTags) {
+  expect_refused(tags({"--hardware", TAGWRENCH_SENSORS "/none.yaml"}), {"none.yaml"});
+  expect_refused(tags({"--hardware", TAGWRENCH_SENSORS "/paper.yaml", "--sensor", "x.yaml"}),
+                 {"--sensor", "--hardware"});
+}
+
 }  // namespace
 }  // namespace tagwrench::test

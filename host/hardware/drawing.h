@@ -1,0 +1,15 @@
+// A chosen sensor as OpenSCAD takes it: every number that the parts need, in mm and degrees.
+#pragma once
+
+#include <string>
+
+#include "host/hardware/geometry.h"
+#include "host/hardware/parameters.h"
+
+namespace tagwrench::hardware {
+
+/// Assignments, one a line: of what stands in the file under its own name without the unit
+/// (`springs_free_length = 25.4;`), and of what follows from it (`z_cover_top = ...;`).
+std::string scad_parameters(const Parameters& parameters, const Geometry& geometry);
+
+}  // namespace tagwrench::hardware

@@ -1,0 +1,296 @@
+#include "host/tracker/edge_width.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace tagwrench {
+namespace {
+
+constexpr double kWhite = 250;        // grey levels: beyond, the sensor is at its end
+constexpr double kMostPixels = 2500;  // of a tag; a grid of them where there are more
+constexpr double kPixelVariance = 1.0 / 12;
+constexpr double kLeastVariance = 0.01;
+constexpr double kMostBlur_px = 30;
+constexpr double kLeastContrast = 8;    // grey levels
+constexpr double kMostResidual = 0.12;  // of the contrast
+constexpr double kMostShift = 1;        // of a corner, cells
+constexpr double kMargin = 0.3;         // of white around the square that is looked at, cells
+constexpr double kClear = 2;            // blurs between that and the paper's end
+
+/// Corners (8), logarithm of the blur, gain, its slopes to the right and down, offset.
+constexpr int kCorners = 8, kBlur = 8, kGain = 9, kOffset = 12, kUnknowns = 13;
+using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
+using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+
+/// Pixels -> cells, 0..cells to the right and down.
+Eigen::Matrix3d cells_from_pixels(const Unknowns& x, int cells) {
+  const double n = cells;
+  const std::array<std::pair<double, double>, 4> at = {{{0, 0}, {n, 0}, {n, n}, {0, n}}};
+  Eigen::Matrix<double, 8, 8> a;
+  Eigen::Matrix<double, 8, 1> b;
+  for (int i = 0; i < 4; ++i) {
+    const double px = x[2 * i], py = x[2 * i + 1];
+    const auto [u, v] = at[static_cast<std::size_t>(i)];
+    a.row(2 * i) << px, py, 1, 0, 0, 0, -u * px, -u * py;
+    a.row(2 * i + 1) << 0, 0, 0, px, py, 1, -v * px, -v * py;
+    b[2 * i] = u;
+    b[2 * i + 1] = v;
+  }
+  const Eigen::Matrix<double, 8, 1> h = a.fullPivLu().solve(b);
+  Eigen::Matrix3d out;
+  out << h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1;
+  return out;
+}
+
+/// Along one axis of the tag: how much of each cell a blurred place sees, and how that changes with
+/// the place (1/cells) and with the logarithm of the blur.
+struct Seen {
+  std::vector<double> part, by_place, by_blur;
+
+  void look(double at, double blur, int cells) {
+    part.resize(static_cast<std::size_t>(cells));
+    by_place.resize(part.size());
+    by_blur.resize(part.size());
+    double before = 0, before_density = 0, before_moment = 0;
+    for (int line = 0; line <= cells; ++line) {
+      const double s = (at - line) / blur;
+      const double share = 0.5 * std::erfc(-s / std::numbers::sqrt2);
+      const double density = std::exp(-0.5 * s * s) / std::sqrt(2 * std::numbers::pi);
+      if (line > 0) {
+        const auto cell = static_cast<std::size_t>(line - 1);
+        part[cell] = before - share;
+        by_place[cell] = (before_density - density) / blur;
+        by_blur[cell] = s * density - before_moment;
+      }
+      before = share;
+      before_density = density;
+      before_moment = s * density;
+    }
+  }
+};
+
+struct Sums {
+  Normal normal = Normal::Zero();
+  Unknowns slope = Unknowns::Zero();
+  double squares = 0;
+  int pixels = 0;
+};
+
+class TagFit {
+ public:
+  TagFit(const ImageView& image, const TagPattern& pattern) : image_(image), pattern_(pattern) {}
+
+  /// Chooses the pixels that are looked at: inside the image, on the square and `margin` cells
+  /// around it.
+  void choose(const Unknowns& x, double margin) {
+    const Eigen::Matrix3d to_cells = cells_from_pixels(x, pattern_.cells);
+    const Eigen::Matrix3d from_cells = to_cells.inverse();
+    Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
+    const double n = pattern_.cells;
+    for (const double u : {-margin, n + margin}) {
+      for (const double v : {-margin, n + margin}) {
+        const Eigen::Vector2d p = (from_cells * Eigen::Vector3d(u, v, 1)).hnormalized();
+        low = low.cwiseMin(p);
+        high = high.cwiseMax(p);
+      }
+    }
+    low = low.cwiseMax(0);
+    high = high.cwiseMin(Eigen::Vector2d(image_.width - 1, image_.height - 1));
+    pixels_.clear();
+    white_ = 0;
+    if (!(low.array() < high.array()).all()) return;
+    const double area = (high - low).prod();
+    const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(area / kMostPixels))));
+    for (int row = static_cast<int>(low.y()); row <= high.y(); row += step) {
+      for (int column = static_cast<int>(low.x()); column <= high.x(); column += step) {
+        const Eigen::Vector2d at = (to_cells * Eigen::Vector3d(column, row, 1)).hnormalized();
+        if (at.minCoeff() < -margin || at.maxCoeff() > n + margin) continue;
+        const int level = image_.pixels[static_cast<std::ptrdiff_t>(row) * image_.stride + column];
+        pixels_.push_back(
+            {static_cast<double>(column), static_cast<double>(row), static_cast<double>(level)});
+        white_ += level >= kWhite ? 1 : 0;
+      }
+    }
+  }
+
+  double white_part() const {
+    return pixels_.empty() ? 0 : static_cast<double>(white_) / static_cast<double>(pixels_.size());
+  }
+
+  Sums sums(const Unknowns& x) {
+    const Eigen::Matrix3d to_cells = cells_from_pixels(x, pattern_.cells);
+    Sums out;
+    for (const Eigen::Vector3d& pixel : pixels_) {
+      if (pixel.z() < kWhite) add(x, to_cells, pixel, out);
+    }
+    return out;
+  }
+
+ private:
+  /// What the blurred tag shows, 0 ink to 1 paper, and its derivatives by place and blur.
+  struct Shown {
+    double level = 1, by_u = 0, by_v = 0, by_blur = 0;
+  };
+  Shown shown() const {
+    Shown out;
+    for (int row = 0; row < pattern_.cells; ++row) {
+      const auto j = static_cast<std::size_t>(row);
+      double ink = 0, ink_u = 0, ink_blur = 0;
+      for (int column = 0; column < pattern_.cells; ++column) {
+        if (pattern_.is_white(row, column)) continue;
+        const auto i = static_cast<std::size_t>(column);
+        ink += across_.part[i];
+        ink_u += across_.by_place[i];
+        ink_blur += across_.by_blur[i];
+      }
+      out.level -= down_.part[j] * ink;
+      out.by_u -= down_.part[j] * ink_u;
+      out.by_v -= down_.by_place[j] * ink;
+      out.by_blur -= down_.part[j] * ink_blur + down_.by_blur[j] * ink;
+    }
+    return out;
+  }
+
+  void add(const Unknowns& x, const Eigen::Matrix3d& to_cells, const Eigen::Vector3d& pixel,
+           Sums& out) {
+    const Eigen::Vector3d h = to_cells * Eigen::Vector3d(pixel.x(), pixel.y(), 1);
+    const Eigen::Vector2d at = h.hnormalized();
+    const Eigen::Matrix2d by_pixel =
+        (to_cells.topLeftCorner<2, 2>() - at * to_cells.bottomLeftCorner<1, 2>()) / h.z();
+    const double blur = std::exp(x[kBlur]);
+    // An edge's blur is that across it, whatever the angle between the tag's axes in the image.
+    across_.look(at.x(), blur * by_pixel.row(0).norm(), pattern_.cells);
+    down_.look(at.y(), blur * by_pixel.row(1).norm(), pattern_.cells);
+    const Shown tag = shown();
+    const double right = at.x() / pattern_.cells, below = at.y() / pattern_.cells;
+    const double gain = x[kGain] + x[kGain + 1] * (right - 0.5) + x[kGain + 2] * (below - 0.5);
+    const Eigen::RowVector2d by_place =
+        gain * Eigen::RowVector2d(tag.by_u, tag.by_v) * by_pixel;  // grey levels per px
+    Unknowns row;
+    const std::array<double, 4> weight = {(1 - right) * (1 - below), right * (1 - below),
+                                          right * below, (1 - right) * below};
+    for (int k = 0; k < 4; ++k) {
+      row[2 * k] = -weight[static_cast<std::size_t>(k)] * by_place.x();
+      row[2 * k + 1] = -weight[static_cast<std::size_t>(k)] * by_place.y();
+    }
+    row[kBlur] = gain * tag.by_blur;
+    row.segment<3>(kGain) << tag.level, tag.level * (right - 0.5), tag.level * (below - 0.5);
+    row[kOffset] = 1;
+    const double residual = pixel.z() - gain * tag.level - x[kOffset];
+    out.normal.noalias() += row * row.transpose();
+    out.slope += residual * row;
+    out.squares += residual * residual;
+    ++out.pixels;
+  }
+
+  const ImageView& image_;
+  const TagPattern& pattern_;
+  std::vector<Eigen::Vector3d> pixels_;  ///< column, row, level
+  int white_ = 0;
+  Seen across_, down_;
+};
+
+/// Solves for those unknowns from `first` on, the others as they are.
+Unknowns step(const Sums& sums, double damping, int first) {
+  const int count = kUnknowns - first;
+  Eigen::MatrixXd normal = sums.normal.bottomRightCorner(count, count);
+  normal.diagonal() *= 1 + damping;
+  normal.diagonal().array() += 1e-9 * normal.diagonal().maxCoeff();
+  Unknowns out = Unknowns::Zero();
+  out.tail(count) = normal.ldlt().solve(sums.slope.tail(count));
+  return out;
+}
+
+/// The best of some blurs, with the light that goes with it.
+Unknowns start(TagFit& fit, const SquareCorners& corners) {
+  Unknowns best = Unknowns::Zero();
+  double least = std::numeric_limits<double>::infinity();
+  for (const double blur : {1.0, 2.0, 4.0, 8.0}) {
+    Unknowns x = Unknowns::Zero();
+    for (int i = 0; i < 4; ++i) x.segment<2>(2 * i) = corners[static_cast<std::size_t>(i)];
+    x[kBlur] = std::log(blur);
+    x += step(fit.sums(x), 0, kGain);
+    const double squares = fit.sums(x).squares;
+    if (squares >= least) continue;
+    least = squares;
+    best = x;
+  }
+  return best;
+}
+
+/// Levenberg and Marquardt.
+Unknowns converge(TagFit& fit, Unknowns x) {
+  constexpr int kSteps = 30;
+  constexpr double kEnough = 1e-5;  // of the squares
+  double damping = 1e-3;
+  Sums here = fit.sums(x);
+  for (int i = 0; i < kSteps && damping < 1e6; ++i) {
+    Unknowns there = x + step(here, damping, 0);
+    there[kBlur] = std::clamp(there[kBlur], 0.5 * std::log(kPixelVariance), std::log(kMostBlur_px));
+    const Sums sums = fit.sums(there);
+    if (!(sums.squares < here.squares)) {
+      damping *= 10;
+      continue;
+    }
+    const bool done = here.squares - sums.squares < kEnough * here.squares;
+    x = there;
+    here = sums;
+    damping *= 0.1;
+    if (done) break;
+  }
+  return x;
+}
+
+/// Of the shortest side, px.
+double cell_px(const SquareCorners& corners, int cells) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 4; ++i)
+    least = std::min(least, (corners[(i + 1) % 4] - corners[i]).norm());
+  return least / cells;
+}
+
+}  // namespace
+
+std::optional<EdgeWidth> edge_width(const ImageView& image, const TagPattern& pattern,
+                                    const SquareCorners& corners_px) {
+  const double cell = cell_px(corners_px, pattern.cells);
+  const double border = pattern.border / pattern.size * pattern.cells;  // cells
+  if (!(cell > 1)) return std::nullopt;
+  TagFit fit(image, pattern);
+  const auto margin = [&](double blur) {
+    return std::clamp(border - kClear * blur / cell, -0.5, kMargin);
+  };
+  Unknowns corners = Unknowns::Zero();
+  for (int i = 0; i < 4; ++i) corners.segment<2>(2 * i) = corners_px[static_cast<std::size_t>(i)];
+  fit.choose(corners, margin(1));
+  Unknowns x = converge(fit, start(fit, corners_px));
+  if (!x.allFinite()) return std::nullopt;
+  // What lies beyond the paper is not white: kept away from, once the blur is known.
+  fit.choose(x, margin(std::exp(x[kBlur])));
+  x = converge(fit, x);
+  const Sums sums = fit.sums(x);
+  if (!x.allFinite() || sums.pixels < 10 * kUnknowns) return std::nullopt;
+  EdgeWidth out;
+  const double total = std::exp(2 * x[kBlur]);
+  out.blur_px = std::sqrt(std::max(total - kPixelVariance, kLeastVariance));
+  out.contrast = x[kGain];
+  out.white_part = fit.white_part();
+  out.residual_part = std::sqrt(sums.squares / sums.pixels) / std::abs(out.contrast);
+  double shift = 0;
+  for (int i = 0; i < 4; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    out.corners_px[k] = x.segment<2>(2 * i);
+    shift = std::max(shift, (out.corners_px[k] - corners_px[k]).norm());
+  }
+  const bool alike = out.contrast > kLeastContrast && out.residual_part < kMostResidual &&
+                     shift < kMostShift * cell && out.blur_px < 0.9 * kMostBlur_px;
+  return alike ? std::optional(out) : std::nullopt;
+}
+
+}  // namespace tagwrench

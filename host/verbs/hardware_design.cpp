@@ -1,0 +1,86 @@
+#include "host/verbs/hardware_design.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iostream>
+
+#include "host/config/hardware_config.h"
+#include "host/config/sensor_edit.h"
+#include "host/config_error.h"
+#include "host/hardware/checks.h"
+#include "host/hardware/drawing.h"
+#include "host/source/simulator/folder_export.h"
+#include "host/tell.h"
+#include "host/verbs/hardware_plan.h"
+
+namespace tagwrench {
+namespace {
+
+/// sensor.yaml of the simulated sensor, said to be that of one to be built.
+std::string nominal_sensor(const hardware::Parameters& p) {
+  std::string text = sim::sensor_yaml(runnable_scenario_of(p));
+  if (text.starts_with('#')) text.erase(0, text.find('\n') + 1);
+  return fmt::format(
+             "# The sensor as drawn, {:g} mm from lens to tags: once it is built, `tagwrench "
+             "calibrate` puts what is true into here.\n",
+             1e3 * p.target.lens_distance) +
+         text;
+}
+
+void tell_of_mirror(const hardware::Geometry& g) {
+  if (!g.mirror) return;
+  tell(
+      "design: `run` does not follow the tag in the mirror yet: sensor.yaml and the simulator have "
+      "the flat tag alone, with which z and the tilts are poor");
+}
+
+/// As YAML takes any text.
+std::string quoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? "''" : std::string(1, c);
+  return out + "'";
+}
+
+}  // namespace
+
+int check_hardware(const std::string& file) {
+  const hardware::Parameters p = load_hardware(file);
+  const hardware::Geometry g = hardware::geometry(p);
+  const auto complaints = hardware::complaints(p, g);
+  for (const hardware::Complaint& c : complaints)
+    std::cout << fmt::format("{}: {}: {}\n", file, c.parameter, c.message);
+  if (!complaints.empty()) return 2;
+  const Vector6 range = hardware::range(p, g);
+  std::cout << fmt::format(
+      "{}: can be built: {:.1f} mm high; before the stops {:.2f} {:.2f} {:.2f} N, {:.1f} {:.1f} "
+      "{:.1f} mN m\n",
+      file, 1e3 * (g.top - g.bottom), range[0], range[1], range[2], 1e3 * range[3], 1e3 * range[4],
+      1e3 * range[5]);
+  tell_of_mirror(g);
+  return std::cout ? 0 : 1;
+}
+
+void export_hardware(const std::string& file, const std::string& folder) {
+  namespace fs = std::filesystem;
+  const hardware::Parameters p = load_buildable(file);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    throw ConfigError(fmt::format("{}: cannot be made a folder ({}): choose another --export",
+                                  folder, error.message()));
+  }
+  tell_of_mirror(hardware::geometry(p));
+  const fs::path into(folder);
+  write_atomically((into / "parameters.scad").string(),
+                   hardware::scad_parameters(p, hardware::geometry(p)));
+  write_atomically((into / "scenario.yaml").string(),
+                   "# The simulated sensor, as built.\nhardware: " +
+                       quoted(fs::absolute(file).lexically_normal().string()) + "\n");
+  write_atomically((into / "sensor.yaml").string(), nominal_sensor(p));
+  write_atomically((into / "plan.yaml").string(), hardware_plan(p));
+  tell(fmt::format("design: wrote parameters.scad, scenario.yaml, sensor.yaml and plan.yaml to {}",
+                   folder));
+}
+
+}  // namespace tagwrench
