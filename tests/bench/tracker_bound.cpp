@@ -125,6 +125,11 @@ Bound BoundOfScenario::at(const Vector6& displacement) {
   return bound;
 }
 
+Matrix6 BoundOfScenario::covariance(const Vector6& displacement) {
+  int pixels = 0;
+  return covariance(displacement, kStep_px, pixels);
+}
+
 double BoundOfScenario::change_with_step(const Vector6& displacement) {
   int pixels = 0;
   const Vector6 whole = covariance(displacement, kStep_px, pixels).diagonal().cwiseSqrt();

@@ -25,6 +25,8 @@ class BoundOfScenario {
  public:
   explicit BoundOfScenario(const sim::Scenario& scenario);
   Bound at(const Vector6& displacement);
+  /// Of the six displacements, m^2, m rad, rad^2.
+  Matrix6 covariance(const Vector6& displacement);
   /// Largest relative change of any sigma when the steps are 0.6 times as long: the check that the
   /// bound is a property of the pictures and not of the steps.
   double change_with_step(const Vector6& displacement);
