@@ -120,7 +120,7 @@ TEST_F(HardwareExport, KeepsTheEarlierFolderWhereAToolFails) {
 
 TEST_F(HardwareExport, StoppedItLeavesNothing) {
   fake_programs(folder_ / "bin", {"openscad", "prusa-slicer"},
-                "touch " + (folder_ / "drawing").string() + "; exec sleep 60");
+                "touch " + (folder_ / "drawing").string() + "; exec tail -f /dev/null");
   Bridge bridge(
       {"PATH=" + (folder_ / "bin").string() + ":" + std::getenv("PATH"), "python3", kScript,
        "--no-pictures", "--program", TAGWRENCH_PROGRAM, "paper", folder_ / "out"},

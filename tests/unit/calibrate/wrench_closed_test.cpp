@@ -185,6 +185,24 @@ TEST(WrenchClosed, AnAxisThatNoPushReachesIsMarkedHoweverCloseToNothingItWas) {
   }
 }
 
+// Everything counts from the rests: none may hold the tail of the push before it.
+TEST(WrenchClosed, RestsBetweenPushesAgree) {
+  sim::BenchSettings perfect;
+  perfect.perfect = true;
+  ClosedBench bench("load_cell", perfect, 1);
+  bench.play();
+  std::vector<Vector6> rests;
+  for (const StepRecord& record : bench.guide().records()) {
+    if (bench.plan().steps[static_cast<std::size_t>(record.step)].kind != StepKind::rest) continue;
+    Vector6 sum = Vector6::Zero();
+    for (const auto& frame : record.frames) sum += frame.displacement;
+    rests.push_back(bench.truth() * sum / static_cast<double>(record.frames.size()));
+  }
+  ASSERT_GE(rests.size(), 4u);
+  for (const Vector6& rest : rests)
+    EXPECT_LT(std::abs((rest - rests.front())[5]), 3e-6) << "N m about z";
+}
+
 TEST(WrenchClosed, ABumpIsRepeatedAndDoesNoHarm) {
   sim::BenchSettings settings;
   settings.faults.bump = 2;  // orders of the plan: hang, hang, let go, turn ...
