@@ -19,6 +19,7 @@ namespace {
 constexpr double kLeastExcitation = 10;
 // Below this the part of an axis' load that others do not tell is the reference's noise.
 constexpr double kLeastIndependent = 3;
+constexpr std::size_t kLeastRests = 3;  // windows that tell the noise
 constexpr double kUnknownNoise = 1e-9;  // of the range, where the reference has none
 constexpr double kMostExcitation = 1e6;
 constexpr int kBins = 10;
@@ -132,6 +133,25 @@ std::vector<Window> quiet_windows(const Course& course, const Analysis& analysis
   return windows;
 }
 
+bool at_rest(const Course& course, const Analysis& analysis, const Window& w) {
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    const double load = course.felt.col(j).segment(w.first, w.count).mean();
+    if (std::abs(load) > kRestShare * analysis.axis[static_cast<std::size_t>(j)].full_scale)
+      return false;
+  }
+  return true;
+}
+
+/// Those at rest, where there are enough of them: a weight that hangs still swings a little.
+std::vector<Window> noise_windows(const Course& course, const Analysis& analysis,
+                                  const std::vector<Window>& windows) {
+  std::vector<Window> rests;
+  for (const Window& w : windows) {
+    if (at_rest(course, analysis, w)) rests.push_back(w);
+  }
+  return rests.size() >= kLeastRests ? rests : windows;
+}
+
 /// White noise from neighbours' differences, which drift does not reach: density per root Hz is
 /// sqrt(2 period) times the Allan deviation at one period (IEEE Std 952, annex C).
 void measure_noise(const Course& course, const std::vector<Window>& windows, Eigen::Index k,
@@ -161,13 +181,7 @@ void measure_drift(const Course& course, const Analysis& analysis,
   std::vector<double> times;
   std::vector<double> errors;
   for (const Window& w : windows) {
-    bool rest = true;
-    for (Eigen::Index j = 0; j < 6; ++j) {
-      const double load = course.felt.col(j).segment(w.first, w.count).mean();
-      rest = rest &&
-             std::abs(load) <= kRestShare * analysis.axis[static_cast<std::size_t>(j)].full_scale;
-    }
-    if (!rest) continue;
+    if (!at_rest(course, analysis, w)) continue;
     times.push_back(course.time.segment(w.first, w.count).mean());
     errors.push_back((course.predicted - course.felt).col(k).segment(w.first, w.count).mean());
   }
@@ -314,11 +328,12 @@ void measure_held_out(Analysis& analysis) {
 
 void measure_rest(const Course& course, double period, bool one_clock, Analysis& analysis) {
   const std::vector<Window> windows = quiet_windows(course, analysis, period);
+  const std::vector<Window> still = noise_windows(course, analysis, windows);
   for (std::size_t k = 0; k < 6; ++k) {
     AxisReport& axis = analysis.axis[k];
     const auto at = static_cast<Eigen::Index>(k);
     if (axis.full_scale == 0) continue;
-    measure_noise(course, windows, at, period, axis);
+    measure_noise(course, still, at, period, axis);
     if (one_clock) measure_drift(course, analysis, windows, at, axis);
     measure_creep(course, windows, at, axis);
   }

@@ -1,6 +1,7 @@
 // Noise, creep, drift, hysteresis and cross-talk that are built into an instrument of numbers are
 // measured.
 #include <cmath>
+#include <numbers>
 
 #include "host/study/analysis.h"
 #include "tests/unit/study/analyzed.h"
@@ -25,6 +26,19 @@ TEST(AnalysisMetrics, NoiseDensityAndResolutionAreThoseOfTheReadings) {
     EXPECT_NEAR(*axis.noise_density, expected * std::sqrt(2 / 50.0), 0.1 * expected);
     EXPECT_NEAR(*axis.resolution, 2.77 * *axis.noise, 0.01 * *axis.noise);
   }
+}
+
+TEST(AnalysisMetrics, AWeightThatSwingsIsNoNoiseOfTheSensor) {
+  const Eigen::MatrixXd loads = loads_in_turn(3);
+  const Trial still = steps(loads, 4);
+  Trial swinging = still;
+  for (Eigen::Index i = 0; i < swinging.time.size(); ++i) {
+    if (swinging.reference.row(i).norm() > 0)
+      swinging.features(i, 0) +=
+          3e-6 * std::sin(2 * std::numbers::pi * 1.5 * swinging.time[i]);  // m
+  }
+  const double alone = *analyze({still}, {}).axis[0].noise;
+  EXPECT_NEAR(*analyze({swinging}, {}).axis[0].noise, alone, 0.15 * alone);
 }
 
 TEST(AnalysisMetrics, CreepAndDriftAreMeasured) {
