@@ -36,7 +36,7 @@ PICTURE = ["--imgsize=1200,900", "--projection=o", "--autocenter", "--viewall", 
 VIEWS = {  # and the angles from which they are seen
     "assembly": (68, 0, 40), "exploded": (68, 0, 40), "section": (76, 0, 18),
     **{f"step_{number}": (62, 0, 35) for number in range(1, 9)},
-    "step_6": (35, 0, 50),  # into the hood
+    "step_6": (20, 0, 12),  # into the hood
 }
 NEEDS = {"step_8": "puck_base"}  # views of some variants only
 JOBS = 2

@@ -72,7 +72,7 @@ module on_platform() {
   translate([0, 0, z_platform]) children();
 }
 
-/// In the frame of the tag: x right, y up on the paper, z behind it.
+/// In the frame of the tag: x right, y down on the paper, z into it.
 module at_tag(tag) {
   on_platform() translate([tag[0], tag[1], tag[2]]) turned([tag[3], tag[4], tag[5]]) children();
 }

@@ -51,13 +51,29 @@ module stop_screws_in() {
 }
 
 module tag_papers() {
-  for (tag = tags) at_tag(tag) {
-    color("white") box([-paper_half, -paper_half, 0], [paper_half, paper_half, paper_thickness]);
-    color("black") box([-target_tag_size / 2, -target_tag_size / 2, -0.03], [target_tag_size / 2, target_tag_size / 2, 0.05]);
-    color("white") for (cell = [[-1, -1], [0, -1], [1, 0], [-1, 1], [0, 1]])
-      translate([cell[0], cell[1], 0] * target_tag_size / 7 * 1.5)
-        cube([target_tag_size / 7, target_tag_size / 7, 0.12], center = true);
+  for (i = [0:len(tags) - 1]) at_tag(tags[i]) tag_paper(i);
+}
+
+/// As it is printed, in the frame of the tag.
+module tag_paper(i) {
+  color("white") box([-paper_half, -paper_half, 0], [paper_half, paper_half, paper_thickness]);
+  color("black") box([-target_tag_size / 2, -target_tag_size / 2, -0.03], [target_tag_size / 2, target_tag_size / 2, 0.05]);
+  color("white") white_cells(tag_bits[i]);
+}
+
+/// One below the other, enlarged, upright, as the camera sees them; the ids beside them.
+module tags_enlarged(times) {
+  for (i = [0:len(tags) - 1]) translate([0, (i - (len(tags) - 1) / 2) * 3 * times * paper_half, 0]) {
+    scale(times) tag_paper(i);
+    color("black") translate([1.3 * times * paper_half, 0, 0]) mirror([0, 1, 0])
+      linear_extrude(0.1) text(str("id ", tag_ids[i]), size = 0.5 * times * paper_half, valign = "center", $fn = 8);
   }
+}
+
+module white_cells(rows) {
+  cell = target_tag_size / len(rows);
+  for (row = [0:len(rows) - 1]) for (column = [0:len(rows) - 1]) if (rows[row][column] == "1")
+    translate([column * cell - target_tag_size / 2, row * cell - target_tag_size / 2, -0.06]) cube([cell, cell, 0.1]);
 }
 
 module mirror_glass() {

@@ -26,6 +26,7 @@ grey = "#6f6f74";
 white = "#f4f1e6";
 blue = "#2f8fc4";
 brown = "#5b4648";
+light = "#c9c9cc";
 
 if (print) on_bed(part) printed(part);
 else if (part == "assembly") assembly();
@@ -201,8 +202,9 @@ module step(number) {
     translate([0, 0, 8]) color(blue) top_plate();
   }
   else if (number == "6") upside_down(z_top) {
-    color(brown) hood();
+    color(light) hood();  // so that papers and ids stand out
     translate([0, 0, -5]) tag_papers();
+    translate([inner_to + 18, 0, z_plate_top]) tags_enlarged(4);
   }
   else if (number == "7") {
     base();

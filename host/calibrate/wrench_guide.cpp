@@ -323,11 +323,13 @@ void WrenchGuide::resume(std::vector<StepRecord> records, const std::vector<int>
   todo_ = left;
   for (const StepRecord& record : records_) zeros_ = std::max(zeros_, record.zero + 1);
   // The sensor may have been moved meanwhile: a rest shows it before anything else is loaded.
-  if (!todo_.empty() && !records_.empty() && step().kind != StepKind::rest &&
-      step_of(records_.back()).visit == step().visit)
-    todo_.push_front(last_rest()->step);
+  const bool rest_again = !todo_.empty() && !records_.empty() && step().kind != StepKind::rest &&
+                          step_of(records_.back()).visit == step().visit;
+  if (rest_again) todo_.push_front(last_rest()->step);
   recount();
   lines_.clear();
+  if (rest_again)
+    say(Line::note, "the rest of this position is taken again: the sensor may have been moved");
   asks_ = 0;
   ask();
 }

@@ -32,6 +32,10 @@ class Sheet {
   void texts(std::string_view name, const std::vector<std::string>& values) {
     text_ += fmt::format("{} = [\"{}\"];\n", name, fmt::join(values, "\", \""));
   }
+  /// As they stand.
+  void raw(std::string_view name, const std::vector<std::string>& values) {
+    text_ += fmt::format("{} = [{}];\n", name, fmt::join(values, ", "));
+  }
   /// Vectors of lengths, mm.
   void list(std::string_view name, const std::vector<std::vector<double>>& rows) {
     std::vector<std::string> parts;
@@ -40,7 +44,7 @@ class Sheet {
       for (double& v : values) v = rounded(v);
       parts.push_back(fmt::format("[{}]", fmt::join(values, ", ")));
     }
-    text_ += fmt::format("{} = [{}];\n", name, fmt::join(parts, ", "));
+    raw(name, parts);
   }
   void comment(std::string_view words) { text_ += fmt::format("// {}\n", words); }
   std::string take() { return std::move(text_); }
@@ -111,6 +115,25 @@ void chosen(const Parameters& p, Sheet& s) {
   s.mm("light_diffuser", p.light.diffuser);
 }
 
+/// Rows from the top, each from the left: 1 where a cell is white.
+void printed(const std::vector<TagPattern>& patterns, Sheet& s) {
+  std::vector<std::string> ids, bits;
+  for (const TagPattern& pattern : patterns) {
+    std::vector<std::string> rows;
+    for (int row = 0; row < pattern.cells; ++row) {
+      std::string cells = "\"";
+      for (int column = 0; column < pattern.cells; ++column)
+        cells += pattern.is_white(row, column) ? '1' : '0';
+      rows.push_back(cells + '"');
+    }
+    ids.push_back(fmt::to_string(pattern.id));
+    bits.push_back(fmt::format("[{}]", fmt::join(rows, ", ")));
+  }
+  s.raw("tag_ids", ids);
+  s.comment("rows of cells from the top, as printed; 1: white");
+  s.raw("tag_bits", bits);
+}
+
 std::vector<std::vector<double>> places(const std::vector<Eigen::Vector2d>& points) {
   std::vector<std::vector<double>> out;
   for (const Eigen::Vector2d& at : points) out.push_back({kToMm * at.x(), kToMm * at.y()});
@@ -175,12 +198,14 @@ void derived(const Geometry& g, Sheet& s) {
 
 }  // namespace
 
-std::string scad_parameters(const Parameters& parameters, const Geometry& geometry) {
+std::string scad_parameters(const Parameters& parameters, const Geometry& geometry,
+                            const std::vector<TagPattern>& patterns) {
   Sheet sheet;
   sheet.comment("Written by `tagwrench design`; mm, degrees. As chosen:");
   chosen(parameters, sheet);
   sheet.comment("What follows; z is the height above the lower face of the mounting plate:");
   derived(geometry, sheet);
+  printed(patterns, sheet);
   std::vector<std::vector<double>> loads;
   for (const Eigen::Vector3d& at : load_points(parameters, geometry))
     loads.push_back({kToMm * at.x(), kToMm * at.y(), kToMm * at.z()});

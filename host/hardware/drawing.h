@@ -2,14 +2,18 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "host/hardware/geometry.h"
 #include "host/hardware/parameters.h"
+#include "host/tracker/edges.h"
 
 namespace tagwrench::hardware {
 
 /// Assignments, one a line: of what stands in the file under its own name without the unit
 /// (`springs_free_length = 25.4;`), and of what follows from it (`z_cover_top = ...;`).
-std::string scad_parameters(const Parameters& parameters, const Geometry& geometry);
+/// `patterns`: what is printed on each of the geometry's tags.
+std::string scad_parameters(const Parameters& parameters, const Geometry& geometry,
+                            const std::vector<TagPattern>& patterns);
 
 }  // namespace tagwrench::hardware

@@ -189,7 +189,9 @@ void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject
                     calibration_of(plan, subject.sensor, measured, data, fit));
   std::error_code none;
   fs::remove(subject.files.progress, none);
-  for (const std::string& line : describe(plan, data, fit, subject.range)) tell(line);
+  for (const std::string& line :
+       describe(plan, data, fit, subject.range, subject.sensor.wrench.range))
+    tell(line);
   tell(fmt::format("written: {}, {} and wrench.calibration in {}",
                    subject.files.calibration.string(), subject.files.data.string(),
                    options.sensor));

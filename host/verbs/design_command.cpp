@@ -104,11 +104,16 @@ DesignCommand::DesignCommand(CLI::App& app)
                         "the options below");
   CLI::Option* check = verb_->add_option(
       "--check", check_, "a file of hardware/sensors: only whether it can be built, and why not");
+  CLI::Option* folder =
+      verb_
+          ->add_option("--export", export_,
+                       "folder for what follows from --hardware: parameters.scad for the parts, "
+                       "sensor.yaml, plan.yaml, scenario.yaml for the simulator")
+          ->needs(hardware);
   verb_
-      ->add_option("--export", export_,
-                   "folder for what follows from --hardware: parameters.scad for the parts, "
-                   "sensor.yaml, scenario.yaml for the simulator")
-      ->needs(hardware);
+      ->add_flag("--force", force_,
+                 "what --export finds there and has been changed (calibrated, say) is replaced")
+      ->needs(folder);
   check->excludes(hardware);
   range_given_ = verb_->add_option("--range-n", range_n_, "wanted, +- along each axis, N")
                      ->capture_default_str()
@@ -358,7 +363,7 @@ study::Instrument DesignCommand::instrument() const {
 int DesignCommand::run() const {
   if (!check_.empty()) return check_hardware(check_);
   const study::Instrument asked = instrument();
-  if (!export_.empty()) export_hardware(hardware_, export_);
+  if (!export_.empty()) export_hardware(hardware_, export_, force_);
   const study::Design design = study::design(asked, ranges_);
   std::cout << design_report(asked, design) << std::flush;
   for (const std::string& warning : design.warnings) tell(warning);

@@ -45,6 +45,7 @@ class DesignCommand {
   std::string hardware_;
   std::string check_;
   std::string export_;
+  bool force_ = false;
   std::string camera_ = "640x480";
   double fps_ = 25;
   double lens_distance_mm_ = 21;

@@ -11,6 +11,7 @@
 #include "host/config_error.h"
 #include "host/output/sample_text.h"
 #include "host/tell.h"
+#include "host/verbs/count_text.h"
 
 namespace tagwrench {
 namespace {
@@ -19,13 +20,20 @@ namespace fs = std::filesystem;
 
 std::int64_t ns(TimePoint time) { return time.time_since_epoch().count(); }
 
+/// What a file holds now. Standard output is not talked about.
+void tell_written(std::uint64_t count, std::string_view one, const std::string& path) {
+  if (path != "-") tell(fmt::format("{} in {}", count_text(count, one), path));
+}
+
 void export_samples(const std::string& recording, const std::string& path, bool force) {
   record::RecordingReader reader(recording);
   ExportFile file(path, force);
   file.out() << kCsvHeader;
   LineBuffer line{};
-  for (Sample sample; reader.next(sample);) file.out() << csv_line(line, sample);
+  std::uint64_t count = 0;
+  for (Sample sample; reader.next(sample); ++count) file.out() << csv_line(line, sample);
   file.finish();
+  tell_written(count, "sample", path);
 }
 
 /// NaN is an empty field.
@@ -41,7 +49,8 @@ void export_references(const std::string& recording, const std::string& path, bo
     for (int i = 0; i < 6; ++i) file.out() << ',' << what << '_' << i;
   }
   file.out() << '\n';
-  for (record::ReferenceRecord r; reader.next(r);) {
+  std::uint64_t count = 0;
+  for (record::ReferenceRecord r; reader.next(r); ++count) {
     std::string line = fmt::format("{},{},{},{},{},{}", ns(r.time), r.time_sigma.count(), r.channel,
                                    r.axes, r.saturated ? 1 : 0, r.lost_before);
     for (const auto* six : {&r.counts, &r.value, &r.sigma}) {
@@ -50,6 +59,7 @@ void export_references(const std::string& recording, const std::string& path, bo
     file.out() << line << '\n';
   }
   file.finish();
+  tell_written(count, "reading", path);
 }
 
 /// RFC 4180.
@@ -63,12 +73,14 @@ void export_events(const std::string& recording, const std::string& path, bool f
   record::RecordingReader reader(recording);
   ExportFile file(path, force);
   file.out() << "id,t_ns,kind,step,value,text\n";
-  for (record::EventRecord e; reader.next(e);) {
+  std::uint64_t count = 0;
+  for (record::EventRecord e; reader.next(e); ++count) {
     file.out() << fmt::format("{},{},{},{},{},{}\n", e.id, ns(e.time), name(e.kind),
                               e.step < 0 ? std::string() : std::to_string(e.step), e.value,
                               e.text.empty() ? std::string() : in_quotes(e.text));
   }
   file.finish();
+  tell_written(count, "event", path);
 }
 
 }  // namespace

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <filesystem>
 #include <iostream>
+#include <utility>
+#include <vector>
 
 #include "host/config/hardware_config.h"
 #include "host/config/sensor_edit.h"
@@ -12,6 +15,7 @@
 #include "host/hardware/drawing.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/tell.h"
+#include "host/tracker/tag_patterns.h"
 #include "host/verbs/hardware_plan.h"
 
 namespace tagwrench {
@@ -42,6 +46,26 @@ std::string quoted(const std::string& text) {
   return out + "'";
 }
 
+/// As printed, in the order of the places.
+std::vector<TagPattern> patterns_of(const hardware::Parameters& p, const hardware::Geometry& g) {
+  const TagFamily family = *family_from_name(p.target.family);
+  std::vector<TagPattern> out;
+  for (const hardware::TagPlace& tag : g.tags)
+    out.push_back(tag_pattern(family, tag.id, p.target.tag_size, p.target.border));
+  return out;
+}
+
+/// Throws ConfigError if something else is at `path`: somebody may have worked on it.
+void check_unchanged(const std::filesystem::path& path, const std::string& text) {
+  std::error_code error;
+  if (!std::filesystem::exists(std::filesystem::symlink_status(path, error))) return;
+  if (std::filesystem::is_regular_file(path, error) && read_text(path) == text) return;
+  throw ConfigError(
+      fmt::format("{}: is there already and holds something else (a calibration or another design "
+                  "may have changed it); name another folder, or replace it with --force",
+                  path.string()));
+}
+
 }  // namespace
 
 int check_hardware(const std::string& file) {
@@ -61,24 +85,29 @@ int check_hardware(const std::string& file) {
   return std::cout ? 0 : 1;
 }
 
-void export_hardware(const std::string& file, const std::string& folder) {
+void export_hardware(const std::string& file, const std::string& folder, bool force) {
   namespace fs = std::filesystem;
   const hardware::Parameters p = load_buildable(file);
+  const hardware::Geometry g = hardware::geometry(p);
+  const fs::path into(folder);
+  const std::array<std::pair<fs::path, std::string>, 4> files{{
+      {into / "sensor.yaml", nominal_sensor(p)},
+      {into / "plan.yaml", hardware_plan(p)},
+      {into / "scenario.yaml", "# The simulated sensor, as built.\nhardware: " +
+                                   quoted(fs::absolute(file).lexically_normal().string()) + "\n"},
+      {into / "parameters.scad", hardware::scad_parameters(p, g, patterns_of(p, g))},
+  }};
+  for (const auto& [path, text] : files) {
+    if (!force) check_unchanged(path, text);
+  }
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
     throw ConfigError(fmt::format("{}: cannot be made a folder ({}): choose another --export",
                                   folder, error.message()));
   }
-  tell_of_mirror(hardware::geometry(p));
-  const fs::path into(folder);
-  write_atomically((into / "parameters.scad").string(),
-                   hardware::scad_parameters(p, hardware::geometry(p)));
-  write_atomically((into / "scenario.yaml").string(),
-                   "# The simulated sensor, as built.\nhardware: " +
-                       quoted(fs::absolute(file).lexically_normal().string()) + "\n");
-  write_atomically((into / "sensor.yaml").string(), nominal_sensor(p));
-  write_atomically((into / "plan.yaml").string(), hardware_plan(p));
+  tell_of_mirror(g);
+  for (const auto& [path, text] : files) write_atomically(path, text);
   tell(fmt::format("design: wrote parameters.scad, scenario.yaml, sensor.yaml and plan.yaml to {}",
                    folder));
 }

@@ -11,7 +11,8 @@ int check_hardware(const std::string& file);
 
 /// parameters.scad, sensor.yaml, scenario.yaml and plan.yaml (for `calibrate wrench`) of the
 /// sensor, into `folder`, which may be there. Throws ConfigError for what cannot be built or
-/// written.
-void export_hardware(const std::string& file, const std::string& folder);
+/// written, and, unless `force`, where one of these files is there and holds something else (a
+/// calibration may have edited it): then nothing is written.
+void export_hardware(const std::string& file, const std::string& folder, bool force);
 
 }  // namespace tagwrench

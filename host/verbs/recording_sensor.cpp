@@ -66,8 +66,9 @@ void take_sensor(const std::string& name, const std::string& text, record::Head&
 void write_recorded_sensor(const record::Head& head, const fs::path& folder) {
   std::string yaml = head.sensor_yaml;
   if (!head.appearance.empty()) {
-    yaml = with_keys(yaml, {"rest", {{"appearance", "appearance.png"}}}, "sensor.yaml");
-    write_atomically(folder / "appearance.png", head.appearance);
+    // As `calibrate target` names it. Not .png: the folder may be one of frames.
+    yaml = with_keys(yaml, {"rest", {{"appearance", "sensor.yaml.rest"}}}, "sensor.yaml");
+    write_atomically(folder / "sensor.yaml.rest", head.appearance);
   }
   if (!head.calibration.empty()) {
     yaml = with_keys(yaml, {"wrench", {{"calibration", "calibration.json"}}}, "sensor.yaml");

@@ -17,7 +17,8 @@ void take_sensor(const std::string& name, const std::string& text, record::Head&
 SensorConfig recorded_sensor(const record::Head& head, const std::string& recording,
                              WrenchCalibration use = WrenchCalibration::use);
 
-/// sensor.yaml, and beside it appearance.png and calibration.json where it has them, into a folder.
+/// sensor.yaml, and beside it sensor.yaml.rest (its appearance) and calibration.json where it has
+/// them, into a folder, which may be one of frames.
 /// Throws ConfigError or std::runtime_error.
 void write_recorded_sensor(const record::Head& head, const std::filesystem::path& folder);
 

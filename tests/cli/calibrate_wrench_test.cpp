@@ -152,6 +152,8 @@ TEST_F(CalibrateWrench, AxesThatNoStepReachesAreCompletedAndMarkedOrRefusedByNam
   const Outcome outcome = calibrate(plan_);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("no load pushes along x: Fx"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("less than half of the range: Fz 0.49 of 2.50 N, "), std::string::npos)
+      << outcome.err;
   const json axes = json::parse(read_file(out_)).at("axes");
   EXPECT_EQ(axes[2].at("state"), "calibrated");
   EXPECT_NE(axes[0].at("state"), "calibrated");

@@ -139,5 +139,51 @@ TEST_F(DesignHardware, ExportGoesOnlyWhereItCanBeWritten) {
   EXPECT_NE(alone.err.find("--hardware"), std::string::npos) << alone.err;
 }
 
+TEST_F(DesignHardware, ExportReplacesWhatHasBeenChangedOnlyWhenForced) {
+  const std::string paper = TAGWRENCH_SENSORS "/paper.yaml";
+  const std::string folder = temporary_ / "out";
+  const std::vector<std::string> again{"design", "--hardware", paper, "--export", folder};
+  ASSERT_EQ(run_bridge(again).status, 0);
+  EXPECT_EQ(run_bridge(again).status, 0) << "what is the same may be written again";
+  for (const char* name : {"sensor.yaml", "plan.yaml"}) {
+    const std::string file = folder + "/" + name;
+    const std::string drawn = read_file(file);
+    const std::string mine = drawn + "# measured\n";
+    write_file(file, mine);
+    std::filesystem::remove(folder + "/parameters.scad");
+    const Outcome refused = run_bridge(again);
+    EXPECT_EQ(refused.status, 2) << refused.err;
+    EXPECT_EQ(lines_in(refused.err), 1u) << refused.err;
+    EXPECT_NE(refused.err.find(file + ": is there already"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("--force"), std::string::npos) << refused.err;
+    EXPECT_EQ(read_file(file), mine);
+    EXPECT_FALSE(std::filesystem::exists(folder + "/parameters.scad")) << "nothing is written";
+    const Outcome forced =
+        run_bridge({"design", "--hardware", paper, "--export", folder, "--force"});
+    EXPECT_EQ(forced.status, 0) << forced.err;
+    EXPECT_EQ(read_file(file), drawn);
+  }
+  const Outcome alone = run_bridge({"design", "--hardware", paper, "--force"});
+  EXPECT_EQ(alone.status, 2);
+  EXPECT_NE(alone.err.find("--export"), std::string::npos) << alone.err;
+}
+
+TEST_F(DesignHardware, DrawingHasTheTagsAsTheyArePrinted) {
+  const std::string folder = temporary_ / "out";
+  ASSERT_EQ(
+      run_bridge({"design", "--hardware", TAGWRENCH_SENSORS "/paper.yaml", "--export", folder})
+          .status,
+      0);
+  const std::string drawing = read_file(folder + "/parameters.scad");
+  EXPECT_NE(drawing.find("\ntag_ids = [5, 2];\n"), std::string::npos);
+  // The original ArUco code writes ids in rows of five bits, two of which count: 00 is 10000, 01 is
+  // 10111, 10 is 01001 and 11 is 01110 (Garrido-Jurado et al. 2014; OpenCV's DICT_ARUCO_ORIGINAL).
+  const std::string zeros = "\"0000000\", \"0100000\", \"0100000\", \"0100000\", ";
+  EXPECT_NE(drawing.find("\ntag_bits = [[" + zeros + "\"0101110\", \"0101110\", \"0000000\"], [" +
+                         zeros + "\"0100000\", \"0010010\", \"0000000\"]];\n"),
+            std::string::npos)
+      << drawing;
+}
+
 }  // namespace
 }  // namespace tagwrench::test

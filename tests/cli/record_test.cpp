@@ -110,6 +110,37 @@ TEST_F(Record, ExportedFramesAreAFolderThatRunsTheSame) {
   EXPECT_NE(again.err.find("exists"), std::string::npos);
 }
 
+TEST_F(Record, ExportedFramesRunWithTheAppearanceOfTheirSensor) {
+  write_file(folder_ / "moving.yaml", std::string(kSmall) + "seed: 3\n");
+  ASSERT_EQ(run_bridge({"sim", "--scenario", file("moving.yaml"), "--out", file("frames"),
+                        "--frames", "90"})
+                .status,
+            0);
+  const std::string sensor = file("frames/sensor.yaml");
+  const Outcome learned = run_bridge(
+      {"calibrate", "target", "--sensor", sensor, "--source", "images:" + file("frames")});
+  ASSERT_EQ(learned.status, 0) << learned.err;
+  const std::string appearance = read_file(file("frames/sensor.yaml.rest"));
+  ASSERT_EQ(record("images:" + file("frames"), {"--frames", "30"}).status, 0);
+  const Outcome exported =
+      run_bridge({"export", file("r.twr"), "--frames", file("out"), "--csv", file("out.csv")});
+  ASSERT_EQ(exported.status, 0) << exported.err;
+  EXPECT_NE(exported.err.find("30 frames in " + file("out")), std::string::npos) << exported.err;
+  EXPECT_NE(exported.err.find("30 samples in " + file("out.csv")), std::string::npos)
+      << exported.err;
+  EXPECT_EQ(read_file(file("out/sensor.yaml.rest")), appearance);
+  const Outcome ran = run_bridge({"run", "--source", "images:" + file("out"), "--fast", "--frames",
+                                  "5", "--output", "jsonl:-"});
+  EXPECT_EQ(ran.status, 0) << ran.err;
+  EXPECT_EQ(lines_in(ran.out), 5U) << ran.err;
+  EXPECT_NE(ran.out.find("\"status\":\"ok\""), std::string::npos) << ran.out;
+  // A picture without a time is still refused.
+  fs::copy_file(file("out/000000.png"), file("out/appearance.png"));
+  const Outcome refused = run_bridge({"run", "--source", "images:" + file("out"), "--fast"});
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("has no time for appearance.png"), std::string::npos) << refused.err;
+}
+
 TEST_F(Record, ExportedSamplesAreTheBytesOfTheCsvOutput) {
   ASSERT_EQ(
       record(small(), {"--frames", "40", "--output", "csv:" + file("live.csv"), "--keep", "none"})

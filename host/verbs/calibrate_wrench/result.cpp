@@ -9,11 +9,14 @@
 #include "host/config/sha256.h"
 #include "host/study/trial_csv.h"
 #include "host/verbs/zero_command.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kLittle = 0.5;  // of the range
 
 /// As sensor.yaml names it: relative to itself where they share a folder.
 std::string name_from(const fs::path& sensor, const fs::path& file) {
@@ -47,6 +50,23 @@ std::string axis_line(int i, const AxisFit& axis, double range, double reference
   return fmt::format("{} {:9.1f} {:4} {:9.2f} {:4} {:6.2f} % {:9.2f} {:4} {:8.0f} %", name_of_axis,
                      milli * axis.largest, unit, milli * axis.held_out_rmse, unit,
                      100 * axis.held_out_rmse / range, milli * reference, unit, 100 * inside);
+}
+
+/// Axes of which the loads reached less than half of the range; empty: none.
+std::string little_loaded(const WrenchFit& fit, const Vector6& range) {
+  std::string axes;
+  for (int i = 0; i < 6; ++i) {
+    const AxisFit& axis = fit.axis[static_cast<std::size_t>(i)];
+    const bool little = axis.largest < kLittle * range[i] && range[i] < kUnknownRange;
+    if (axis.state != AxisState::calibrated || !little) continue;
+    const double scale = i < 3 ? 1 : 1e3;
+    axes += fmt::format("{}{} {:.2f} of {:.2f} {}", axes.empty() ? "" : ", ",
+                        kWrenchAxes[static_cast<std::size_t>(i)], scale * axis.largest,
+                        scale * range[i], i < 3 ? "N" : "mN m");
+  }
+  if (axes.empty()) return {};
+  return fmt::format(
+      "loaded to less than half of the range: {}; beyond that it is the model's word", axes);
 }
 
 /// All that were tried, the best of each kind, in one line.
@@ -93,7 +113,8 @@ void write_calibration(const CalibrationFiles& files, const std::string& sensor_
 }
 
 std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,
-                                  const WrenchFit& fit, const Vector6& range) {
+                                  const WrenchFit& fit, const Vector6& range,
+                                  const Vector6& known) {
   std::vector<std::string> lines = {
       "     loads up to   error held out   of range   loads known to   within 95 %"};
   const Vector6 reference = known_to(data, fit);
@@ -101,6 +122,8 @@ std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data
     const auto axis = static_cast<std::size_t>(i);
     lines.push_back(axis_line(i, fit.axis[axis], range[i], reference[i], fit.inside_95[axis]));
   }
+  if (const std::string little = little_loaded(fit, known); !little.empty())
+    lines.push_back(little);
   lines.push_back(
       "error held out: rms, each step predicted by the others. The load's own uncertainty is in it "
       "(loads known to: rms), so where the two are alike the reference limits, not the sensor");

@@ -29,8 +29,9 @@ void write_calibration(const CalibrationFiles& files, const std::string& sensor_
                        const std::filesystem::path& sensor_file, const SensorConfig& sensor,
                        const WrenchData& data, Calibration calibration);
 
-/// One line per axis and one for each thing to be said.
+/// One line per axis and one for each thing to be said. `range`: full load, N and N m; `known`:
+/// the sensor's own, beyond kUnknownRange where nobody has told it.
 std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,
-                                  const WrenchFit& fit, const Vector6& range);
+                                  const WrenchFit& fit, const Vector6& range, const Vector6& known);
 
 }  // namespace tagwrench

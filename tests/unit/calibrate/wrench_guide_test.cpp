@@ -165,6 +165,10 @@ TEST(WrenchGuide, GoesOnWhereItWasStopped) {
   WrenchGuide guide(plan, paper_options());
   guide.resume(stopped.records(), stopped.skipped());
   EXPECT_EQ(guide.asked(), 4) << "the rest of the mounting first: it may have been moved";
+  GuideLine why;
+  ASSERT_TRUE(guide.next(why));
+  EXPECT_NE(why.text.find("the rest of this position is taken again"), std::string::npos)
+      << why.text;
   HandsOn hands(plan, guide);
   hands.play();
   ASSERT_TRUE(guide.done()) << guide.live();

@@ -171,8 +171,19 @@ TEST(Geometry, VariantsNameWhatToPrint) {
   EXPECT_EQ(printed_parts(variant("puck")).back(), "puck_base");
   EXPECT_EQ(printed_parts(variant("mirror")).back(), "mirror_holder");
   const Parameters p = variant("paper");
-  EXPECT_NE(scad_parameters(p, geometry(p)).find("parts = [\"mounting_plate\", "),
+  EXPECT_NE(scad_parameters(p, geometry(p), {}).find("parts = [\"mounting_plate\", "),
             std::string::npos);
+}
+
+TEST(Geometry, DrawingHasTheCellsOfItsTags) {
+  const Parameters p = variant("paper");
+  TagPattern pattern;
+  pattern.id = 7;
+  pattern.cells = 3;
+  pattern.white = {0, 0, 1, 0, 1, 0, 0, 0, 0};
+  const std::string drawing = scad_parameters(p, geometry(p), {pattern});
+  EXPECT_NE(drawing.find("\ntag_ids = [7];\n"), std::string::npos);
+  EXPECT_NE(drawing.find("\ntag_bits = [[\"001\", \"010\", \"000\"]];\n"), std::string::npos);
 }
 
 TEST(Geometry, GripperBearsFortyNewtons) {
