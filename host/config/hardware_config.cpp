@@ -280,7 +280,7 @@ sim::Scenario scenario_of(const Parameters& p) {
   const Vector6 range = hardware::range(p, g);
   for (std::size_t i = 0; i < 6; ++i) {
     m.range[i] = range[static_cast<int>(i)];
-    // All six at once, by hand, stay within the stops.
+    // Modest, as all six act at once.
     out.trajectory.amplitude[i] = 0.3 * m.range[i];
   }
   sim::Camera& c = out.camera;

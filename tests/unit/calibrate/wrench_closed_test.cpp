@@ -153,6 +153,23 @@ TEST(WrenchClosed, APointThatIsElsewhereThanThePlanSaysIsTold) {
   }
 }
 
+// Half of the plan hangs there, so that the other half might as well be wrong.
+TEST(WrenchClosed, StepsThatContradictEachOtherAreToldWhereNobodyKnowsWhichAreWrong) {
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    ClosedBench bench("paper", {}, seed);
+    bench.play();
+    WrenchPlan plan = bench.plan();
+    for (PlanPoint& point : plan.points) {
+      if (point.name == "the centre") point.position.z() += 0.010;
+    }
+    try {
+      EXPECT_FALSE(bench.fit(collect(plan, bench.guide().records(), 0)).warnings.empty()) << seed;
+    } catch (const ConfigError& e) {
+      EXPECT_NE(std::string(e.what()).find("contradict"), std::string::npos) << e.what();
+    }
+  }
+}
+
 TEST(WrenchClosed, APlanWithItsPointsMirroredIsRefused) {
   ClosedBench bench("six_orientations", {}, 1);
   bench.play();
