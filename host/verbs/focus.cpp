@@ -195,22 +195,21 @@ class FocusScreen {
     live_ = ::isatty(STDOUT_FILENO) == 1 && term != nullptr && std::strcmp(term, "dumb") != 0;
   }
 
-  bool due(TimePoint now) const {
-    return !last_ || now - *last_ >= (live_ ? kDrawEvery : kSayEvery);
-  }
+  bool due(TimePoint now) const { return now >= next_; }
 
   /// Whether it could be written.
   bool show(const std::vector<std::string>& lines, TimePoint now) {
     std::string out;
     if (live_) {
-      if (last_) out += fmt::format("\x1b[{}A", lines.size());
+      if (shown_) out += fmt::format("\x1b[{}A", lines.size());
       for (const std::string& line : lines)
         out += fmt::format("\r{}\x1b[K\n", line.substr(0, columns() - 1));
     } else {
       for (const std::string& line : lines) out += (out.empty() ? "" : "; ") + line;
       out += '\n';
     }
-    last_ = now;
+    shown_ = true;
+    next_ = now + (live_ ? kDrawEvery : kSayEvery);
     std::fputs(out.c_str(), stdout);
     return std::fflush(stdout) == 0;
   }
@@ -223,7 +222,8 @@ class FocusScreen {
   }
 
   bool live_ = false;
-  std::optional<TimePoint> last_;
+  bool shown_ = false;
+  TimePoint next_ = TimePoint::min();
 };
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace {
 
 /// Every seed glues the tags anew, and its tracker learns anew where they sit.
 constexpr int kSeeds = 8;
-constexpr int kFrames = 250;  // judged, of each seed
+constexpr int kFrames = 80;  // judged, of each seed
 
 struct Consistency {
   int frames = 0;

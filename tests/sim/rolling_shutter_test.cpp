@@ -14,7 +14,7 @@
 namespace tagwrench::test {
 namespace {
 
-constexpr int kFrames = 200;
+constexpr int kJudged = 200;
 
 TEST(RollingShutter, MeasuredReadoutTakesAwayMostOfTheErrorOfMotion) {
   constexpr double kLeft = 0.5;   // of the error
@@ -29,7 +29,7 @@ TEST(RollingShutter, MeasuredReadoutTakesAwayMostOfTheErrorOfMotion) {
   SimulatorSource source(scenario, /*live=*/false);
   Vector6 off = Vector6::Zero(), on = Vector6::Zero();
   int ok = 0, both = 0;
-  for (int i = 0; i < sensor.rest.frames + kFrames; ++i) {
+  for (int i = 0; i < sensor.rest.frames + kJudged; ++i) {
     Frame frame;
     source.read(frame);
     const Track blind = without.track(frame);

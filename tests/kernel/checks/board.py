@@ -26,7 +26,8 @@ def whole_rows():
     if not os.path.exists(REFERENCE):
         return 0
     with open(REFERENCE, encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+        whole_lines = file.read().split("\n")[:-1]  # the bridge may be in the middle of one
+    rows = list(csv.DictReader(whole_lines)) if whole_lines else []
     return sum(all(row.get(f"cell{i}_counts") for i in range(4)) for row in rows)
 
 

@@ -116,11 +116,11 @@ TEST_F(Derivatives, AgreeWithDifferencesOfTheProjection) {
 
 // Random equations, solved by elimination and all at once.
 TEST(TargetEquations, EliminationSolvesWhatTheFullEquationsSay) {
-  constexpr int kFrames = 3;
+  constexpr int kViews = 3;
   constexpr int kTags = 2;
   constexpr Eigen::Index kPoints = 16;
   constexpr Eigen::Index kShared = 7 * kTags + 2;
-  constexpr Eigen::Index kAll = 6 * kFrames + kShared + kPoints;
+  constexpr Eigen::Index kAll = 6 * kViews + kShared + kPoints;
   std::mt19937 random(3);
   std::normal_distribution<double> gauss;
   const auto vector6 = [&] {
@@ -129,10 +129,10 @@ TEST(TargetEquations, EliminationSolvesWhatTheFullEquationsSay) {
     v.head<3>() *= 200;  // as px/m to px/rad
     return v;
   };
-  TargetNormal normal(kFrames, kTags, kPoints);
+  TargetNormal normal(kViews, kTags, kPoints);
   Eigen::MatrixXd full = Eigen::MatrixXd::Zero(kAll, kAll);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(kAll);
-  const Eigen::Index shared = 6 * kFrames;
+  const Eigen::Index shared = 6 * kViews;
   const Eigen::Index points = shared + kShared;
   const auto add = [&](const Eigen::VectorXd& row, double offset, double weight) {
     full += weight * row * row.transpose();
@@ -140,7 +140,7 @@ TEST(TargetEquations, EliminationSolvesWhatTheFullEquationsSay) {
   };
   for (Eigen::Index p = 0; p < kPoints; ++p) {
     const int tag = static_cast<int>(p % kTags);
-    for (int frame = -1; frame < kFrames; ++frame) {
+    for (int frame = -1; frame < kViews; ++frame) {
       EdgeEquation e;
       e.frame = frame;
       e.tag = tag;

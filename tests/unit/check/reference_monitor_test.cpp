@@ -17,7 +17,7 @@ struct Instrument {
   double spikes = 0;        ///< share of pairs that are far off
 };
 
-Vector6 range() { return (Vector6() << 1, 1, 3, 0.02, 0.02, 0.01).finished(); }
+Vector6 monitored_range() { return (Vector6() << 1, 1, 3, 0.02, 0.02, 0.01).finished(); }
 /// Down, 5 mm off in x.
 Vector6 line() { return (Vector6() << 0, 0, -1, 0, 5e-3, 0).finished(); }
 
@@ -31,10 +31,11 @@ std::vector<ReferenceFault> play(ReferenceMonitor& monitor, const Instrument& se
     const double force = sensor.excitation * (1 + std::sin(2 * M_PI * 0.3 * t));
     Vector6 wrench = line() * (sensor.scale * force + sensor.zero);
     wrench[0] += sensor.other * std::sin(2 * M_PI * 0.17 * t);
-    for (int i = 0; i < 6; ++i) wrench[i] += 1e-3 * range()[i] * normal(random);
+    for (int i = 0; i < 6; ++i) wrench[i] += 1e-3 * monitored_range()[i] * normal(random);
     if (uniform(random) < sensor.spikes) wrench += 0.2 * line();
-    const ReferenceFault fault = monitor.add(TimePoint(Duration(std::llround(t * 1e9))), wrench,
-                                             line(), range(), force + 0.5e-3 * normal(random));
+    const ReferenceFault fault =
+        monitor.add(TimePoint(Duration(std::llround(t * 1e9))), wrench, line(), monitored_range(),
+                    force + 0.5e-3 * normal(random));
     if (fault != ReferenceFault::none) said.push_back(fault);
   }
   return said;
@@ -91,8 +92,8 @@ TEST(ReferenceMonitor, WithoutARangeOrWithNumbersThatAreNoneItIsSilent) {
     EXPECT_EQ(monitor.add(TimePoint(std::chrono::milliseconds(40 * i)), 2 * line(), line(), unknown,
                           i % 7),
               ReferenceFault::none);
-    EXPECT_EQ(monitor.add(TimePoint(std::chrono::milliseconds(40 * i)), 2 * line(), line(), range(),
-                          std::nan("")),
+    EXPECT_EQ(monitor.add(TimePoint(std::chrono::milliseconds(40 * i)), 2 * line(), line(),
+                          monitored_range(), std::nan("")),
               ReferenceFault::none);
   }
 }

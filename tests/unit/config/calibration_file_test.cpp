@@ -11,7 +11,7 @@
 namespace tagwrench {
 namespace {
 
-const char* const kGood = R"({"format": "tagwrench-calibration-1",
+const char* const kCalibration = R"({"format": "tagwrench-calibration-1",
  "sensor": {"family": "aruco_original", "tag_ids": [5, 2], "tag_size_mm": 3.8, "image_px": [640, 480]},
  "K": [[280,0,0,0,0,0],[0,280,0,0,0,0],[0,0,2800,0,0,0],[0,0,0,0.2,0,0],[0,0,0,0,0.3,0],[0,0,1.5,0,0,0.05]],
  "B": [0.1,0,0,0,0,0],
@@ -33,7 +33,7 @@ class CalibrationFile : public testing::Test {
     return model;
   }
   std::string complaint(const std::string& from, const std::string& to) {
-    std::string text = kGood;
+    std::string text = kCalibration;
     text.replace(text.find(from), from.size(), to);
     try {
       load(text);
@@ -47,7 +47,7 @@ class CalibrationFile : public testing::Test {
 };
 
 TEST_F(CalibrationFile, ReadsStiffnessOffsetAndRange) {
-  const WrenchModel m = load(kGood);
+  const WrenchModel m = load(kCalibration);
   EXPECT_EQ(m.K(2, 2), 2800);   // N/m
   EXPECT_EQ(m.K(5, 2), 1.5);    // row 5 (Mz), column 2 (z)
   EXPECT_EQ(m.B[0], 0.1);       // N
@@ -83,7 +83,7 @@ TEST_F(CalibrationFile, RefusesWrongShapesNamingTheKey) {
 TEST_F(CalibrationFile, RefusesOtherFilesAndTruncatedOnes) {
   EXPECT_NE(complaint("tagwrench-calibration-1", "tagwrench-calibration-2").find("\"format\""),
             std::string::npos);
-  const std::string whole = kGood;
+  const std::string whole = kCalibration;
   for (std::size_t length = 0; length < whole.size(); length += 7) {
     EXPECT_THROW(load(whole.substr(0, length)), ConfigError) << length;
   }

@@ -34,7 +34,7 @@ const char* const kSensor =
     "    axial_n_per_mm: 0.7\n"
     "    lateral_n_per_mm: 0.07\n";
 
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
+std::string edited(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   if (at == std::string::npos) throw std::logic_error("test text lacks " + from);
   return text.replace(at, from.size(), to);
@@ -59,8 +59,8 @@ TEST(WithKeys, ReplacesAndAddsInAFlowSection) {
       kSensor,
       {"camera", {{"fx", "812.25"}, {"mirrored", "true"}, {"distortion", "[1, 0, 0, 0, 0]"}}},
       "sensor.yaml");
-  EXPECT_EQ(out, replaced(replaced(kSensor, "805.0", "812.25"), "mirrored: false}",
-                          "mirrored: true, distortion: [1, 0, 0, 0, 0]}"));
+  EXPECT_EQ(out, edited(edited(kSensor, "805.0", "812.25"), "mirrored: false}",
+                        "mirrored: true, distortion: [1, 0, 0, 0, 0]}"));
   EXPECT_EQ(parse_sensor(out, "sensor.yaml").camera.fx_px, 812.25);
 }
 
@@ -68,13 +68,13 @@ TEST(WithKeys, ReplacesABlockListAndAddsToABlockSection) {
   const std::string out =
       with_keys(kSensor, {"target", {{"tags", "[{id: 5},\n {id: 2}]"}, {"tag_size_mm", "3.81"}}},
                 "sensor.yaml");
-  EXPECT_EQ(out, replaced(replaced(kSensor, "3.8 ", "3.81 "), "  - {id: 5}\n  - {id: 2}\n",
-                          "    [{id: 5},\n     {id: 2}]\n"));
+  EXPECT_EQ(out, edited(edited(kSensor, "3.8 ", "3.81 "), "  - {id: 5}\n  - {id: 2}\n",
+                        "    [{id: 5},\n     {id: 2}]\n"));
   EXPECT_EQ(parse_sensor(out, "sensor.yaml").target.tags.size(), 2u);
   const std::string added =
       with_keys(kSensor, {"wrench", {{"range_n", "[1, 1, 3]"}}}, "sensor.yaml");
   EXPECT_EQ(added, std::string(kSensor) + "  range_n: [1, 1, 3]\n");
-  EXPECT_EQ(with_keys(replaced(kSensor, "0.07\n", "0.07"), {"wrench", {{"range_n", "[1, 1, 3]"}}},
+  EXPECT_EQ(with_keys(edited(kSensor, "0.07\n", "0.07"), {"wrench", {{"range_n", "[1, 1, 3]"}}},
                       "sensor.yaml"),
             added);
 }
@@ -116,8 +116,8 @@ TEST(WithKeys, RefusesWhatIsNoSensorFile) {
 TEST(CheckEditable, SaysBeforeTheWorkWhatCouldNotBeWrittenAfterIt) {
   const std::vector<SectionEdit> edits = {{"camera", {{"fx", "1"}}}, {"rest", {{"frames", "9"}}}};
   EXPECT_NO_THROW(check_editable(kSensor, edits, "sensor.yaml"));
-  const std::string anchored = replaced(replaced(kSensor, "fx: 805.0", "fx: &f 805.0"),
-                                        "axial_n_per_mm: 0.7", "axial_n_per_mm: *f");
+  const std::string anchored = edited(edited(kSensor, "fx: 805.0", "fx: &f 805.0"),
+                                      "axial_n_per_mm: 0.7", "axial_n_per_mm: *f");
   for (const std::string& text :
        {anchored, "\xEF\xBB\xBF" + std::string(kSensor), std::string(kSensor) + "---\na: 1\n"}) {
     ASSERT_NO_THROW(parse_sensor(text, "sensor.yaml"));

@@ -5,15 +5,11 @@
 #include <algorithm>
 #include <functional>
 
-#include "host/config/hardware_config.h"
 #include "host/hardware/part_checks.h"
+#include "tests/unit/hardware/published.h"
 
 namespace tagwrench::hardware {
 namespace {
-
-Parameters variant(const std::string& name) {
-  return load_hardware(std::string(TAGWRENCH_SENSORS) + "/" + name + ".yaml");
-}
 
 std::vector<Complaint> complaints_of(const Parameters& p) { return complaints(p, geometry(p)); }
 
@@ -31,7 +27,7 @@ void PrintTo(const Wrong& wrong, std::ostream* out) { *out << wrong.name; }
 class WrongParameter : public testing::TestWithParam<Wrong> {};
 
 TEST_P(WrongParameter, IsNamedInOneLineWithARemedy) {
-  Parameters p = variant(GetParam().variant);
+  Parameters p = published(GetParam().variant);
   ASSERT_TRUE(complaints_of(p).empty()) << complaints_of(p).front().message;
   GetParam().spoil(p);
   const auto found = complaints_of(p);
@@ -136,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(Checks, WrongParameter, testing::ValuesIn(kWrong),
 
 TEST(Checks, ShippedVariantsCanBeBuilt) {
   for (const char* name : {"paper", "puck", "gripper40", "single", "mirror", "endoscope"}) {
-    const auto found = complaints_of(variant(name));
+    const auto found = complaints_of(published(name));
     EXPECT_TRUE(found.empty()) << name << ": " << found.front().message;
   }
 }

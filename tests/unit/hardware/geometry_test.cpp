@@ -4,19 +4,15 @@
 
 #include <Eigen/LU>
 
-#include "host/config/hardware_config.h"
 #include "host/hardware/drawing.h"
 #include "host/hardware/stops.h"
+#include "tests/unit/hardware/published.h"
 
 namespace tagwrench::hardware {
 namespace {
 
-Parameters variant(const std::string& name) {
-  return load_hardware(std::string(TAGWRENCH_SENSORS) + "/" + name + ".yaml");
-}
-
 TEST(Geometry, PaperHasItsPublishedSizes) {
-  const Parameters p = variant("paper");
+  const Parameters p = published("paper");
   const Geometry g = geometry(p);
   EXPECT_NEAR(g.top - g.bottom, 51e-3, 1e-9);
   EXPECT_NEAR(g.platform - g.pupil, 21e-3, 1e-9);
@@ -26,7 +22,7 @@ TEST(Geometry, PaperHasItsPublishedSizes) {
 }
 
 TEST(Geometry, StopsActAtTheirTravelAlongEachAxis) {
-  const Parameters p = variant("paper");
+  const Parameters p = published("paper");
   double x = 0, y = 0, z = 0;
   for (const Vector6& d : travel_corners(p, geometry(p))) {
     if (d.tail<3>().norm() > 0) continue;
@@ -42,7 +38,7 @@ TEST(Geometry, StopsActAtTheirTravelAlongEachAxis) {
 /// A push tilts the platform about the springs' middle; the stops, which are lower, move less than
 /// the tags.
 TEST(Geometry, TravelIncludesWhatAPushDoes) {
-  const Parameters p = variant("paper");
+  const Parameters p = published("paper");
   const Geometry g = geometry(p);
   const Vector6 pushed = range(p, g)[1] * stiffness(p, g).inverse().col(1);
   const auto corners = travel_corners(p, g);
@@ -54,7 +50,7 @@ TEST(Geometry, TravelIncludesWhatAPushDoes) {
 /// Turned about z as far as the travel says, no corner of the cover has gone through a wall, and
 /// some stop is within a tenth of acting.
 TEST(Geometry, TurningEndsWhereSomethingTouches) {
-  const Parameters p = variant("paper");
+  const Parameters p = published("paper");
   const Geometry g = geometry(p);
   double angle = 0;
   for (const Vector6& d : travel_corners(p, g))
@@ -110,7 +106,7 @@ double deepest_in_plastic(const Parameters& p, const Geometry& g, const Vector6&
 /// Leaning by 4 degrees: small angles alone would have the screws of `puck` 0.06 mm in plastic.
 TEST(Geometry, NoStopScrewGoesThroughTheCoverOnItsWayToTheStop) {
   for (const char* name : {"paper", "puck", "gripper40", "single", "mirror", "endoscope"}) {
-    const Parameters p = variant(name);
+    const Parameters p = published(name);
     const Geometry g = geometry(p);
     for (const Vector6& d : travel_corners(p, g))
       EXPECT_LT(deepest_in_plastic(p, g, d), 1e-6) << name << ' ' << d.transpose();
@@ -119,7 +115,7 @@ TEST(Geometry, NoStopScrewGoesThroughTheCoverOnItsWayToTheStop) {
 
 TEST(Geometry, APushEndsWhereSomethingTouches) {
   for (const char* name : {"paper", "puck", "gripper40", "single", "mirror", "endoscope"}) {
-    const Parameters p = variant(name);
+    const Parameters p = published(name);
     const Geometry g = geometry(p);
     const Matrix6 compliance = stiffness(p, g).inverse();
     const Vector6 most = range(p, g);
@@ -133,7 +129,7 @@ TEST(Geometry, APushEndsWhereSomethingTouches) {
 
 TEST(Geometry, StopScrewsKeepTheirGripAndAreSold) {
   for (const char* name : {"paper", "puck", "gripper40", "single", "mirror", "endoscope"}) {
-    const Parameters p = variant(name);
+    const Parameters p = published(name);
     const Geometry g = geometry(p);
     ASSERT_EQ(g.stop_screws.size(), 3U);
     for (const Geometry::StopScrew& s : g.stop_screws) {
@@ -148,7 +144,7 @@ TEST(Geometry, StopScrewsKeepTheirGripAndAreSold) {
 
 /// The mirrored tag's line of sight, reflected by hand, meets the paper where it is.
 TEST(Geometry, TheMirrorIsWhereItIsNeeded) {
-  const Parameters p = variant("mirror");
+  const Parameters p = published("mirror");
   const Geometry g = geometry(p);
   ASSERT_TRUE(g.mirror);
   const Eigen::Vector3d eye(0, 0, g.pupil);
@@ -167,16 +163,16 @@ TEST(Geometry, TheMirrorIsWhereItIsNeeded) {
 
 TEST(Geometry, VariantsNameWhatToPrint) {
   const std::vector<std::string> box{"mounting_plate", "camera_cover", "top_plate", "light_shield"};
-  EXPECT_EQ(printed_parts(variant("paper")), box);
-  EXPECT_EQ(printed_parts(variant("puck")).back(), "puck_base");
-  EXPECT_EQ(printed_parts(variant("mirror")).back(), "mirror_holder");
-  const Parameters p = variant("paper");
+  EXPECT_EQ(printed_parts(published("paper")), box);
+  EXPECT_EQ(printed_parts(published("puck")).back(), "puck_base");
+  EXPECT_EQ(printed_parts(published("mirror")).back(), "mirror_holder");
+  const Parameters p = published("paper");
   EXPECT_NE(scad_parameters(p, geometry(p), {}).find("parts = [\"mounting_plate\", "),
             std::string::npos);
 }
 
 TEST(Geometry, DrawingHasTheCellsOfItsTags) {
-  const Parameters p = variant("paper");
+  const Parameters p = published("paper");
   TagPattern pattern;
   pattern.id = 7;
   pattern.cells = 3;
@@ -187,9 +183,9 @@ TEST(Geometry, DrawingHasTheCellsOfItsTags) {
 }
 
 TEST(Geometry, GripperBearsFortyNewtons) {
-  const Parameters p = variant("gripper40");
+  const Parameters p = published("gripper40");
   EXPECT_GE(range(p, geometry(p)).head<3>().minCoeff(), 40);
-  const Parameters puck = variant("puck");
+  const Parameters puck = published("puck");
   EXPECT_NEAR(range(puck, geometry(puck)).head<3>().minCoeff(), 5, 0.5);
 }
 

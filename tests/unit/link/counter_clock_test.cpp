@@ -8,7 +8,7 @@
 namespace tagwrench::link {
 namespace {
 
-TimePoint at(double t) { return TimePoint(Duration(static_cast<std::int64_t>(t * 1e9))); }
+TimePoint moment(double t) { return TimePoint(Duration(static_cast<std::int64_t>(t * 1e9))); }
 double seconds(Duration d) { return std::chrono::duration<double>(d).count(); }
 
 TEST(CounterClockTest, TimesAreSmootherThanArrivals) {
@@ -21,9 +21,9 @@ TEST(CounterClockTest, TimesAreSmootherThanArrivals) {
   for (int i = 0; i < 6000; ++i) {
     const double truth = 50 + 0.01003 * i;  // 0.3 % off nominal
     const HostTime told =
-        clock.take(static_cast<std::uint16_t>(65000 + i), at(truth + late(random)));
+        clock.take(static_cast<std::uint16_t>(65000 + i), moment(truth + late(random)));
     if (i < 500) continue;
-    const double error = seconds(told.time - at(truth + 2e-3));
+    const double error = seconds(told.time - moment(truth + 2e-3));
     squares += error * error;
     normal += std::pow(error / seconds(told.sigma), 2);
     ++n;
@@ -36,17 +36,17 @@ TEST(CounterClockTest, TimesAreSmootherThanArrivals) {
 
 TEST(CounterClockTest, LostSamplesLeaveTheTimesWhereTheyAre) {
   CounterClock clock(0.01);
-  for (int i = 0; i < 400; ++i) clock.take(static_cast<std::uint16_t>(i), at(10 + 0.01 * i));
-  const HostTime told = clock.take(450, at(10 + 4.5));
-  EXPECT_NEAR(seconds(told.time - at(14.5)), 0, 1e-3);
+  for (int i = 0; i < 400; ++i) clock.take(static_cast<std::uint16_t>(i), moment(10 + 0.01 * i));
+  const HostTime told = clock.take(450, moment(10 + 4.5));
+  EXPECT_NEAR(seconds(told.time - moment(14.5)), 0, 1e-3);
 }
 
 TEST(CounterClockTest, ABatchThatArrivesLateIsDatedByItsCounter) {
   CounterClock clock(0.01);
-  for (int i = 0; i < 400; ++i) clock.take(static_cast<std::uint16_t>(i), at(10 + 0.01 * i));
+  for (int i = 0; i < 400; ++i) clock.take(static_cast<std::uint16_t>(i), moment(10 + 0.01 * i));
   for (int i = 400; i < 420; ++i) {  // 20 samples at once, after the last of them
-    const HostTime told = clock.take(static_cast<std::uint16_t>(i), at(10 + 4.2));
-    EXPECT_NEAR(seconds(told.time - at(10 + 0.01 * i)), 0, 2e-3);
+    const HostTime told = clock.take(static_cast<std::uint16_t>(i), moment(10 + 4.2));
+    EXPECT_NEAR(seconds(told.time - moment(10 + 0.01 * i)), 0, 2e-3);
   }
 }
 
@@ -55,9 +55,9 @@ TEST(CounterClockTest, StragglersNowAndThenAreLeftOut) {
   for (int i = 0; i < 6000; ++i) {
     const double truth = 10 + 0.01 * i;
     const HostTime told =
-        clock.take(static_cast<std::uint16_t>(i), at(truth + (i % 40 == 39 ? 0.2 : 0)));
+        clock.take(static_cast<std::uint16_t>(i), moment(truth + (i % 40 == 39 ? 0.2 : 0)));
     if (i > 200) {
-      ASSERT_NEAR(seconds(told.time - at(truth)), 0, 1e-3) << i;
+      ASSERT_NEAR(seconds(told.time - moment(truth)), 0, 1e-3) << i;
     }
   }
   EXPECT_EQ(clock.restarts(), 0u);
@@ -65,11 +65,11 @@ TEST(CounterClockTest, StragglersNowAndThenAreLeftOut) {
 
 TEST(CounterClockTest, ASensorThatStartsAnewIsFollowed) {
   CounterClock clock(0.01);
-  for (int i = 0; i < 400; ++i) clock.take(static_cast<std::uint16_t>(i), at(10 + 0.01 * i));
+  for (int i = 0; i < 400; ++i) clock.take(static_cast<std::uint16_t>(i), moment(10 + 0.01 * i));
   HostTime told;
   for (int i = 0; i < 200; ++i)
-    told = clock.take(static_cast<std::uint16_t>(i), at(100 + 0.01 * i));
-  EXPECT_NEAR(seconds(told.time - at(101.99)), 0, 5e-3);
+    told = clock.take(static_cast<std::uint16_t>(i), moment(100 + 0.01 * i));
+  EXPECT_NEAR(seconds(told.time - moment(101.99)), 0, 5e-3);
   EXPECT_GE(clock.restarts(), 1u);
 }
 

@@ -15,18 +15,18 @@
 namespace tagwrench {
 namespace {
 
-std::string refused(const std::string& path) {
+std::string refused_camera(const std::string& path) {
   V4l2Options options;
   options.path = path;
   return refusal([&] { V4l2Source source(options); });
 }
 
 TEST(V4l2Setup, ANodeThatDoesNotExistIsNoSuchCamera) {
-  EXPECT_TRUE(names(refused("/dev/video4711"), {"/dev/video4711", "no such camera"}));
+  EXPECT_TRUE(names(refused_camera("/dev/video4711"), {"/dev/video4711", "no such camera"}));
 }
 
 TEST(V4l2Setup, WhatIsNotAVideoDeviceIsSaidToBeNone) {
-  EXPECT_TRUE(names(refused("/dev/null"), {"/dev/null", "not a video device"}));
+  EXPECT_TRUE(names(refused_camera("/dev/null"), {"/dev/null", "not a video device"}));
 }
 
 TEST(V4l2Setup, NoPermissionNamesTheGroup) {
@@ -34,7 +34,7 @@ TEST(V4l2Setup, NoPermissionNamesTheGroup) {
   const std::string path = ::testing::TempDir() + "/forbidden";
   std::ofstream(path) << "";
   std::filesystem::permissions(path, std::filesystem::perms::none);
-  EXPECT_TRUE(names(refused(path), {"no permission", "video"}));
+  EXPECT_TRUE(names(refused_camera(path), {"no permission", "video"}));
 }
 
 TEST(V4l2Setup, HoldersOfANodeAreNamed) {

@@ -5,18 +5,14 @@
 
 #include <chrono>
 
+#include "tests/support/six.h"
+
 namespace tagwrench {
 namespace {
 
 using std::chrono::milliseconds;
 
 constexpr double kRounding = 1e-12;  // m, rad
-
-Vector6 motion6(double x, double y, double z, double rx, double ry, double rz) {
-  Vector6 m;
-  m << x, y, z, rx, ry, rz;
-  return m;
-}
 
 TimePoint at(int ms) { return TimePoint{} + milliseconds(ms); }
 
@@ -34,7 +30,7 @@ void expect_motion(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to,
       << motion_between(from, to).transpose();
 }
 
-const Vector6 kStep = motion6(1e-5, -2e-5, 3e-5, 1e-3, 2e-3, -3e-3);
+const Vector6 kStep = test::six(1e-5, -2e-5, 3e-5, 1e-3, 2e-3, -3e-3);
 
 /// Two frames, 40 ms and kStep apart, the later one at 40 ms.
 Motion moving() {

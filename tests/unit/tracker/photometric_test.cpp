@@ -17,7 +17,7 @@ using render::Scene;
 
 constexpr double kSigmas = 4;  // of six axes, several pictures: chance alone stays below
 
-Vector6 motion6(double x_um, double y_um, double z_um, double rx, double ry, double rz) {
+Vector6 motion_um_rad(double x_um, double y_um, double z_um, double rx, double ry, double rz) {
   Vector6 m;
   m << x_um * 1e-6, y_um * 1e-6, z_um * 1e-6, rx, ry, rz;
   return m;
@@ -78,9 +78,10 @@ TEST_P(Displaced, IsFoundOnEveryAxis) {
   Aligned bench(GetParam().mirrored, GetParam().k1);
   // About half a pixel each, as prediction leaves it.
   for (const Vector6& truth :
-       {motion6(15, 0, 0, 0, 0, 0), motion6(0, -15, 0, 0, 0, 0), motion6(0, 0, 120, 0, 0, 0),
-        motion6(0, 0, 0, 0.008, 0, 0), motion6(0, 0, 0, 0, -0.008, 0),
-        motion6(0, 0, 0, 0, 0, 0.008), motion6(-8, 7, -60, -0.004, 0.004, -0.004)}) {
+       {motion_um_rad(15, 0, 0, 0, 0, 0), motion_um_rad(0, -15, 0, 0, 0, 0),
+        motion_um_rad(0, 0, 120, 0, 0, 0), motion_um_rad(0, 0, 0, 0.008, 0, 0),
+        motion_um_rad(0, 0, 0, 0, -0.008, 0), motion_um_rad(0, 0, 0, 0, 0, 0.008),
+        motion_um_rad(-8, 7, -60, -0.004, 0.004, -0.004)}) {
     const PhotometricFit fit = bench.align(render::take(bench.scene, truth, bench.random));
     ASSERT_TRUE(fit.converged) << truth.transpose();
     EXPECT_EQ(fit.tags_held, 2);
@@ -213,14 +214,15 @@ TEST(Photometric, StateIsLeftAloneUnlessConverged) {
   // 10 px away there is nothing that alignment could climb.
   const Picture picture = render::take(bench.scene, Vector6::Zero(), bench.random);
   expect_untouched(bench.aligner.align(render::window(picture),
-                                       moved(bench.rest, motion6(500, 400, 0, 0, 0, 0.3)),
+                                       moved(bench.rest, motion_um_rad(500, 400, 0, 0, 0, 0.3)),
                                        Vector6::Zero(), bench.state));
 }
 
 TEST(Photometric, RegionCoversTheTagsAndTheMarginAndNotMuchMore) {
   constexpr double kSlack_px = 12;
   Aligned bench;
-  for (const Vector6& motion : {Vector6(Vector6::Zero()), motion6(500, -300, -800, 0.03, 0, 0.1)}) {
+  for (const Vector6& motion :
+       {Vector6(Vector6::Zero()), motion_um_rad(500, -300, -800, 0.03, 0, 0.1)}) {
     const Eigen::Isometry3d pose = moved(bench.rest, motion);
     double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
     for (const render::PrintedTag& tag : bench.scene.tags) {
@@ -253,7 +255,7 @@ TEST(Photometric, RegionCoversTheTagsAndTheMarginAndNotMuchMore) {
 TEST(Photometric, MotionOfShiftsIsTheMotionThatMakesThem) {
   Aligned bench;
   const PixelTemplate& t = bench.aligner.pixels();
-  const Vector6 truth = motion6(3, -2, 10, 4e-4, -3e-4, 5e-4);
+  const Vector6 truth = motion_um_rad(3, -2, 10, 4e-4, -3e-4, 5e-4);
   std::vector<Eigen::Vector2d> shifts;
   for (const PixelPatch& patch : t.patches) {
     shifts.push_back(project(t.camera, moved(bench.rest, truth) * patch.middle).pixel -

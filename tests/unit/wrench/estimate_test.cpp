@@ -6,34 +6,32 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/support/six.h"
+
 namespace tagwrench {
 namespace {
-
-Vector6 v6(double a, double b, double c, double d, double e, double f) {
-  return (Vector6() << a, b, c, d, e, f).finished();
-}
 
 Track ok_track(const Vector6& displacement) {
   Track t;
   t.status = Status::ok;
   t.displacement = displacement;
-  t.covariance = v6(1e-12, 1e-12, 16e-12, 1e-8, 1e-8, 1e-8).asDiagonal();
+  t.covariance = test::six(1e-12, 1e-12, 16e-12, 1e-8, 1e-8, 1e-8).asDiagonal();
   return t;
 }
 
 WrenchModel diagonal_model() {
   WrenchModel m;
-  m.K = v6(280, 280, 2800, 0.2, 0.3, 0.05).asDiagonal();
-  m.B = v6(0.01, 0, 0, 0, 0, 0);
-  m.range = v6(1, 1, 5, 0.05, 0.05, 0.05);
+  m.K = test::six(280, 280, 2800, 0.2, 0.3, 0.05).asDiagonal();
+  m.B = test::six(0.01, 0, 0, 0, 0, 0);
+  m.range = test::six(1, 1, 5, 0.05, 0.05, 0.05);
   return m;
 }
 
 TEST(WrenchEstimate, IsAffineInTheDisplacement) {
   Sample s;
-  WrenchEstimator(diagonal_model()).estimate(ok_track(v6(1e-3, 0, -1e-3, 0.01, 0, 0.02)), s);
+  WrenchEstimator(diagonal_model()).estimate(ok_track(test::six(1e-3, 0, -1e-3, 0.01, 0, 0.02)), s);
   EXPECT_EQ(s.status, Status::ok);
-  EXPECT_TRUE(s.wrench.isApprox(v6(0.29, 0, -2.8, 0.002, 0, 0.001), 1e-12));
+  EXPECT_TRUE(s.wrench.isApprox(test::six(0.29, 0, -2.8, 0.002, 0, 0.001), 1e-12));
 }
 
 TEST(WrenchEstimate, SigmaIsTheDisplacementSigmaTimesStiffness) {
@@ -45,14 +43,14 @@ TEST(WrenchEstimate, SigmaIsTheDisplacementSigmaTimesStiffness) {
 
 TEST(WrenchEstimate, BeyondTheRangeIsSaturatedAndStillCarriesNumbers) {
   Sample s;
-  WrenchEstimator(diagonal_model()).estimate(ok_track(v6(4e-3, 0, 0, 0, 0, 0)), s);
+  WrenchEstimator(diagonal_model()).estimate(ok_track(test::six(4e-3, 0, 0, 0, 0, 0)), s);
   EXPECT_EQ(s.status, Status::saturated);
   EXPECT_NEAR(s.wrench[0], 1.13, 1e-12);
 }
 
 TEST(WrenchEstimate, OnlyOkTracksCarryNumbers) {
   for (Status status : {Status::acquiring, Status::lost, Status::doubtful}) {
-    Track t = ok_track(v6(1e-3, 1e-3, 1e-3, 0.1, 0.1, 0.1));
+    Track t = ok_track(test::six(1e-3, 1e-3, 1e-3, 0.1, 0.1, 0.1));
     t.status = status;
     Sample s;
     WrenchEstimator(diagonal_model()).estimate(t, s);
@@ -65,7 +63,7 @@ TEST(WrenchEstimate, OnlyOkTracksCarryNumbers) {
 TEST(WrenchEstimate, ANumberThatIsNotFiniteIsDoubtfulAndZero) {
   Sample s;
   WrenchEstimator(diagonal_model())
-      .estimate(ok_track(v6(std::numeric_limits<double>::quiet_NaN(), 0, 0, 0, 0, 0)), s);
+      .estimate(ok_track(test::six(std::numeric_limits<double>::quiet_NaN(), 0, 0, 0, 0, 0)), s);
   EXPECT_EQ(s.status, Status::doubtful);
   EXPECT_EQ(s.wrench, Vector6::Zero().eval());
 }
@@ -76,8 +74,8 @@ TEST(WrenchEstimate, MovingTheOriginToWhereAForceActsRemovesItsMoment) {
   m.K.setIdentity();
   m.wrench_origin = {0, 0, 0.020};
   Sample s;
-  WrenchEstimator(m).estimate(ok_track(v6(1, 0, 0, 0, 0.020, 0)), s);
-  EXPECT_TRUE(s.wrench.isApprox(v6(1, 0, 0, 0, 0, 0), 1e-12));
+  WrenchEstimator(m).estimate(ok_track(test::six(1, 0, 0, 0, 0.020, 0)), s);
+  EXPECT_TRUE(s.wrench.isApprox(test::six(1, 0, 0, 0, 0, 0), 1e-12));
 }
 
 TEST(WrenchEstimate, TurningTheFrameTurnsForceAndTorqueAlike) {
@@ -87,20 +85,20 @@ TEST(WrenchEstimate, TurningTheFrameTurnsForceAndTorqueAlike) {
       Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   Sample s;
   // The frame's x axis is the camera's y axis, so a push along camera y is a push along frame x.
-  WrenchEstimator(m).estimate(ok_track(v6(0, 1, 0, 0, 2, 0)), s);
-  EXPECT_TRUE(s.wrench.isApprox(v6(1, 0, 0, 2, 0, 0), 1e-12));
+  WrenchEstimator(m).estimate(ok_track(test::six(0, 1, 0, 0, 2, 0)), s);
+  EXPECT_TRUE(s.wrench.isApprox(test::six(1, 0, 0, 2, 0, 0), 1e-12));
 }
 
 TEST(WrenchEstimate, SigmaHoldsWhatTheFitDoesNotKnowAtThisLoad) {
   WrenchModel m = diagonal_model();
   m.B.setZero();
   m.parameter_covariance = Eigen::MatrixXd::Zero(42, 42);
-  m.parameter_covariance(14, 14) = 28.0 * 28.0;    // K(2, 2): 1 % of 2800 N/m
-  m.parameter_covariance(38, 38) = 0.003 * 0.003;  // B[2], N
-  m.error_at_full_load = v6(0, 0, 0.02, 0, 0, 0);  // N at 2 N
+  m.parameter_covariance(14, 14) = 28.0 * 28.0;           // K(2, 2): 1 % of 2800 N/m
+  m.parameter_covariance(38, 38) = 0.003 * 0.003;         // B[2], N
+  m.error_at_full_load = test::six(0, 0, 0.02, 0, 0, 0);  // N at 2 N
   m.full_load.setConstant(2);
   m.wrench_origin = {0.010, 0, 0};
-  Track track = ok_track(v6(0, 0, 0.5e-3, 0, 0, 0));
+  Track track = ok_track(test::six(0, 0, 0.5e-3, 0, 0, 0));
   track.covariance.setZero();
   Sample s;
   WrenchEstimator(m).estimate(track, s);
@@ -121,7 +119,7 @@ TEST(WrenchEstimate, CreepIsTakenOutOfALongHold) {
   estimator.estimate(ok_track(Vector6::Zero()), s);
   for (int i = 0; i < 10'000; ++i) {
     s.capture_time += std::chrono::milliseconds(10);
-    estimator.estimate(ok_track(v6(1e-3, 0, 0, 0, 0, 0)), s);
+    estimator.estimate(ok_track(test::six(1e-3, 0, 0, 0, 0, 0)), s);
     if (i == 0) {
       EXPECT_NEAR(s.wrench[0], 0.105, 1e-5);  // N, at once
     }

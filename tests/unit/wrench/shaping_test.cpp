@@ -12,7 +12,7 @@ Sample pushed(int axis, double value) {
   return s;
 }
 
-ShapingOptions options() {
+ShapingOptions shaping_options() {
   ShapingOptions o;
   o.full_scale << 1, 1, 2, 0.01, 0.01, 0.01;
   o.dead_zone << 0.1, 0.1, 0.2, 0.001, 0.001, 0.001;
@@ -21,19 +21,19 @@ ShapingOptions options() {
 
 TEST(Shaping, RestIsExactlyZeroInsideTheDeadZone) {
   Sample s = pushed(0, 0.0999);
-  Shaping(options()).shape(s);
+  Shaping(shaping_options()).shape(s);
   EXPECT_EQ(s.motion, Vector6::Zero().eval());
 }
 
 TEST(Shaping, IsContinuousAtTheEdgeOfTheDeadZoneAndReachesFullScale) {
   Sample s = pushed(0, 0.1 + 1e-9);
-  Shaping(options()).shape(s);
+  Shaping(shaping_options()).shape(s);
   EXPECT_NEAR(s.motion[0], 0, 1e-8);
   s = pushed(0, 1.0);
-  Shaping(options()).shape(s);
+  Shaping(shaping_options()).shape(s);
   EXPECT_DOUBLE_EQ(s.motion[0], 1.0);
   s = pushed(0, -7.0);
-  Shaping(options()).shape(s);
+  Shaping(shaping_options()).shape(s);
   EXPECT_DOUBLE_EQ(s.motion[0], -1.0);
 }
 
@@ -43,7 +43,7 @@ TEST(Shaping, DefaultMountingTurnsCameraAxesIntoHidAxes) {
   const double expected_sign[6] = {1, -1, -1, 1, -1, -1};
   for (int axis = 0; axis < 6; ++axis) {
     Sample s = pushed(axis, 5.0);
-    Shaping(options()).shape(s);
+    Shaping(shaping_options()).shape(s);
     for (int i = 0; i < 6; ++i)
       EXPECT_EQ(s.motion[i], i == axis ? expected_sign[axis] : 0.0) << axis << " " << i;
   }
@@ -54,7 +54,7 @@ TEST(Shaping, AStatusWithoutNumbersIsNeutral) {
     Sample s = pushed(2, 1.5);
     s.status = status;
     s.motion.setOnes();
-    Shaping(options()).shape(s);
+    Shaping(shaping_options()).shape(s);
     EXPECT_EQ(s.motion, Vector6::Zero().eval());
   }
 }
@@ -62,7 +62,7 @@ TEST(Shaping, AStatusWithoutNumbersIsNeutral) {
 TEST(Shaping, SaturatedStillMoves) {
   Sample s = pushed(0, 3);
   s.status = Status::saturated;
-  Shaping(options()).shape(s);
+  Shaping(shaping_options()).shape(s);
   EXPECT_EQ(s.motion[0], 1.0);
 }
 

@@ -4,6 +4,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "tests/support/six.h"
+
 namespace tagwrench {
 namespace {
 
@@ -20,32 +22,28 @@ Springs four_springs() {
   return s;
 }
 
-Vector6 v6(double a, double b, double c, double d, double e, double f) {
-  return (Vector6() << a, b, c, d, e, f).finished();
-}
-
 TEST(SpringModel, AxialPushIsFourSpringsInParallel) {
-  const Vector6 w = stiffness(four_springs()) * v6(0, 0, 1e-3, 0, 0, 0);
+  const Vector6 w = stiffness(four_springs()) * test::six(0, 0, 1e-3, 0, 0, 0);
   EXPECT_NEAR(w[2], 2.8, 1e-12);  // N: 4 * 700 N/m * 1 mm
   EXPECT_NEAR(w.cwiseAbs().sum(), 2.8, 1e-12);
 }
 
 TEST(SpringModel, LateralPushNeedsATorqueBecauseTheSpringsHoldBelowTheOrigin) {
-  const Vector6 w = stiffness(four_springs()) * v6(1e-3, 0, 0, 0, 0, 0);
+  const Vector6 w = stiffness(four_springs()) * test::six(1e-3, 0, 0, 0, 0, 0);
   EXPECT_NEAR(w[0], 0.28, 1e-12);           // N
   EXPECT_NEAR(w[4], -0.010 * 0.28, 1e-12);  // N m about y: z * Fx with z = -10 mm
 }
 
 TEST(SpringModel, YawWorksLateralSpringsAtTheirRadiusPlusTorsion) {
   const double yaw_rad = 0.01;
-  const Vector6 w = stiffness(four_springs()) * v6(0, 0, 0, 0, 0, yaw_rad);
+  const Vector6 w = stiffness(four_springs()) * test::six(0, 0, 0, 0, 0, yaw_rad);
   const double radius_squared = 0.011 * 0.011 + 0.008 * 0.008;
   EXPECT_NEAR(w[5], 4 * (70 * radius_squared + 0.002) * yaw_rad, 1e-12);
 }
 
 TEST(SpringModel, TiltWorksAxialSpringsAtTheirArm) {
   const double tilt_rad = 0.01;
-  const Vector6 w = stiffness(four_springs()) * v6(0, 0, 0, tilt_rad, 0, 0);
+  const Vector6 w = stiffness(four_springs()) * test::six(0, 0, 0, tilt_rad, 0, 0);
   EXPECT_NEAR(w[3], 4 * (700 * 0.008 * 0.008 + 70 * 0.010 * 0.010 + 0.003) * tilt_rad, 1e-12);
 }
 

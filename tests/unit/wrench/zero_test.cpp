@@ -17,7 +17,7 @@ constexpr Duration kFrame = milliseconds(40);
 Vector6 range() { return (Vector6() << 1, 1, 3, 0.02, 0.02, 0.01).finished(); }
 Vector6 noise() { return range() * 6e-4; }  // the simulated sensor's in depth
 
-ZeroOptions options() {
+ZeroOptions zero_options() {
   ZeroOptions o;
   o.range = range();
   return o;
@@ -50,7 +50,7 @@ double largest_part(const Vector6& wrench) {
 }
 
 TEST(Zero, SlowDriftIsFollowed) {
-  ZeroTracking zero(options());
+  ZeroTracking zero(zero_options());
   // 1.5 % of the range in an hour.
   const Sample last = play(zero, 0, 3600, [](double t) { return part_of_range(0.015 * t / 3600); });
   EXPECT_EQ(last.zero_state, ZeroState::following);
@@ -60,7 +60,7 @@ TEST(Zero, SlowDriftIsFollowed) {
 
 TEST(Zero, ALoadOfFivePercentIsNeverEatenInAnHour) {
   for (const double put_on : {0.0, 10.0}) {
-    ZeroTracking zero(options());
+    ZeroTracking zero(zero_options());
     const Sample last = play(zero, 0, 3600, [&](double t) {
       return t < put_on ? Vector6::Zero().eval() : (Vector6() << 0, 0, 0.15, 0, 0, 0).finished();
     });
@@ -71,7 +71,7 @@ TEST(Zero, ALoadOfFivePercentIsNeverEatenInAnHour) {
 }
 
 TEST(Zero, ALightLoadThatIsPutOnIsNotEatenEither) {
-  ZeroTracking zero(options());
+  ZeroTracking zero(zero_options());
   play(zero, 0, 600, [](double t) {  // 1 % of the range: 3 g
     return t < 5 ? Vector6::Zero().eval() : (Vector6() << 0, 0, 0.03, 0, 0, 0).finished();
   });
@@ -79,11 +79,11 @@ TEST(Zero, ALightLoadThatIsPutOnIsNotEatenEither) {
 }
 
 TEST(Zero, WhatStandsAtTheStartIsFollowedWithinTheBandAlone) {
-  ZeroTracking near(options());
+  ZeroTracking near(zero_options());
   play(near, 0, 300, [](double) { return part_of_range(-0.015); });
   EXPECT_LT(largest_part(near.moved() - part_of_range(-0.015)), 3e-4);
 
-  ZeroTracking drifting(options());  // slowly through the whole band, and on
+  ZeroTracking drifting(zero_options());  // slowly through the whole band, and on
   const Sample last =
       play(drifting, 0, 3600, [](double t) { return part_of_range(0.06 * t / 3600); });
   EXPECT_LE(largest_part(drifting.moved()), 0.02 + 1e-12);
@@ -96,7 +96,7 @@ TEST(Zero, AHandThatRestsOnTheSensorIsNotEaten) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   double sway = 0;
-  ZeroTracking zero(options());
+  ZeroTracking zero(zero_options());
   play(zero, 0, 600, [&](double t) {
     if (t < 3) return Vector6::Zero().eval();
     sway = 0.97 * sway + 0.3 * normal(random);
@@ -106,7 +106,7 @@ TEST(Zero, AHandThatRestsOnTheSensorIsNotEaten) {
 }
 
 TEST(Zero, MovesNoFasterThanHalfAScaleIntervalASecond) {
-  ZeroTracking zero(options());
+  ZeroTracking zero(zero_options());
   const Vector6 load = part_of_range(0.018);
   play(zero, 0, 30, [&](double) { return load; });
   EXPECT_LE(largest_part(zero.moved()), 30 * 0.5 / 3000);
@@ -114,14 +114,14 @@ TEST(Zero, MovesNoFasterThanHalfAScaleIntervalASecond) {
 }
 
 TEST(Zero, NoiseHardlyMovesIt) {
-  ZeroTracking zero(options());
+  ZeroTracking zero(zero_options());
   play(zero, 0, 120, [](double) { return Vector6::Zero(); });
   // A part of the noise of one frame.
   EXPECT_LT((zero.moved().array() / noise().array()).abs().maxCoeff(), 0.25);
 }
 
 TEST(Zero, StaysWhileAButtonIsPressed) {
-  ZeroTracking zero(options());
+  ZeroTracking zero(zero_options());
   const Sample last = play(
       zero, 0, 300, [](double) { return part_of_range(0.004); }, 1,
       [](Sample& s) { s.touched = true; });
@@ -130,7 +130,7 @@ TEST(Zero, StaysWhileAButtonIsPressed) {
 }
 
 TEST(Zero, StaysWhileNothingIsHeldAndSettlesAnewAfterwards) {
-  ZeroTracking zero(options());
+  ZeroTracking zero(zero_options());
   play(zero, 0, 60, [](double) { return part_of_range(0.004); });
   const Vector6 before = zero.moved();
   Sample last = play(
@@ -147,7 +147,7 @@ TEST(Zero, StaysWhileNothingIsHeldAndSettlesAnewAfterwards) {
 }
 
 TEST(Zero, WhatWasSetIsTakenOffFromTheFirstSample) {
-  ZeroOptions o = options();
+  ZeroOptions o = zero_options();
   o.set = part_of_range(0.08);
   ZeroTracking zero(o);
   const Sample first = play(zero, 0, 0.01, [](double) { return part_of_range(0.08); });
@@ -159,9 +159,9 @@ TEST(Zero, WhatWasSetIsTakenOffFromTheFirstSample) {
 }
 
 TEST(Zero, SwitchedOffOrWithoutARangeItStays) {
-  ZeroOptions off = options();
+  ZeroOptions off = zero_options();
   off.follow = false;
-  ZeroOptions unknown = options();
+  ZeroOptions unknown = zero_options();
   unknown.range.setConstant(1e9);
   for (const ZeroOptions& o : {off, unknown}) {
     ZeroTracking zero(o);
@@ -173,7 +173,7 @@ TEST(Zero, SwitchedOffOrWithoutARangeItStays) {
 }
 
 TEST(Zero, AnAxisWithoutARangeIsLeftAlone) {
-  ZeroOptions o = options();
+  ZeroOptions o = zero_options();
   o.range[5] = 0;
   ZeroTracking zero(o);
   play(zero, 0, 120, [](double) { return part_of_range(0.004); });
@@ -183,7 +183,7 @@ TEST(Zero, AnAxisWithoutARangeIsLeftAlone) {
 
 TEST(Zero, DependsOnTheSamplesAndTheirTimesAlone) {
   const auto moved = [] {
-    ZeroTracking zero(options());
+    ZeroTracking zero(zero_options());
     play(zero, 0, 100, [](double t) { return part_of_range(0.002 + 1e-5 * t); });
     return zero.moved();
   };
@@ -191,7 +191,7 @@ TEST(Zero, DependsOnTheSamplesAndTheirTimesAlone) {
 }
 
 TEST(Zero, TimeThatRunsBackwardsStartsTheStillnessAnew) {
-  ZeroTracking zero(options());
+  ZeroTracking zero(zero_options());
   play(zero, 100, 160, [](double) { return part_of_range(0.004); });
   const Vector6 before = zero.moved();
   const Sample last = play(zero, 0, 0.9, [](double) { return part_of_range(0.004); });

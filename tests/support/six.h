@@ -1,0 +1,12 @@
+// Six numbers of a pose or a wrench, in the order of host/types.h.
+#pragma once
+
+#include "host/types.h"
+
+namespace tagwrench::test {
+
+inline Vector6 six(double x, double y, double z, double rx, double ry, double rz) {
+  return (Vector6() << x, y, z, rx, ry, rz).finished();
+}
+
+}  // namespace tagwrench::test
