@@ -122,7 +122,7 @@ void read_light(YamlSection s, sim::Light& l) {
 
 void read_trajectory(YamlSection s, sim::Trajectory& t) {
   s.choice("motion", t.motion,
-           {"rest", "hold", "push", "steps", "sweep", "tap", "drop", "compound", "hard"});
+           {"rest", "hold", "push", "steps", "sweep", "tap", "drop", "compound", "hard", "desk"});
   s.number("rest_s", t.rest_time);
   s.numbers("amplitude", t.amplitude);
   s.choice("axis", t.axis, {"fx", "fy", "fz", "mx", "my", "mz"});
@@ -133,6 +133,14 @@ void read_trajectory(YamlSection s, sim::Trajectory& t) {
   s.number("sweep_to_hz", t.sweep_to);
   s.number("sweep_s", t.sweep_time);
   s.number("event_s", t.event_time);
+  s.finish();
+}
+
+void read_desk(YamlSection s, sim::DeskSettings& d) {
+  s.number("length_s", d.length);
+  s.number("gesture_share", d.gesture_share);
+  s.number("wander", d.wander);
+  s.number("knock_m_per_s2", d.knock);
   s.finish();
 }
 
@@ -183,6 +191,7 @@ sim::Scenario read_scenario(YamlReader root) {
   section("target", read_target, scenario.target);
   section("light", read_light, scenario.light);
   section("trajectory", read_trajectory, scenario.trajectory);
+  section("desk", read_desk, scenario.desk);
   section("exposure", read_exposure, scenario.exposure);
   section("delivery", read_delivery, scenario.delivery);
   section("noise", read_noise, scenario.noise);

@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <filesystem>
+#include <utility>
 
 #include "host/config/appearance_file.h"
 #include "host/config/calibration_file.h"
@@ -326,11 +327,16 @@ Eigen::Matrix3d read_mounting(YamlReader node) {
 
 ShapingOptions read_shaping(YamlReader node, ShapingOptions shaping) {
   shaping.full_scale = force_and_torque(node, "full_scale_n", "full_scale_nm", shaping.full_scale);
-  shaping.dead_zone = force_and_torque(node, "dead_zone_n", "dead_zone_nm", shaping.dead_zone);
-  for (int i = 0; i < 6; ++i) {
-    if (shaping.dead_zone[i] >= shaping.full_scale[i]) {
-      node.fail(i < 3 ? "dead_zone_n" : "dead_zone_nm",
-                "must be smaller than the full scale of its axis");
+  for (const auto& [key, first] : {std::pair{"dead_zone_n", 0}, std::pair{"dead_zone_nm", 3}}) {
+    const std::vector<double> read = node.numbers_or(
+        key,
+        {shaping.dead_zone[first], shaping.dead_zone[first + 1], shaping.dead_zone[first + 2]});
+    for (int i = 0; i < 3; ++i) {
+      const double dead_zone = read[static_cast<std::size_t>(i)];
+      if (dead_zone < 0) node.fail(key, "must not be negative");
+      if (dead_zone >= shaping.full_scale[first + i])
+        node.fail(key, "must be smaller than the full scale of its axis");
+      shaping.dead_zone[first + i] = dead_zone;
     }
   }
   node.finish();

@@ -153,6 +153,18 @@ std::string YamlReader::text(const std::string& key) {
   return node.Scalar();
 }
 
+std::vector<std::string> YamlReader::texts(const std::string& key) {
+  const YAML::Node node = required(key);
+  if (!node.IsSequence()) fail(key, "must be a list of text values, such as [one, two]");
+  std::vector<std::string> out;
+  for (const YAML::Node& item : node) {
+    if (!item.IsScalar())
+      fail(key, fmt::format("entry {} must be a single text value", out.size() + 1));
+    out.push_back(item.Scalar());
+  }
+  return out;
+}
+
 std::vector<double> YamlReader::numbers(const std::string& key, std::size_t count) {
   const YAML::Node node = required(key);
   if (!node.IsSequence() || node.size() != count) {

@@ -37,6 +37,8 @@ class YamlReader {
   int integer(const std::string& key, int lowest, int highest);
   bool boolean(const std::string& key);
   std::string text(const std::string& key);
+  /// A list of text values, which may be empty.
+  std::vector<std::string> texts(const std::string& key);
   /// Exactly `count` finite numbers.
   std::vector<double> numbers(const std::string& key, std::size_t count);
   /// A non-empty list of points, each of exactly `dimension` finite numbers.

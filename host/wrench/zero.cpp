@@ -66,7 +66,6 @@ bool ZeroTracking::within(const Vector6& wrench, double part) const noexcept {
 }
 
 ZeroState ZeroTracking::judge(const Sample& sample, const Vector6& noise) noexcept {
-  if (!follow_) return ZeroState::off;
   if (!carries_numbers(sample.status)) {
     meter_.reset();
     return ZeroState::touched;
@@ -74,22 +73,42 @@ ZeroState ZeroTracking::judge(const Sample& sample, const Vector6& noise) noexce
   meter_.add(sample.capture_time, sample.wrench, noise);
   if (sample.touched || sample.status == Status::saturated) meter_.reset();
   const bool hand = sample.touched || meter_.moves();
-  const Vector6 reading = meter_.mean() - options_.set - moved_;
-  felt_ = felt_ || hand || !within(reading, options_.band);
+  felt_ = felt_ || hand || !within(reading(), options_.band);
   if (hand || !meter_.still()) return ZeroState::touched;
-  return within(reading, felt_ ? options_.capture : options_.band) ? ZeroState::following
-                                                                   : ZeroState::far;
+  return within(reading(), felt_ ? options_.capture : options_.band) ? ZeroState::following
+                                                                     : ZeroState::far;
+}
+
+/// A hand is felt by what scatters: who merely rests his hand on the sensor does not get a zero.
+void ZeroTracking::answer(const Sample& sample) noexcept {
+  if (!asked_at_) asked_at_ = sample.capture_time;
+  const bool range_known = range_.maxCoeff() > 0;
+  const bool at_rest =
+      sample.zero_state == ZeroState::following || sample.zero_state == ZeroState::far;
+  if (!range_known) {
+    answer_ = ZeroAnswer::no_range;
+  } else if (at_rest && within(reading(), options_.reach)) {
+    options_.set += reading();
+    answer_ = ZeroAnswer::done;
+  } else if (sample.capture_time - *asked_at_ >= options_.patience) {
+    answer_ = at_rest ? ZeroAnswer::loaded : ZeroAnswer::moving;
+  } else {
+    return;
+  }
+  asked_ = false;
+  asked_at_.reset();
 }
 
 void ZeroTracking::follow(Sample& sample, const Vector6& noise) noexcept {
   sample.zero_state = judge(sample, noise);
+  if (asked_) answer(sample);
+  if (!follow_) sample.zero_state = ZeroState::off;
   if (sample.zero_state == ZeroState::following) {
     const double dt = seconds(sample.capture_time - last_);
     const double weight = 1 - std::exp(-dt / options_.time_constant);
     const Vector6 step = options_.rate * dt * range_;
     const Vector6 limit = options_.band * range_;
-    const Vector6 reading = meter_.mean() - options_.set - moved_;
-    moved_ += (weight * reading).cwiseMin(step).cwiseMax(-step);
+    moved_ += (weight * reading()).cwiseMin(step).cwiseMax(-step);
     moved_ = moved_.cwiseMin(limit).cwiseMax(-limit).eval();
   }
   last_ = sample.capture_time;

@@ -2,6 +2,11 @@
 // wrench at rest wanders. It is taken off, by hand (`tagwrench zero`) and, slowly, by itself.
 #pragma once
 
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
 #include "host/types.h"
 
 namespace tagwrench {
@@ -59,14 +64,26 @@ struct ZeroOptions {
   double capture = 0.005;
   double rate = 0.5 / 3000;   ///< of the range a second: half an interval, where 3000 are the range
   double time_constant = 10;  ///< s, of following where the rate allows it
+  double reach = 0.1;         ///< of the range: farther from zero is a load, and no zero on demand
+  Duration patience = std::chrono::seconds(10);  ///< for a zero on demand to find it at rest
+};
+
+/// What became of a zero on demand.
+enum class ZeroAnswer : std::uint8_t {
+  none,      ///< nothing was asked, or it waits for rest
+  done,      ///< what read is zero now
+  loaded,    ///< it stands still, but as under a load
+  moving,    ///< it did not come to rest: somebody holds it
+  no_range,  ///< without a range nobody knows what is still and what is a load
 };
 
 /// Ranges of a sensor whose range nobody has told are larger than this, N and N m.
 inline constexpr double kUnknownRange = 1e8;
 
 /// Takes the zero off samples and, if asked to, lets it follow while nobody touches the sensor: the
-/// wrench stands still, to its noise, for a second, is near zero, and no button is pressed.
-/// Depends on samples and their times alone, so that a replay gives the same. No heap.
+/// wrench stands still, to its noise, for a second, is near zero, and no button is pressed. On
+/// demand it goes at once to what reads then, as soon as nobody touches the sensor. Depends on
+/// samples and their times alone, so that a replay gives the same. No heap.
 class ZeroTracking {
  public:
   explicit ZeroTracking(const ZeroOptions& options);
@@ -76,18 +93,27 @@ class ZeroTracking {
   void follow(Sample& sample, const Vector6& noise) noexcept;
 
   bool follows() const noexcept { return follow_; }
+  /// Zero on demand, with the next sample at rest.
+  void ask() noexcept { asked_ = true; }
+  /// Told once for each ask().
+  ZeroAnswer take_answer() noexcept { return std::exchange(answer_, ZeroAnswer::none); }
   /// How far it has moved from the one that was set, N and N m.
   const Vector6& moved() const noexcept { return moved_; }
 
  private:
   ZeroState judge(const Sample& sample, const Vector6& noise) noexcept;
   bool within(const Vector6& wrench, double part) const noexcept;
+  void answer(const Sample& sample) noexcept;
+  Vector6 reading() const noexcept { return meter_.mean() - options_.set - moved_; }
 
   ZeroOptions options_;
   Vector6 range_;  ///< 0 for axes that are not followed
   bool follow_;
   StillMeter meter_;
   bool felt_ = false;  ///< somebody, since the start
+  bool asked_ = false;
+  std::optional<TimePoint> asked_at_;
+  ZeroAnswer answer_ = ZeroAnswer::none;
   TimePoint last_{};
   Vector6 moved_ = Vector6::Zero();
 };

@@ -281,6 +281,17 @@ TEST(SensorConfig, RefusesADeadZoneBeyondFullScale) {
   EXPECT_NE(line.find("shaping.dead_zone_n: must be smaller"), std::string::npos) << line;
 }
 
+TEST(SensorConfig, ADeadZoneMayBeNothingButNotLess) {
+  const std::string shaping = "shaping: {dead_zone_n: [0, 0.1, 0]}\n";
+  const SensorConfig s = parse_sensor(std::string(kGood) + shaping, "sensor.yaml");
+  EXPECT_EQ(s.shaping.dead_zone[0], 0);
+  EXPECT_EQ(s.shaping.dead_zone[1], 0.1);
+  EXPECT_EQ(s.shaping.dead_zone[3], ShapingOptions{}.dead_zone[3]);
+  EXPECT_NE(complaint(std::string(kGood) + "shaping: {dead_zone_nm: [0, -1, 0]}\n")
+                .find("shaping.dead_zone_nm: must not be negative"),
+            std::string::npos);
+}
+
 TEST(SensorConfig, RefusesTheIdThatTheKernelKeepsForRealDevices) {
   EXPECT_NE(complaint(std::string(kGood) + "spacemouse: {id: '046d:c626'}\n").find("hid-logitech"),
             std::string::npos);

@@ -1,9 +1,11 @@
-// Newtons of every kind of model without the heap, and how long one sample takes.
+// Newtons of every kind of model, and their shaping, without the heap; and how long one sample
+// takes.
 #include <gtest/gtest.h>
 
 #include <cstdio>
 
 #include "host/wrench/estimate.h"
+#include "host/wrench/shaping.h"
 #include "tests/support/heap_count.h"
 
 namespace tagwrench {
@@ -38,6 +40,29 @@ TEST(WrenchHeap, EveryKindOfModelEstimatesWithoutIt) {
     std::printf("%s: %.2f us a sample\n", name(model.features.kind).data(),
                 static_cast<double>(spent.count()) / 1e3 / kSamples);
   }
+}
+
+TEST(WrenchHeap, ShapingDoesWithoutItAlsoWhenItIsChanged) {
+  ShapingOptions options;
+  for (AxisOptions& axis : options.axes) axis.curve = {.kind = CurveKind::power, .power = 1.6};
+  Shaping shaping(options);
+  Sample sample;
+  sample.status = Status::ok;
+  sample.wrench_sigma.setConstant(1e-4);
+  constexpr int kSamples = 20'000;
+  test::start_counting_allocations();
+  const auto before = std::chrono::steady_clock::now();
+  for (int i = 0; i < kSamples; ++i) {
+    sample.wrench.setConstant(1e-3 * (i % 700));
+    sample.capture_time += std::chrono::milliseconds(10);
+    shaping.shape(sample);
+    sample.motion = shaping.motion_at(sample.capture_time + std::chrono::milliseconds(5));
+    if (i % 100 == 0) shaping.change(options);
+  }
+  const Duration spent = std::chrono::steady_clock::now() - before;
+  EXPECT_EQ(test::stop_counting_allocations(), 0);
+  EXPECT_TRUE(sample.motion.allFinite());
+  std::printf("shaping: %.2f us a sample\n", static_cast<double>(spent.count()) / 1e3 / kSamples);
 }
 
 }  // namespace

@@ -210,5 +210,52 @@ TEST(Zero, TheRangeAboutAnOffsetOriginHasTheLeverInIt) {
   EXPECT_EQ(range_through(tool, unknown)[3], 0) << "not known, for its part is not";
 }
 
+TEST(ZeroOnDemand, TakesOffWhatReadsAtRest) {
+  for (const bool follow : {true, false}) {
+    ZeroOptions o = zero_options();
+    o.follow = follow;
+    ZeroTracking zero(o);
+    const auto offset = [](double) { return part_of_range(0.05); };
+    play(zero, 0, 3, offset);
+    zero.ask();
+    const Sample last = play(zero, 3, 4, offset, 2);
+    EXPECT_EQ(zero.take_answer(), ZeroAnswer::done);
+    EXPECT_EQ(zero.take_answer(), ZeroAnswer::none) << "told once";
+    EXPECT_LT(largest_part(last.zero - part_of_range(0.05)), 1e-3);
+    EXPECT_EQ(last.zero_state, follow ? ZeroState::following : ZeroState::off);
+  }
+}
+
+TEST(ZeroOnDemand, WaitsUntilTheHandIsGone) {
+  ZeroTracking zero(zero_options());
+  const auto let_go = [](double t) { return part_of_range(t < 4 ? 0.3 * std::sin(7 * t) : 0.01); };
+  play(zero, 0, 2, let_go);
+  zero.ask();
+  play(zero, 2, 4, let_go, 2);
+  EXPECT_EQ(zero.take_answer(), ZeroAnswer::none);
+  EXPECT_TRUE(zero.moved().isZero());
+  const Sample last = play(zero, 4, 12, let_go, 3);
+  EXPECT_EQ(zero.take_answer(), ZeroAnswer::done);
+  EXPECT_LT(largest_part(last.zero - part_of_range(0.01)), 1e-3);
+}
+
+TEST(ZeroOnDemand, IsRefusedWhileHeldUnderALoadAndWithoutARange) {
+  const auto held = [](double t) { return part_of_range(0.02 + 0.02 * std::sin(60 * t)); };
+  const auto loaded = [](double) { return part_of_range(0.3); };
+  for (const bool load : {false, true}) {
+    ZeroTracking zero(zero_options());
+    const auto wrench = load ? std::function<Vector6(double)>(loaded) : held;
+    play(zero, 0, 3, wrench);
+    zero.ask();
+    const Sample last = play(zero, 3, 14, wrench, 2);
+    EXPECT_EQ(zero.take_answer(), load ? ZeroAnswer::loaded : ZeroAnswer::moving);
+    EXPECT_TRUE(last.zero.isZero());
+  }
+  ZeroTracking unknown{ZeroOptions{}};
+  unknown.ask();
+  play(unknown, 0, 1, loaded);
+  EXPECT_EQ(unknown.take_answer(), ZeroAnswer::no_range);
+}
+
 }  // namespace
 }  // namespace tagwrench
