@@ -50,6 +50,12 @@ void write_once(int fd, const std::vector<std::uint8_t>& bytes) {
   [[maybe_unused]] const ssize_t written = ::write(fd, bytes.data(), bytes.size());
 }
 
+void write_neutral(const std::vector<DeadManDevice>& devices) {
+  for (const DeadManDevice& device : devices) {
+    for (const std::vector<std::uint8_t>& bytes : device.neutral) write_once(device.fd, bytes);
+  }
+}
+
 void close_gap(unsigned first, unsigned last) {
   if (first > last || close_range(first, last, 0) == 0) return;
   const long limit = std::min<long>(sysconf(_SC_OPEN_MAX), 65536);  // kernels before 5.9
@@ -98,7 +104,7 @@ void guard(int link, std::atomic<std::int64_t>& deadline_ns,
     } else if (deadline_ns.compare_exchange_strong(deadline, kMissed)) {
       // Had the bridge moved the deadline meanwhile, it would be alive and the loop would look
       // again.
-      for (const DeadManDevice& device : devices) write_once(device.fd, device.neutral);
+      write_neutral(devices);
     }
   }
 }
@@ -148,7 +154,7 @@ DeadMan::DeadMan(const std::vector<DeadManDevice>& devices) {
   close_all_but(kept);  // the other end of the link among them
   guard(guardian_end.get(), shared_->deadline_ns, devices);
   if (!shared_->dismissed.load()) {
-    for (const DeadManDevice& device : devices) write_once(device.fd, device.neutral);
+    write_neutral(devices);
     for (const DeadManDevice& device : devices) write_once(device.fd, device.destroy);
   }
   _exit(0);

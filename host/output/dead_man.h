@@ -26,7 +26,7 @@ namespace tagwrench {
 /// DeadMan exists.
 struct DeadManDevice {
   int fd = -1;
-  std::vector<std::uint8_t> neutral;
+  std::vector<std::vector<std::uint8_t>> neutral;  ///< a write each
   std::vector<std::uint8_t> destroy;  ///< may be empty: the last close() then removes the device
 };
 

@@ -180,6 +180,11 @@ Counts6 to_counts(const Vector6& motion, int limit_counts) noexcept {
 
 std::span<const std::uint8_t> spacemouse_descriptor() noexcept { return kSpacemouseDescriptor; }
 
+SpacemouseButtonReport spacemouse_button_report(std::uint32_t pressed) noexcept {
+  constexpr std::uint32_t kThere = (1U << kSpacemouseButtons) - 1;
+  return {kSpacemouseButtonReportId, static_cast<std::uint8_t>(pressed & kThere), 0};
+}
+
 SpacemouseReport spacemouse_report(const Counts6& counts) noexcept {
   SpacemouseReport report{};
   ReportWriter out(report);

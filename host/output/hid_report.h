@@ -34,6 +34,12 @@ using SpacemouseReport = std::array<std::uint8_t, 13>;  ///< report id, then six
 std::span<const std::uint8_t> spacemouse_descriptor() noexcept;
 SpacemouseReport spacemouse_report(const Counts6& counts) noexcept;
 
+inline constexpr std::uint8_t kSpacemouseButtonReportId = 3;
+inline constexpr int kSpacemouseButtons = 2;
+using SpacemouseButtonReport = std::array<std::uint8_t, 3>;  ///< report id, bit 0 the first button
+/// Of the pressed ones those that the device has.
+SpacemouseButtonReport spacemouse_button_report(std::uint32_t pressed) noexcept;
+
 /// HID axes (X right, Y toward the user, Z down) to spnav axes (x right, y up, z away; rotations
 /// right-handed about each), for a vendor id whose axes spacenavd passes straight through.
 Counts6 to_spnav_order(const Counts6& hid) noexcept;

@@ -18,9 +18,10 @@ namespace {
 constexpr const char* kPath = "/dev/uinput";
 constexpr std::uint16_t kAxes[] = {ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ};
 
-// Six absolute axes without any key would be an accelerometer to udev and SDL; these two codes mean
+// Six absolute axes without any key would be an accelerometer to udev and SDL; these codes mean
 // joystick to both.
-constexpr int kButtons[] = {BTN_TRIGGER, BTN_THUMB};
+constexpr std::array<std::uint16_t, kJoystickButtons> kButtons = {
+    BTN_TRIGGER, BTN_THUMB, BTN_THUMB2, BTN_TOP, BTN_TOP2, BTN_PINKIE, BTN_BASE, BTN_BASE2};
 
 uinput_setup setup_of(const JoystickOptions& options) {
   uinput_setup setup{};
@@ -37,15 +38,20 @@ uinput_setup setup_of(const JoystickOptions& options) {
 
 }  // namespace
 
-JoystickEvents joystick_events(const Counts6& counts) noexcept {
+JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noexcept {
   JoystickEvents events{};
   for (std::size_t i = 0; i < 6; ++i) {
     events[i].type = EV_ABS;
     events[i].code = kAxes[i];
     events[i].value = counts[i];
   }
-  events[6].type = EV_SYN;
-  events[6].code = SYN_REPORT;
+  for (std::size_t i = 0; i < kJoystickButtons; ++i) {
+    events[6 + i].type = EV_KEY;
+    events[6 + i].code = kButtons[i];
+    events[6 + i].value = (pressed >> i) & 1U;
+  }
+  events.back().type = EV_SYN;
+  events.back().code = SYN_REPORT;
   return events;
 }
 
@@ -71,16 +77,18 @@ JoystickOutput::JoystickOutput(const JoystickOptions& options) {
 }
 
 JoystickOutput::~JoystickOutput() {
-  JoystickOutput::send(Sample{});
+  JoystickOutput::move(Sample{});
   ioctl(uinput_.get(), UI_DEV_DESTROY);  // the guardian's duplicate of the fd would keep it alive
 }
 
-SendStatus JoystickOutput::send(const Sample& sample) noexcept {
+SendStatus JoystickOutput::move(const Sample& sample) noexcept {
   Counts6 counts{};
+  std::uint32_t pressed = 0;
   if (carries_numbers(shown_status(sample))) {
+    pressed = sample.buttons;
     counts = to_counts(sample.motion, kJoystickLimit_counts);
   }
-  const JoystickEvents events = joystick_events(counts);
+  const JoystickEvents events = joystick_events(counts, pressed);
   if (::write(uinput_.get(), events.data(), sizeof events) >= 0) return SendStatus::ok;
   if (errno == EAGAIN || errno == EINTR) return SendStatus::skipped;
   error_ = errno;
@@ -93,9 +101,9 @@ std::string JoystickOutput::failure() const {
 }
 
 void JoystickOutput::add_to(std::vector<DeadManDevice>& devices) const {
-  const JoystickEvents neutral = joystick_events({});
+  const JoystickEvents neutral = joystick_events({}, 0);
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(neutral.data());
-  devices.push_back({uinput_.get(), {bytes, bytes + sizeof neutral}, {}});
+  devices.push_back({uinput_.get(), {{bytes, bytes + sizeof neutral}}, {}});
 }
 
 }  // namespace tagwrench

@@ -5,6 +5,8 @@
 #include <linux/input.h>
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -24,18 +26,22 @@ struct JoystickOptions {
   std::string name = "tagwrench joystick";  ///< 1..79 bytes, printable
 };
 
-/// ABS_X to ABS_RZ and the SYN_REPORT that makes them one frame.
-using JoystickEvents = std::array<input_event, 7>;
-JoystickEvents joystick_events(const Counts6& counts) noexcept;
+inline constexpr std::size_t kJoystickButtons = 8;
 
-/// Sends Sample::motion as +-32767. No dither: games read the state of an axis, not its events.
+/// ABS_X to ABS_RZ, the buttons (bit 0 of `pressed` is the first), and the SYN_REPORT that makes
+/// them one frame.
+using JoystickEvents = std::array<input_event, 6 + kJoystickButtons + 1>;
+JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noexcept;
+
+/// Sends Sample::motion as +-32767, and the buttons. No dither: games read the state of an axis,
+/// not its events.
 class JoystickOutput : public Output {
  public:
   /// Throws ConfigError if /dev/uinput is not usable.
   explicit JoystickOutput(const JoystickOptions& options);
   ~JoystickOutput() override;
 
-  SendStatus send(const Sample& sample) noexcept override;
+  SendStatus move(const Sample& sample) noexcept override;
   std::string failure() const override;
 
   void add_to(std::vector<DeadManDevice>& devices) const;

@@ -1,4 +1,5 @@
-// Where samples go. Every output gets every sample; none blocks, none queues.
+// Where samples go: every sample to those who want data, motion and buttons to input devices. None
+// blocks, none queues.
 #pragma once
 
 #include <string>
@@ -24,10 +25,14 @@ class Output {
   /// line.
   virtual ~Output() = default;
 
-  /// A sample whose status does not carry numbers is a neutral output: zeros.
-  virtual SendStatus send(const Sample& sample) noexcept = 0;
+  /// Every sample, once. One whose status does not carry numbers is a neutral output: zeros.
+  virtual SendStatus send(const Sample&) noexcept { return SendStatus::ok; }
 
-  /// One line about the last failed send().
+  /// What input devices show: Sample::motion and Sample::buttons. With every sample, or at a rate
+  /// of its own, then with what the motion is at that time. Neutral as above.
+  virtual SendStatus move(const Sample&) noexcept { return SendStatus::ok; }
+
+  /// One line about the last failed send() or move().
   virtual std::string failure() const { return {}; }
 
   /// Readable when service() has something to answer (a client's LED report); -1: never.
@@ -35,8 +40,8 @@ class Output {
   /// Answers. What a client has changed, in words for people; empty if nothing.
   virtual std::string_view service() noexcept { return {}; }
 
-  /// Whether somebody presses a button that this output knows of.
-  virtual bool touched() const noexcept { return false; }
+  /// Buttons that this output knows of and that are pressed now, bit 0 is the first.
+  virtual std::uint32_t pressed() const noexcept { return 0; }
 
   /// Offers a line meant for people; true if this output has shown it. An empty one takes the last
   /// one away.

@@ -35,18 +35,28 @@ SpacemouseOutput::SpacemouseOutput(UhidDevice device, const SpacemouseOptions& o
   device_.send(spacemouse_report({}));
 }
 
-SpacemouseOutput::~SpacemouseOutput() { device_.send(spacemouse_report({})); }
+SpacemouseOutput::~SpacemouseOutput() {
+  device_.send(spacemouse_report({}));
+  const SpacemouseButtonReport released = spacemouse_button_report(0);
+  if (last_buttons_ != released) device_.send(released);
+}
 
-SendStatus SpacemouseOutput::send(const Sample& sample) noexcept {
+SendStatus SpacemouseOutput::move(const Sample& sample) noexcept {
   Counts6 wanted{};
+  std::uint32_t pressed = 0;
   if (carries_numbers(shown_status(sample))) {
+    pressed = sample.buttons;
     wanted = to_counts(sample.motion, kSpacemouseLimit_counts);
     if (vendor_ != k3dconnexion) wanted = to_spnav_order(wanted);
   }
   const Counts6 counts = dithered(wanted, last_);
   const SendStatus status = device_.send(spacemouse_report(counts));
   if (status == SendStatus::ok) last_ = counts;
-  return status;
+  const SpacemouseButtonReport buttons = spacemouse_button_report(pressed);
+  if (status != SendStatus::ok || buttons == last_buttons_) return status;
+  const SendStatus pressing = device_.send(buttons);
+  if (pressing == SendStatus::ok) last_buttons_ = buttons;
+  return pressing;
 }
 
 std::string_view SpacemouseOutput::service() noexcept {
@@ -67,7 +77,9 @@ std::string SpacemouseOutput::spacenavd_advice() const {
 }
 
 void SpacemouseOutput::add_to(std::vector<DeadManDevice>& devices) const {
-  devices.push_back(device_.dead_man_device(spacemouse_report({})));
+  const SpacemouseReport rest = spacemouse_report({});
+  const SpacemouseButtonReport released = spacemouse_button_report(0);
+  devices.push_back(device_.dead_man_device({rest, released}));
 }
 
 }  // namespace tagwrench

@@ -20,9 +20,10 @@ struct SpacemouseOptions {
   std::string serial = "tagwrench-0";
 };
 
-/// Sends Sample::motion as +-350 counts. Zero at rest is exact and sent with every sample, so that
-/// a slow hidraw reader that lost reports still learns of the release. Off-centre every sample
-/// makes an event (see dithered()). A status that carries no numbers is zeros at once.
+/// Sends Sample::motion as +-350 counts, and buttons when they change. Zero at rest is exact and
+/// sent with every move, so that a slow hidraw reader that lost reports still learns of the
+/// release. Off-centre every move makes an event (see dithered()). A status that carries no numbers
+/// is zeros at once.
 class SpacemouseOutput : public Output {
  public:
   /// Throws ConfigError: /dev/uhid is not usable, or vendor 046d, whose SpaceMouse ids the kernel
@@ -31,7 +32,7 @@ class SpacemouseOutput : public Output {
   SpacemouseOutput(const SpacemouseOptions& options, UniqueFd uhid);
   ~SpacemouseOutput() override;
 
-  SendStatus send(const Sample& sample) noexcept override;
+  SendStatus move(const Sample& sample) noexcept override;
   std::string failure() const override { return device_.failure(); }
   int poll_fd() const noexcept override { return device_.fd(); }
   std::string_view service() noexcept override;
@@ -51,6 +52,7 @@ class SpacemouseOutput : public Output {
   std::uint16_t vendor_;
   std::uint16_t product_;
   Counts6 last_{};
+  SpacemouseButtonReport last_buttons_ = spacemouse_button_report(0);
   bool led_ = false;
 };
 

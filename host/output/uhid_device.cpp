@@ -206,17 +206,22 @@ std::optional<HidOutputReport> UhidDevice::next_output() noexcept {
   return std::nullopt;
 }
 
-DeadManDevice UhidDevice::dead_man_device(std::span<const std::uint8_t> neutral) const {
-  ShortInput input;
-  const std::size_t size = std::min(neutral.size(), sizeof input.data);
-  input.size = static_cast<std::uint16_t>(size);
-  std::memcpy(input.data, neutral.data(), size);
+DeadManDevice UhidDevice::dead_man_device(
+    std::initializer_list<std::span<const std::uint8_t>> neutral) const {
+  DeadManDevice device;
+  device.fd = uhid_.get();
+  for (const std::span<const std::uint8_t> report : neutral) {
+    ShortInput input;
+    const std::size_t size = std::min(report.size(), sizeof input.data);
+    input.size = static_cast<std::uint16_t>(size);
+    std::memcpy(input.data, report.data(), size);
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(&input);
+    device.neutral.emplace_back(bytes, bytes + kInputHeader + size);
+  }
   const std::uint32_t destroy = UHID_DESTROY;
-  const auto* input_bytes = reinterpret_cast<const std::uint8_t*>(&input);
-  const auto* destroy_bytes = reinterpret_cast<const std::uint8_t*>(&destroy);
-  return {uhid_.get(),
-          {input_bytes, input_bytes + kInputHeader + size},
-          {destroy_bytes, destroy_bytes + sizeof destroy}};
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&destroy);
+  device.destroy.assign(bytes, bytes + sizeof destroy);
+  return device;
 }
 
 }  // namespace tagwrench

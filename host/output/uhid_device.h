@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <span>
@@ -65,8 +66,8 @@ class UhidDevice {
   /// One line about the last failed send().
   std::string failure() const;
 
-  /// For the guardian: this input report, then the device's end.
-  DeadManDevice dead_man_device(std::span<const std::uint8_t> neutral) const;
+  /// For the guardian: these input reports, then the device's end.
+  DeadManDevice dead_man_device(std::initializer_list<std::span<const std::uint8_t>> neutral) const;
 
  private:
   void create(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor);

@@ -31,7 +31,7 @@ std::string_view WrenchHidOutput::service() noexcept {
 }
 
 void WrenchHidOutput::add_to(std::vector<DeadManDevice>& devices) const {
-  devices.push_back(device_.dead_man_device(neutral_wrench_report()));
+  devices.push_back(device_.dead_man_device({neutral_wrench_report()}));
 }
 
 }  // namespace tagwrench

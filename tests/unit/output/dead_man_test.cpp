@@ -53,7 +53,7 @@ bool has_nothing(int fd) {
   return poll(&waiting, 1, 0) == 0;
 }
 
-DeadManDevice device(const Pipe& pipe) { return {pipe.write.get(), {'N'}, {'D'}}; }
+DeadManDevice device(const Pipe& pipe) { return {pipe.write.get(), {{'N'}}, {'D'}}; }
 
 /// A bridge in a process of its own, that arms its dead man and then does what it is told.
 class Bridge {
@@ -124,7 +124,7 @@ TEST(DeadMan, AMissedDeadlineIsNeutralOnceAndTheNextOneAgain) {
 
 TEST(DeadMan, EveryDeviceGoesNeutral) {
   Pipe a, b;
-  DeadMan dead_man({device(a), {b.write.get(), {'z', 'z'}, {}}});
+  DeadMan dead_man({device(a), {b.write.get(), {{'z', 'z'}}, {}}});
   dead_man.expect_by(steady_clock::now());
   EXPECT_EQ(take(a.read.get(), 1), "N");
   EXPECT_EQ(take(b.read.get(), 2), "zz");

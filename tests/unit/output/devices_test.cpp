@@ -92,40 +92,40 @@ TEST_F(SpacemouseDevice, IsCreatedWithTheIdentityThatClientsLookFor) {
 TEST_F(SpacemouseDevice, SendsHidAxesWithoutSignChanges) {
   Sample s = test::ok_sample();
   s.motion << 0.1, 0.2, 0.3, -0.1, -0.2, -0.3;
-  EXPECT_EQ(out_->send(s), SendStatus::ok);
+  EXPECT_EQ(out_->move(s), SendStatus::ok);
   EXPECT_EQ(kernel_.next_input(), axes({35, 70, 105, -35, -70, -105}));
 }
 
 TEST_F(SpacemouseDevice, HeldOffCentreEverySampleChangesAndReleaseIsExactZeroAgainAndAgain) {
   std::optional<Bytes> last;
   for (int i = 0; i < 20; ++i) {
-    out_->send(test::moving(0.5));
+    out_->move(test::moving(0.5));
     const auto report = kernel_.next_input();
     ASSERT_TRUE(report);
     EXPECT_NE(report, last);
     last = report;
   }
   for (int i = 0; i < 4; ++i) {
-    out_->send(test::moving(0));
+    out_->move(test::moving(0));
     EXPECT_EQ(kernel_.next_input(), axes({}));
   }
 }
 
 TEST_F(SpacemouseDevice, EveryStatusWithoutNumbersIsZeroAtOnce) {
   for (const Status status : {Status::acquiring, Status::lost, Status::doubtful}) {
-    out_->send(test::moving(1));
+    out_->move(test::moving(1));
     kernel_.next_input();
     Sample s = test::moving(1);
     s.status = status;
-    out_->send(s);
+    out_->move(s);
     EXPECT_EQ(kernel_.next_input(), axes({}));
   }
 }
 
 TEST_F(SpacemouseDevice, NanIsZero) {
-  out_->send(test::moving(1));
+  out_->move(test::moving(1));
   kernel_.next_input();
-  out_->send(test::moving(std::numeric_limits<double>::quiet_NaN()));
+  out_->move(test::moving(std::numeric_limits<double>::quiet_NaN()));
   EXPECT_EQ(kernel_.next_input(), axes({}));
 }
 
@@ -161,7 +161,7 @@ TEST_F(SpacemouseDevice, AnOutputReportWithALyingSizeIsHarmless) {
 }
 
 TEST_F(SpacemouseDevice, GetReportIsAnsweredWithTheLastInputAndElseRefused) {
-  out_->send(test::moving(1));
+  out_->move(test::moving(1));
   kernel_.next_input();
   const auto ask = [this](std::uint8_t report) {
     kernel_.say(UHID_GET_REPORT, [report](uhid_event& e) {
@@ -200,7 +200,7 @@ TEST_F(SpacemouseDevice, SetReportOfTheLedIsTakenAndAnswered) {
 }
 
 TEST_F(SpacemouseDevice, GoesAwayWithZerosThenDestroy) {
-  out_->send(test::moving(1));
+  out_->move(test::moving(1));
   kernel_.next_input();
   out_.reset();
   const auto zeros = kernel_.next();
@@ -215,14 +215,28 @@ TEST_F(SpacemouseDevice, AFullQueueLosesTheSampleAndNothingComesLate) {
   SendStatus status = SendStatus::ok;
   int sent = 0;
   while (status == SendStatus::ok && sent < 100000) {
-    status = out_->send(test::moving(0.5));
+    status = out_->move(test::moving(0.5));
     if (status == SendStatus::ok) ++sent;
   }
   EXPECT_EQ(status, SendStatus::skipped);
   while (kernel_.next_input()) --sent;
   EXPECT_EQ(sent, 0);
-  EXPECT_EQ(out_->send(test::moving(0.25)), SendStatus::ok);
+  EXPECT_EQ(out_->move(test::moving(0.25)), SendStatus::ok);
   EXPECT_EQ(kernel_.next_input(), axes({88, 0, 0, 0, 0, 0}));
+}
+
+TEST_F(SpacemouseDevice, ButtonsAreSentWhenTheyChangeAndOnlyThoseThatItHas) {
+  Sample s = test::moving(0);
+  s.buttons = 0b110;
+  out_->move(s);
+  EXPECT_EQ(kernel_.next_input(), axes({}));
+  EXPECT_EQ(kernel_.next_input(), (Bytes{3, 0b10, 0}));
+  out_->move(s);
+  EXPECT_EQ(kernel_.next_input(), axes({}));
+  s.status = Status::lost;  // whoever pressed it, nobody knows how it goes on
+  out_->move(s);
+  EXPECT_EQ(kernel_.next_input(), axes({}));
+  EXPECT_EQ(kernel_.next_input(), (Bytes{3, 0, 0}));
 }
 
 TEST_F(SpacemouseDevice, GuardianBytesAreNeutralThenDestroy) {
@@ -230,10 +244,11 @@ TEST_F(SpacemouseDevice, GuardianBytesAreNeutralThenDestroy) {
   out_->add_to(devices);
   ASSERT_EQ(devices.size(), 1u);
   EXPECT_EQ(devices[0].fd, out_->poll_fd());
-  const Bytes neutral = {12, 0, 0, 0,  // UHID_INPUT2
-                         13, 0,        // size
-                         1,  0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-  EXPECT_EQ(devices[0].neutral, neutral);
+  const Bytes rest = {12, 0, 0, 0,  // UHID_INPUT2
+                      13, 0,        // size
+                      1,  0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  const Bytes released = {12, 0, 0, 0, 3, 0, 3, 0, 0};
+  EXPECT_EQ(devices[0].neutral, (std::vector<Bytes>{rest, released}));
   EXPECT_EQ(devices[0].destroy, (Bytes{1, 0, 0, 0}));  // UHID_DESTROY
 }
 
@@ -250,7 +265,7 @@ TEST(Spacemouse, OwnIdSendsSpnavOrderAndSaysTheLineToAdd) {
   kernel.next_input();
   Sample s = test::ok_sample();
   s.motion << 0, 0, 1, 0, 0, 0;  // down
-  out.send(s);
+  out.move(s);
   EXPECT_EQ(kernel.next_input(), axes({0, -350, 0, 0, 0, 0}));  // spnav y is up
 }
 
@@ -303,15 +318,20 @@ TEST(Joystick, WithoutTheNodeSetUpThrows) {
   EXPECT_THROW(JoystickOutput{JoystickOptions{}}, ConfigError);
 }
 
-TEST(Joystick, OneFrameIsSixAxesAndASync) {
-  const JoystickEvents events = joystick_events({1, -2, 3, -4, 32767, -32767});
+TEST(Joystick, OneFrameIsSixAxesEightButtonsAndASync) {
+  const JoystickEvents events = joystick_events({1, -2, 3, -4, 32767, -32767}, 0b101);
   const int values[] = {1, -2, 3, -4, 32767, -32767};
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(events[i].type, EV_ABS);
     EXPECT_EQ(events[i].code, i);  // ABS_X is 0, ABS_RZ is 5
     EXPECT_EQ(events[i].value, values[i]);
   }
-  EXPECT_EQ(events[6].type, EV_SYN);
+  for (std::size_t i = 0; i < kJoystickButtons; ++i) {
+    EXPECT_EQ(events[6 + i].type, EV_KEY);
+    EXPECT_EQ(events[6 + i].code, BTN_TRIGGER + i);
+    EXPECT_EQ(events[6 + i].value, i == 0 || i == 2 ? 1 : 0);
+  }
+  EXPECT_EQ(events.back().type, EV_SYN);
 }
 
 TEST(WrenchDevice, SendsOneFullReportForEverySampleAndNeutralAtTheEnd) {

@@ -1,0 +1,273 @@
+#include "host/output/spnav_output.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <exception>
+#include <span>
+#include <utility>
+
+#include "host/config_error.h"
+#include "host/output/shown.h"
+
+namespace tagwrench {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr std::size_t kMostPrograms = 128;
+constexpr int kAttempts = 3;
+constexpr milliseconds kStartTime{10'000};  // of a keeper on a busy machine
+constexpr Duration kBetweenAttempts = std::chrono::seconds(1);
+// As the pipeline has them: a move that is this late is missing, and a camera that is slower than
+// this is lost.
+constexpr Duration kGrace = milliseconds(60);
+constexpr Duration kShortestInterval = milliseconds(8);
+constexpr Duration kSlowestInterval = milliseconds(250);
+
+// The keeper's descriptors; 0 to 2 are /dev/null.
+constexpr int kProgramsFd = 3;
+constexpr int kBridgeFd = 4;
+
+/// A descriptor that the rearrangement of low numbers leaves alone.
+UniqueFd out_of_the_way(int fd) { return UniqueFd(::fcntl(fd, F_DUPFD_CLOEXEC, kBridgeFd + 1)); }
+
+SpnavHello hello_of(const SpnavOptions& options) noexcept {
+  SpnavHello hello;
+  hello.device.vendor = options.vendor;
+  hello.device.product = options.product;
+  options.name.copy(hello.device.name.data(), hello.device.name.size() - 1);
+  return hello;
+}
+
+/// Without heap, and cut where there is no more room.
+template <typename... Args>
+std::string_view write_line(std::span<char> into, fmt::format_string<Args...> format,
+                            Args&&... args) noexcept {
+  try {
+    const auto written =
+        fmt::format_to_n(into.data(), into.size(), format, std::forward<Args>(args)...);
+    return {into.data(), std::min(written.size, into.size())};
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
+/// What posix_spawn is told: what to do in the child before the program starts.
+class SpawnPlan {
+ public:
+  SpawnPlan(int programs, int bridge) {
+    posix_spawn_file_actions_init(&actions_);
+    posix_spawn_file_actions_addopen(&actions_, 0, "/dev/null", O_RDWR, 0);
+    posix_spawn_file_actions_adddup2(&actions_, 0, 1);
+    posix_spawn_file_actions_adddup2(&actions_, 0, 2);
+    posix_spawn_file_actions_adddup2(&actions_, programs, kProgramsFd);
+    posix_spawn_file_actions_adddup2(&actions_, bridge, kBridgeFd);
+    posix_spawn_file_actions_addclosefrom_np(&actions_, kBridgeFd + 1);
+    posix_spawn_file_actions_addchdir_np(&actions_, "/");
+    posix_spawnattr_init(&attributes_);
+    sigset_t none;
+    sigset_t all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    posix_spawnattr_setsigmask(&attributes_, &none);
+    posix_spawnattr_setsigdefault(&attributes_, &all);
+    posix_spawnattr_setflags(&attributes_,
+                             POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  }
+  SpawnPlan(const SpawnPlan&) = delete;
+  SpawnPlan& operator=(const SpawnPlan&) = delete;
+  ~SpawnPlan() {
+    posix_spawn_file_actions_destroy(&actions_);
+    posix_spawnattr_destroy(&attributes_);
+  }
+
+  int spawn(pid_t& pid, const std::string& program, std::vector<std::string> arguments) const {
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    return ::posix_spawn(&pid, program.c_str(), &actions_, &attributes_, argv.data(), environ);
+  }
+
+ private:
+  posix_spawn_file_actions_t actions_;
+  posix_spawnattr_t attributes_;
+};
+
+}  // namespace
+
+SpnavOutput::SpnavOutput(const SpnavOptions& options)
+    : options_(options),
+      path_(spnav_socket_path(options.socket)),
+      intervals_{milliseconds(40), milliseconds(40), milliseconds(40)} {
+  programs_.reserve(kMostPrograms);
+  // A keeper that is just about to end, or to start, takes another attempt.
+  for (int i = 0; i < kAttempts && !welcome_ && !other_bridge_; ++i) {
+    if (reach_keeper()) await_greeting();
+  }
+  if (other_bridge_) throw ConfigError(refusal());
+  if (!welcome_) {
+    throw ConfigError(fmt::format(
+        "spnav socket {}: its keeper does not answer; `tagwrench spnav --socket {}` in another "
+        "terminal says why",
+        path_, path_));
+  }
+}
+
+SpnavOutput::~SpnavOutput() {
+  if (welcome_) send_spnav(link_.get(), SpnavUpdate{});
+  if (keeper_ > 0) ::waitpid(keeper_, nullptr, WNOHANG);
+}
+
+/// Connects, to a keeper that is started if there is none.
+bool SpnavOutput::reach_keeper() {
+  link_ = connect_spnav_bridge(path_);
+  if (link_) return true;
+  if (const std::optional<SpnavSockets> sockets = listen_spnav(path_)) start_keeper(*sockets);
+  link_ = connect_spnav_bridge(path_);
+  return static_cast<bool>(link_);
+}
+
+void SpnavOutput::start_keeper(const SpnavSockets& sockets) {
+  if (keeper_ > 0) ::waitpid(keeper_, nullptr, WNOHANG);
+  keeper_ = 0;
+  const UniqueFd programs = out_of_the_way(sockets.programs.get());
+  const UniqueFd bridge = out_of_the_way(sockets.bridge.get());
+  const SpawnPlan plan(programs.get(), bridge.get());
+  const int failed = plan.spawn(keeper_, options_.program,
+                                {"tagwrench", "spnav", "--socket", path_, "--inherited",
+                                 fmt::format("{},{}", kProgramsFd, kBridgeFd)});
+  if (failed == 0) return;
+  sockets.remove();
+  throw ConfigError(
+      fmt::format("spnav socket {}: its keeper {} cannot be started: {}; end other "
+                  "programs, or run without the output spnav",
+                  path_, options_.program, std::strerror(failed)));
+}
+
+void SpnavOutput::await_greeting() {
+  const TimePoint until = steady_clock::now() + kStartTime;
+  for (TimePoint now; link_ && !welcome_ && (now = steady_clock::now()) < until;) {
+    pollfd entry{link_.get(), POLLIN, 0};
+    const auto left = std::chrono::ceil<milliseconds>(until - now).count();
+    if (::poll(&entry, 1, static_cast<int>(left)) > 0) service();
+    if (other_bridge_) return;
+  }
+}
+
+SendStatus SpnavOutput::move(const Sample& sample) noexcept {
+  if (other_bridge_) return SendStatus::failed;
+  const TimePoint now = steady_clock::now();
+  SpnavUpdate update;
+  update.valid_ms = valid_ms(now);
+  if (carries_numbers(shown_status(sample))) {
+    update.state.motion = spnav_counts(sample.motion);
+    update.state.buttons = sample.buttons & ((std::uint32_t{1} << kSpnavButtons) - 1);
+  }
+  if (!link_) restart_keeper(now);
+  if (!welcome_) return SendStatus::skipped;
+  const SpnavState rest;
+  if (update.state == rest && last_ == rest) return SendStatus::ok;
+  if (!send_spnav(link_.get(), update)) return SendStatus::skipped;
+  last_ = update.state;
+  return SendStatus::ok;
+}
+
+/// Until when this move holds: the median of three intervals, and some grace.
+std::uint32_t SpnavOutput::valid_ms(TimePoint now) noexcept {
+  intervals_ = {intervals_[1], intervals_[2],
+                std::clamp<Duration>(now - last_move_, kShortestInterval, kSlowestInterval)};
+  last_move_ = now;
+  std::array<Duration, 3> sorted = intervals_;
+  std::sort(sorted.begin(), sorted.end());
+  return static_cast<std::uint32_t>(std::chrono::ceil<milliseconds>(sorted[1] + kGrace).count());
+}
+
+/// At most once a second; what is in the way may go away.
+bool SpnavOutput::restart_keeper(TimePoint now) noexcept {
+  if (now < next_attempt_) return false;
+  next_attempt_ = now + kBetweenAttempts;
+  try {
+    return reach_keeper();
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+std::string SpnavOutput::failure() const { return refusal(); }
+
+std::string SpnavOutput::refusal() const {
+  const std::int32_t pid = other_bridge_.value_or(0);
+  return fmt::format(
+      "spnav socket {}: another bridge{} feeds it already; end that one, or choose another path, "
+      "as "
+      "in --output spnav:PATH",
+      path_, pid > 0 ? fmt::format(" (process {})", pid) : "");
+}
+
+std::string SpnavOutput::advice() const {
+  if (path_ == kSpnavSystemSocket) return "spnav: serving " + path_;
+  return fmt::format("spnav: programs find it when started with SPNAV_SOCKET={}", path_);
+}
+
+std::string_view SpnavOutput::service() noexcept {
+  if (!link_) return {};
+  std::array<std::uint8_t, kSpnavLongestMessage> buffer;
+  const SpnavReceived received = receive_spnav(link_.get(), buffer);
+  if (!received.open) return lost_keeper();
+  if (received.bytes.empty()) return {};
+  if (const auto greeting = spnav_message<SpnavGreeting>(received.bytes)) return take(*greeting);
+  if (const auto program = spnav_message<SpnavProgram>(received.bytes)) return take(*program);
+  lost_keeper();
+  return write_line(news_,
+                    "spnav: the keeper is of another version of tagwrench; end it with `pkill "
+                    "tw-spnav`");
+}
+
+std::string_view SpnavOutput::lost_keeper() noexcept {
+  const bool was_welcome = welcome_;
+  link_.reset();
+  welcome_ = false;
+  last_ = {};
+  programs_.clear();
+  if (!was_welcome) return {};
+  return write_line(news_,
+                    "spnav: the keeper of the socket has ended; starting another. Programs that "
+                    "were connected find it when they are started again");
+}
+
+std::string_view SpnavOutput::take(const SpnavGreeting& greeting) noexcept {
+  if (greeting.refused != 0) {
+    other_bridge_ = greeting.other_bridge;
+    link_.reset();
+    return {};
+  }
+  welcome_ = send_spnav(link_.get(), hello_of(options_));
+  return {};
+}
+
+std::string_view SpnavOutput::take(const SpnavProgram& program) noexcept {
+  SpnavPeer peer = program.peer;
+  peer.name.back() = '\0';
+  std::replace_if(
+      peer.name.begin(), peer.name.end() - 1, [](char c) { return c > 0 && c < ' '; }, '?');
+  if (program.connected != 0) {
+    if (programs_.size() < kMostPrograms) programs_.push_back(peer);
+    return write_line(news_, "spnav: {} (process {}) has connected", peer.name.data(), peer.pid);
+  }
+  const auto it = std::find_if(programs_.begin(), programs_.end(),
+                               [&](const SpnavPeer& known) { return known.pid == peer.pid; });
+  if (it != programs_.end()) programs_.erase(it);
+  return write_line(news_, "spnav: {} (process {}) has gone", peer.name.data(), peer.pid);
+}
+
+}  // namespace tagwrench

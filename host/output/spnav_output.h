@@ -1,0 +1,80 @@
+// The spnav socket without spacenavd and without a kernel device: for machines that have no uhid,
+// sandboxes and remote desktops. It is held by a keeper process (spnav_link.h), which this starts
+// if there is none, and which stays when the bridge ends.
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/os/unique_fd.h"
+#include "host/output/output.h"
+#include "host/output/spnav_link.h"
+
+namespace tagwrench {
+
+struct SpnavOptions {
+  std::string socket;  ///< path; empty: the usual one
+  /// What programs are told that the device is.
+  std::uint16_t vendor = 0x256f;
+  std::uint16_t product = 0xc62e;
+  std::string name = "tagwrench SpaceMouse";
+  /// Program whose verb `spnav` is the keeper.
+  std::string program = "/proc/self/exe";
+};
+
+/// Sends Sample::motion as +-500 counts in spnav's axes: an event for every move off-centre, one
+/// for the return to zero, none at rest. FreeCAD turns by counts times events, so moves at a steady
+/// rate make its speed. Should the bridge hang or die, the keeper goes neutral 60 ms after the move
+/// that should have come. Should the keeper die, another one is started; programs do not connect to
+/// it by themselves.
+class SpnavOutput : public Output {
+ public:
+  /// Throws ConfigError: no place for the socket, another server has it, another bridge feeds its
+  /// keeper, the keeper cannot be started.
+  explicit SpnavOutput(const SpnavOptions& options);
+  ~SpnavOutput() override;
+
+  SendStatus move(const Sample& sample) noexcept override;
+  std::string failure() const override;
+  int poll_fd() const noexcept override { return link_.get(); }
+  /// Programs that come and go, and the keeper's end.
+  std::string_view service() noexcept override;
+
+  /// Where programs connect, as an absolute path.
+  const std::string& socket() const noexcept { return path_; }
+  /// How programs find it, for people.
+  std::string advice() const;
+  /// Who is connected now, in the order of their coming.
+  const std::vector<SpnavPeer>& programs() const noexcept { return programs_; }
+
+ private:
+  bool reach_keeper();
+  void start_keeper(const SpnavSockets& sockets);
+  void await_greeting();
+  bool restart_keeper(TimePoint now) noexcept;
+  std::string_view lost_keeper() noexcept;
+  std::string_view take(const SpnavGreeting& greeting) noexcept;
+  std::string_view take(const SpnavProgram& program) noexcept;
+  std::string refusal() const;
+  std::uint32_t valid_ms(TimePoint now) noexcept;
+
+  SpnavOptions options_;
+  std::string path_;
+  UniqueFd link_;
+  bool welcome_ = false;  ///< the keeper takes what is sent
+  std::optional<std::int32_t> other_bridge_;
+  pid_t keeper_ = 0;  ///< if it is a child of ours
+  SpnavState last_;   ///< what the keeper has
+  TimePoint last_move_{};
+  std::array<Duration, 3> intervals_;  ///< the last three between moves
+  TimePoint next_attempt_{};
+  std::vector<SpnavPeer> programs_;
+  std::array<char, 256> news_{};  ///< the last that service() said
+};
+
+}  // namespace tagwrench
