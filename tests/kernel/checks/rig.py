@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 
-PATIENCE = 40.0  # s; for anything that a healthy system does at once
+PATIENCE = 90.0  # s; for anything that a healthy system does at once
 
 _failed = []
 _checks = 0
