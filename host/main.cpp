@@ -19,11 +19,14 @@
 #include "host/verbs/calibrate_command.h"
 #include "host/verbs/certificate_command.h"
 #include "host/verbs/check_command.h"
+#include "host/verbs/control_command.h"
 #include "host/verbs/design_command.h"
 #include "host/verbs/doctor_command.h"
 #include "host/verbs/export_command.h"
+#include "host/verbs/read_command.h"
 #include "host/verbs/record_command.h"
 #include "host/verbs/run_command.h"
+#include "host/verbs/spnav_command.h"
 #include "host/verbs/tags_command.h"
 #include "host/verbs/zero_command.h"
 
@@ -47,6 +50,7 @@ constexpr const char* kOutputs =
     "  spacemouse                    virtual 6-DOF puck for CAD programs\n"
     "  wrench                        HID force-torque sensor in N and N m\n"
     "  joystick                      six-axis joystick for games\n"
+    "  spnav[:PATH]                  the socket of libspnav programs, without any device\n"
     "  reference:FILE                as csv, beside the load cells of --board at the same time\n"
     "Without it: terminal, and every device that this machine allows";
 
@@ -91,6 +95,13 @@ int dispatch(int argc, char** argv) {
   run->add_option("--sensor", run_options.sensor, "sensor.yaml of this sensor");
   run->add_option("--source", run_options.source, kSources);
   run->add_option("--output", run_options.outputs, kOutputs);
+  run->add_option("--profile", run_options.profiles,
+                  "how pushes become motion: cad, game, research, a file, or a folder of them;\n"
+                  "several: the first is in force until a program's window, a gesture or\n"
+                  "`tagwrench control` chooses another");
+  run->add_option("--name", run_options.name,
+                  "of the sensor, where there are two: the serial number of its devices")
+      ->capture_default_str();
   run->add_option("--frames", run_options.frames, "end after N frames")
       ->check(CLI::Range(1, kMostFrames));
   run->add_option("--seconds", run_options.seconds, "end after S seconds")->check(duration);
@@ -117,6 +128,7 @@ int dispatch(int argc, char** argv) {
 
   tagwrench::RecordCommand record(app, kSources, kOutputs, duration);
   tagwrench::ExportCommand exporting(app);
+  tagwrench::ReadCommand read(app, duration);
   tagwrench::CalibrateCommand calibrate(app);
   tagwrench::TagsCommand tags(app);
   tagwrench::BoardCommand board(app);
@@ -128,6 +140,8 @@ int dispatch(int argc, char** argv) {
   tagwrench::CertificateCommand certificate(app);
   tagwrench::DesignCommand design(app);
 
+  tagwrench::ControlCommand control(app);
+  tagwrench::SpnavCommand spnav(app);
   tagwrench::DoctorCommand doctor(app, duration);
 
   try {
@@ -141,6 +155,7 @@ int dispatch(int argc, char** argv) {
   if (run->parsed()) return tagwrench::run(run_options);
   if (record.parsed()) return record.run();
   if (exporting.parsed()) return exporting.run();
+  if (read.parsed()) return read.run();
   if (calibrate.parsed()) return calibrate.run();
   if (tags.parsed()) return tags.run();
   if (board.parsed()) return board.run();
@@ -150,6 +165,8 @@ int dispatch(int argc, char** argv) {
   if (zero.parsed()) return zero.run();
   if (certificate.parsed()) return certificate.run();
   if (design.parsed()) return design.run();
+  if (control.parsed()) return control.run();
+  if (spnav.parsed()) return spnav.run();
   if (doctor.parsed()) return doctor.run();
   if (sim->parsed()) {
     const tagwrench::sim::Scenario described =

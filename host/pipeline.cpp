@@ -21,16 +21,17 @@ constexpr Duration kGuardianGrace = milliseconds(60);
 // A camera that slows down in dim light is late, not lost; slower than this it is lost.
 constexpr Duration kSlowestInterval = milliseconds(250);
 constexpr std::size_t kMostOutputs = 14;
+constexpr std::size_t kOthers = 3;  // source, stop, desk
 
 }  // namespace
 
-Pipeline::Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench,
-                   const Shaping& shaping, std::vector<std::unique_ptr<Output>>& outputs,
-                   DeadMan& dead_man, int stop_fd, FrameLog* log)
+Pipeline::Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, Desk& desk,
+                   std::vector<std::unique_ptr<Output>>& outputs, DeadMan& dead_man, int stop_fd,
+                   FrameLog* log)
     : source_(source),
       tracker_(tracker),
       wrench_(wrench),
-      shaping_(shaping),
+      desk_(desk),
       outputs_(outputs),
       dead_man_(dead_man),
       stop_fd_(stop_fd),
@@ -49,10 +50,11 @@ void Pipeline::step(Frame& frame) noexcept {
                 .latency_origin = frame.latency_origin,
                 .dropped = frame.dropped};
   wrench_.estimate(track, sample);  // displacement -> newtons
-  sample.touched = frame.touched || touched();
-  if (zero_ != nullptr) zero_->follow(sample, wrench_.noise(track));  // less what reads untouched
-  shaping_.shape(sample);                // newtons -> motion of an input device
-  send(sample, frame.recorded_latency);  // to every output
+  sample.buttons = pressed();
+  sample.touched = frame.touched || sample.buttons != 0;
+  follow_zero(sample, wrench_.noise(track));  // less what reads untouched
+  desk_.shape(sample);                        // newtons -> motion and buttons of an input device
+  send(sample, frame.recorded_latency);       // to every output
   if (log_ != nullptr) log_->frame({frame, decoded, source_.raw(), track, sample});
   ++report_.frames;
   report_.dropped += sample.dropped;
@@ -67,7 +69,9 @@ RunReport Pipeline::run(const RunLimits& limits) {
     if (limits.time && std::chrono::steady_clock::now() - start_ >= *limits.time) break;
     wait(wake_time(limits));
     const bool came = source_ready_ && read_source();
-    if (!came && std::chrono::steady_clock::now() >= missing_at()) send_neutral({});
+    const TimePoint now = std::chrono::steady_clock::now();
+    if (!came && now >= missing_at()) send_neutral({});
+    if (now >= next_move_) move_on(now);
   }
   dead_man_.stand_down();
   report_.end = end_.value_or(RunReport::End::limit);
@@ -76,7 +80,7 @@ RunReport Pipeline::run(const RunLimits& limits) {
 }
 
 TimePoint Pipeline::wake_time(const RunLimits& limits) const noexcept {
-  const TimePoint wake = missing_at();
+  const TimePoint wake = std::min(missing_at(), next_move_);
   return limits.time ? std::min(wake, start_ + *limits.time) : wake;
 }
 
@@ -89,26 +93,30 @@ TimePoint Pipeline::missing_at() const noexcept {
 
 /// Blocks until the source, an output's client or a stop wants attention, or the time has come.
 void Pipeline::wait(TimePoint until) noexcept {
-  std::array<pollfd, kMostOutputs + 2> fds{};
+  std::array<pollfd, kMostOutputs + kOthers> fds{};
   const int source_fd = source_.poll_fd();
   fds[0] = {source_fd, POLLIN, 0};
   fds[1] = {stop_fd_, POLLIN, 0};
+  fds[2] = {desk_.poll_fd(), POLLIN, 0};
   const std::size_t outputs = std::min(outputs_.size(), kMostOutputs);
-  for (std::size_t i = 0; i < outputs; ++i) fds[i + 2] = {outputs_[i]->poll_fd(), POLLIN, 0};
+  for (std::size_t i = 0; i < outputs; ++i) fds[i + kOthers] = {outputs_[i]->poll_fd(), POLLIN, 0};
 
   timespec timeout{};
   const bool endless = until == TimePoint::max() && source_fd >= 0;
   if (source_fd >= 0 && !endless) {
-    const Duration left = std::max(Duration::zero(), until - std::chrono::steady_clock::now());
+    const TimePoint now = std::chrono::steady_clock::now();
+    const Duration left = until > now ? until - now : Duration::zero();
     timeout.tv_sec = left.count() / 1'000'000'000;
     timeout.tv_nsec = left.count() % 1'000'000'000;
   }
-  const int ready = ::ppoll(fds.data(), outputs + 2, endless ? nullptr : &timeout, nullptr);
+  const int ready = ::ppoll(fds.data(), outputs + kOthers, endless ? nullptr : &timeout, nullptr);
   source_ready_ = source_fd < 0 || (ready > 0 && fds[0].revents != 0);
   if (ready <= 0) return;
   if (fds[1].revents != 0) end_ = RunReport::End::interrupted;
+  if (fds[2].revents != 0) desk_.service();
+  if (const std::string news = desk_.take_news(); !news.empty()) say(news);
   for (std::size_t i = 0; i < outputs; ++i) {
-    if (fds[i + 2].revents == 0) continue;
+    if (fds[i + kOthers].revents == 0) continue;
     if (const std::string_view news = outputs_[i]->service(); !news.empty()) say(news);
   }
 }
@@ -158,22 +166,51 @@ void Pipeline::send(Sample& sample, std::optional<Duration> recorded_latency) no
   sample.output_time = recorded_latency ? sample.latency_origin + *recorded_latency
                                         : std::chrono::steady_clock::now();
   if (carries_numbers(sample.status)) guard();
-  for (const std::unique_ptr<Output>& output : outputs_) {
-    const SendStatus status = output->send(sample);
-    if (status == SendStatus::skipped) ++report_.skipped;
-    if (status == SendStatus::failed && !end_) {
-      report_.failure = output->failure();
-      end_ = RunReport::End::output_failed;
-    }
-  }
+  for (const std::unique_ptr<Output>& output : outputs_) note(output->send(sample), *output);
   last_sample_ = sample;
   neutral_ = !carries_numbers(sample.status);
+  const bool steady = desk_.period() > Duration::zero() && source_.poll_fd() >= 0;
+  if (neutral_ || !steady) {
+    next_move_ = TimePoint::max();
+    move(sample);
+  } else if (next_move_ == TimePoint::max()) {
+    next_move_ = TimePoint::min();  // at once, and from then on by the clock
+  }
   if (neutral_) dead_man_.stand_down();
 }
 
-bool Pipeline::touched() const noexcept {
-  return std::any_of(outputs_.begin(), outputs_.end(),
-                     [](const std::unique_ptr<Output>& output) { return output->touched(); });
+void Pipeline::move(const Sample& sample) noexcept {
+  for (const std::unique_ptr<Output>& output : outputs_) note(output->move(sample), *output);
+}
+
+/// Between frames devices move on, to where the motion is by now.
+void Pipeline::move_on(TimePoint now) noexcept {
+  const Duration period = desk_.period();
+  next_move_ = next_move_ == TimePoint::min() || now - next_move_ > period ? now + period
+                                                                           : next_move_ + period;
+  Sample sample = last_sample_;
+  desk_.move_on(sample, sample.capture_time + (now - sample.latency_origin));
+  move(sample);
+}
+
+void Pipeline::note(SendStatus status, const Output& output) noexcept {
+  if (status == SendStatus::skipped) ++report_.skipped;
+  if (status != SendStatus::failed || end_) return;
+  report_.failure = output.failure();
+  end_ = RunReport::End::output_failed;
+}
+
+std::uint32_t Pipeline::pressed() const noexcept {
+  std::uint32_t buttons = 0;
+  for (const std::unique_ptr<Output>& output : outputs_) buttons |= output->pressed();
+  return buttons;
+}
+
+void Pipeline::follow_zero(Sample& sample, const Vector6& noise) noexcept {
+  if (zero_ == nullptr) return;
+  if (desk_.take_zero()) zero_->ask();
+  zero_->follow(sample, noise);
+  if (const std::string_view line = zero_text(zero_->take_answer()); !line.empty()) say(line);
 }
 
 /// If the loop should hang from here on, the guardian sends neutral.
@@ -186,6 +223,7 @@ void Pipeline::send_neutral(std::optional<Duration> recorded_latency) noexcept {
                 .capture_time = last_sample_.capture_time,
                 .latency_origin = last_sample_.latency_origin,
                 .status = Status::lost};
+  desk_.shape(sample);  // or it would go on from before the gap
   send(sample, recorded_latency);
   if (log_ != nullptr) log_->missing(sample);
 }

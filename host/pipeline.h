@@ -10,13 +10,13 @@
 #include <string_view>
 #include <vector>
 
+#include "host/desk/desk.h"
 #include "host/frame_log.h"
 #include "host/output/dead_man.h"
 #include "host/output/output.h"
 #include "host/source/frame_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
-#include "host/wrench/shaping.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -42,7 +42,7 @@ class Pipeline {
  public:
   /// Borrows everything; `stop_fd` becomes readable when the run shall end (a signalfd), -1 for
   /// never. `log` is told of every frame; there may be none.
-  Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, const Shaping& shaping,
+  Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, Desk& desk,
            std::vector<std::unique_ptr<Output>>& outputs, DeadMan& dead_man, int stop_fd,
            FrameLog* log = nullptr);
 
@@ -57,7 +57,11 @@ class Pipeline {
   void step(Frame& frame) noexcept;
   void send(Sample& sample, std::optional<Duration> recorded_latency) noexcept;
   void send_neutral(std::optional<Duration> recorded_latency) noexcept;
-  bool touched() const noexcept;
+  void move(const Sample& sample) noexcept;
+  void move_on(TimePoint now) noexcept;
+  void note(SendStatus status, const Output& output) noexcept;
+  std::uint32_t pressed() const noexcept;
+  void follow_zero(Sample& sample, const Vector6& noise) noexcept;
   void guard() noexcept;
   bool read_source() noexcept;
   void note_arrival(TimePoint now) noexcept;
@@ -70,7 +74,7 @@ class Pipeline {
   FrameSource& source_;
   Tracker& tracker_;
   WrenchEstimator& wrench_;
-  const Shaping& shaping_;
+  Desk& desk_;
   std::vector<std::unique_ptr<Output>>& outputs_;
   DeadMan& dead_man_;
   int stop_fd_;
@@ -79,8 +83,9 @@ class Pipeline {
 
   TimePoint start_{};
   TimePoint last_arrival_{};
-  std::array<Duration, 3> intervals_;  ///< the last three between frames
-  Duration interval_;                  ///< to be expected, at least the announced period
+  TimePoint next_move_ = TimePoint::max();  ///< of devices that move at a rate of their own
+  std::array<Duration, 3> intervals_;       ///< the last three between frames
+  Duration interval_;                       ///< to be expected, at least the announced period
   bool neutral_ = true;
   bool source_ready_ = false;
   Hint last_hint_ = Hint::none;

@@ -242,6 +242,7 @@ struct Sample {
   bool touched = false;              ///< somebody presses a button of the board
   Vector6 motion = Vector6::Zero();  ///< -1..1 per axis in the HID frame, dead zone and full scale
                                      ///< applied; exactly zero at rest
+  std::uint32_t buttons = 0;  ///< pressed, bit 0 is the first: the board's, and what gestures press
   std::uint32_t dropped = 0;
   TimePoint output_time{};  ///< when it was handed to the outputs, on latency_origin's clock; the
                             ///< same for all of them

@@ -86,7 +86,9 @@ void BoardOutput::take_readings() noexcept {
   }
   for (link::ButtonReading r; session.next(r);) {
     if (record_) record_->button(r);
-    buttons_down_[r.button] = r.pressed;
+    if (r.button >= 32) continue;
+    const std::uint32_t bit = std::uint32_t{1} << r.button;
+    buttons_down_ = r.pressed ? buttons_down_ | bit : buttons_down_ & ~bit;
   }
 }
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <array>
-#include <bitset>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -47,7 +47,7 @@ class BoardOutput final : public Output {
   std::string failure() const override;
   int poll_fd() const noexcept override { return link_.poll_fd(); }
   std::string_view service() noexcept override;
-  bool touched() const noexcept override { return buttons_down_.any(); }
+  std::uint32_t pressed() const noexcept override { return buttons_down_; }
 
   /// From now on all that the board says is recorded as well. Borrowed.
   void record_to(record::RecordingWriter& writer) { record_.emplace(writer, cells_); }
@@ -70,7 +70,7 @@ class BoardOutput final : public Output {
   link::CellCalibrations cells_;
   Duration latency_;
   std::array<link::SampleHistory, link::kMostChannels> counts_;
-  std::bitset<256> buttons_down_;  ///< by their number, one byte of the protocol
+  std::uint32_t buttons_down_ = 0;  ///< bit 0 is the board's button 0
   std::optional<ReferenceComparison> comparison_;
   ReferenceMonitor monitor_{{}};
   std::string found_;  ///< by it, and not said yet

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -19,6 +20,7 @@
 #include "host/output/joystick.h"
 #include "host/output/jsonl.h"
 #include "host/output/spacemouse.h"
+#include "host/output/spnav_output.h"
 #include "host/output/terminal.h"
 #include "host/output/wrench_hid.h"
 #include "host/pipeline.h"
@@ -80,21 +82,28 @@ struct Outputs {
   std::vector<DeadManDevice> devices;
 };
 
-SpacemouseOptions spacemouse_options(const SensorConfig& sensor) {
+/// HID_UNIQ of both devices, and what clients show of them.
+std::string serial_of(const std::string& sensor_name) { return "tagwrench-" + sensor_name; }
+
+SpacemouseOptions spacemouse_options(const SensorConfig& sensor, const std::string& name) {
   SpacemouseOptions options;
+  options.serial = serial_of(name);
   options.vendor = sensor.spacemouse.vendor;
   options.product = sensor.spacemouse.product;
   return options;
 }
 
-void add_device(Outputs& outputs, const std::string& kind, const SensorConfig& sensor) {
+void add_device(Outputs& outputs, const std::string& kind, const SensorConfig& sensor,
+                const std::string& name) {
   if (kind == "spacemouse") {
-    auto device = std::make_unique<SpacemouseOutput>(spacemouse_options(sensor));
+    auto device = std::make_unique<SpacemouseOutput>(spacemouse_options(sensor, name));
     device->add_to(outputs.devices);
     if (const std::string advice = device->spacenavd_advice(); !advice.empty()) tell(advice);
     outputs.all.push_back(std::move(device));
   } else if (kind == "wrench") {
-    auto device = std::make_unique<WrenchHidOutput>(WrenchHidOptions{});
+    WrenchHidOptions options;
+    options.serial = serial_of(name);
+    auto device = std::make_unique<WrenchHidOutput>(options);
     device->add_to(outputs.devices);
     outputs.all.push_back(std::move(device));
   } else {
@@ -102,6 +111,16 @@ void add_device(Outputs& outputs, const std::string& kind, const SensorConfig& s
     device->add_to(outputs.devices);
     outputs.all.push_back(std::move(device));
   }
+}
+
+std::unique_ptr<Output> spnav(const std::string& socket, const SensorConfig& sensor) {
+  SpnavOptions options;
+  options.socket = socket;
+  options.vendor = sensor.spacemouse.vendor;
+  options.product = sensor.spacemouse.product;
+  auto output = std::make_unique<SpnavOutput>(options);
+  tell(output->advice());
+  return output;
 }
 
 std::unique_ptr<Output> terminal(const Input& input, bool stdout_taken) {
@@ -114,10 +133,10 @@ std::unique_ptr<Output> terminal(const Input& input, bool stdout_taken) {
 }
 
 /// What a user gets who asked for nothing: the view, and every device that this machine allows.
-void add_default_outputs(Outputs& outputs, const Input& input) {
+void add_default_outputs(Outputs& outputs, const Input& input, const std::string& name) {
   for (const char* kind : {"spacemouse", "wrench", "joystick"}) {
     try {
-      add_device(outputs, kind, input.sensor);
+      add_device(outputs, kind, input.sensor, name);
     } catch (const ConfigError& e) {
       // Both uhid devices lack the same thing; say it once.
       if (kind != std::string("wrench"))
@@ -139,13 +158,14 @@ bool is_file(const std::string& kind) {
 void check_outputs(const std::vector<Spec>& specs, bool with_board) {
   for (std::size_t i = 0; i < specs.size(); ++i) {
     const Spec& spec = specs[i];
-    const bool known = spec.argument.empty() ? spec.kind == "terminal" || is_device(spec.kind)
-                                             : is_file(spec.kind);
+    const bool known = spec.kind == "spnav" ||
+                       (spec.argument.empty() ? spec.kind == "terminal" || is_device(spec.kind)
+                                              : is_file(spec.kind));
     const std::string text = spec.argument.empty() ? spec.kind : spec.kind + ":" + spec.argument;
     if (!known) {
       throw ConfigError(fmt::format(
           "--output {}: not an output; use terminal, jsonl:FILE, csv:FILE, reference:FILE, "
-          "spacemouse, wrench or joystick",
+          "spacemouse, wrench, joystick or spnav[:PATH]",
           text));
     }
     if (spec.kind == "reference" && !with_board) {
@@ -204,13 +224,14 @@ std::vector<Spec> output_specs(const RunOptions& options) {
 Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* board) {
   Outputs outputs;
   if (options.outputs.empty()) {
-    if (!options.record) add_default_outputs(outputs, input);
+    if (!options.record) add_default_outputs(outputs, input, options.name);
     if (board != nullptr) outputs.all.push_back(board->output(input.sensor, {}));
     return outputs;
   }
   const std::vector<Spec> specs = output_specs(options);
   for (const Spec& spec : specs) {
-    if (is_device(spec.kind)) add_device(outputs, spec.kind, input.sensor);
+    if (is_device(spec.kind)) add_device(outputs, spec.kind, input.sensor, options.name);
+    if (spec.kind == "spnav") outputs.all.push_back(spnav(spec.argument, input.sensor));
   }
   // Only a source that waits for its reader may be made to wait.
   const bool lossless = options.fast && input.source->poll_fd() < 0;
@@ -230,6 +251,38 @@ Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* bo
         board->output(input.sensor, reference == specs.end() ? "" : reference->argument));
   }
   return outputs;
+}
+
+bool is_input_device(const Spec& spec) {
+  return spec.kind == "spacemouse" || spec.kind == "joystick" || spec.kind == "spnav";
+}
+
+/// Where wishes come in, for who has a device on his desk.
+std::optional<ControlSocket> control_of(const RunOptions& options) {
+  const std::vector<Spec> specs = output_specs(options);
+  const bool device = (specs.empty() && !options.record) ||
+                      std::any_of(specs.begin(), specs.end(), is_input_device);
+  if (!device && options.profiles.empty()) return {};
+  try {
+    return ControlSocket(control_path(options.name));
+  } catch (const ConfigError& e) {
+    // Two devices with one serial number would be mixed up by whoever opens them by it.
+    const bool on_hid = std::any_of(specs.begin(), specs.end(),
+                                    [](const Spec& spec) { return is_device(spec.kind); });
+    if (on_hid) throw ConfigError(fmt::format("{}, or give this one another --name", e.what()));
+    tell(fmt::format("running without `tagwrench control`: {}", e.what()));
+    return {};
+  }
+}
+
+void check_name(const std::string& name) {
+  const bool usable = !name.empty() && name.size() <= 32 &&
+                      std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                        return std::isalnum(c) != 0 || c == '-' || c == '_';
+                      });
+  if (!usable)
+    throw ConfigError(
+        fmt::format("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name));
 }
 
 /// What reads as nothing, as samples have it, and whether it may follow.
@@ -312,6 +365,7 @@ std::string summary(const RunReport& report, const SensorConfig& sensor) {
 int run(const RunOptions& options) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
   output_specs(options);          // refused before anything is opened or lit
+  check_name(options.name);
   if (options.record) check_recording(*options.record);
   std::unique_ptr<RunBoard> board;
   if (!options.board.empty()) {
@@ -336,7 +390,9 @@ int run(const RunOptions& options) {
   if (board && !board->settle_light(input, stop)) return 0;
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
   WrenchEstimator wrench(input.sensor.wrench);
-  const Shaping shaping(input.sensor.shaping);
+  const bool many_profiles = !options.profiles.empty();
+  Desk desk(ProfileFiles(options.profiles, input.sensor), control_of(options),
+            many_profiles ? FocusWatch::open() : std::nullopt);
   const ZeroOptions zero_limits =
       zero_options(input.sensor, wrench.tool(), !options.no_zero_tracking);
   ZeroTracking zero(zero_limits);
@@ -354,7 +410,7 @@ int run(const RunOptions& options) {
     Recording* recording = nullptr;
     if (options.record)
       recording = &start_recording(options, head, input, limits, board.get(), outputs);
-    Pipeline pipeline(*input.source, tracker, wrench, shaping, outputs.all, dead_man, stop.get(),
+    Pipeline pipeline(*input.source, tracker, wrench, desk, outputs.all, dead_man, stop.get(),
                       recording);
     pipeline.follow_zero(zero);
     report = pipeline.run(limits);

@@ -15,6 +15,8 @@ struct RunOptions {
   std::string source;  ///< SRC; empty: a camera that sees the tags, else the simulated sensor
   std::vector<std::string>
       outputs;  ///< OUT; empty: terminal and every device that can be made here
+  std::vector<std::string> profiles;  ///< ready-made ones, files, folders; none: the sensor's own
+  std::string name = "sensor";        ///< tells two sensors on one computer apart
   std::optional<long> frames;
   std::optional<double> seconds;
   bool fast = false;

@@ -198,7 +198,7 @@ std::string bench(const char* title, const sim::Scenario& scenario, PixelFormat 
   UsualWay usual_way(clip.sensor);
   Tracker tracker(clip.sensor.camera, clip.sensor.target, clip.sensor.rest);
   WrenchEstimator estimator(clip.sensor.wrench);
-  const Shaping shaping(clip.sensor.shaping);
+  Shaping shaping(clip.sensor.shaping);
   const UniqueFd device(::open("/dev/null", O_WRONLY | O_CLOEXEC));
 
   std::vector<Duration> decode, acquire, usual, track, wrench, report, write, total;

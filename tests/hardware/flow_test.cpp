@@ -115,7 +115,7 @@ TEST(ParameterFlow, ALensDistanceReachesDrawingPartsSimulatorAndDesign) {
   for (const Exported* sensor : {&near, &farther}) {
     const Outcome run = run_bridge(
         {"run", "--source", "sim:" + (sensor->folder / "scenario.yaml").string(), "--sensor",
-         sensor->folder / "sensor.yaml", "--output", "jsonl:-", "--fast", "--seconds", "2"});
+         sensor->folder / "sensor.yaml", "--output", "jsonl:-", "--fast", "--frames", "40"});
     EXPECT_EQ(run.status, 0) << run.err;
     EXPECT_NE(run.out.find("\"status\":\"ok\""), std::string::npos) << run.err;
   }

@@ -113,9 +113,9 @@ class PipelineLoop : public testing::Test {
     outputs_.push_back(std::move(recorder));
     Tracker tracker(sensor_.camera, sensor_.target, sensor_.rest);
     WrenchEstimator wrench(sensor_.wrench);
-    const Shaping shaping(sensor_.shaping);
+    Desk desk(sensor_);
     DeadMan dead_man({});
-    return Pipeline(source, tracker, wrench, shaping, outputs_, dead_man, stop_.get()).run(limits);
+    return Pipeline(source, tracker, wrench, desk, outputs_, dead_man, stop_.get()).run(limits);
   }
   const Recorder& recorder() const { return static_cast<const Recorder&>(*outputs_.back()); }
 

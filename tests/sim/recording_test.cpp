@@ -63,9 +63,9 @@ class RecordedLoop : public PipelineLoop {
     }));
     Tracker tracker(sensor_.camera, sensor_.target, sensor_.rest);
     WrenchEstimator wrench(sensor_.wrench);
-    const Shaping shaping(sensor_.shaping);
+    Desk desk(sensor_);
     DeadMan dead_man({});
-    Pipeline(source, tracker, wrench, shaping, outputs_, dead_man, stop_.get(), log).run({});
+    Pipeline(source, tracker, wrench, desk, outputs_, dead_man, stop_.get(), log).run({});
     std::uint64_t stopped = 0;
     ::eventfd_read(stop_.get(), &stopped);
     return recorder().samples;

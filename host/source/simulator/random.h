@@ -90,6 +90,8 @@ enum Stream : std::uint64_t {
   kLoadCell,
   kSixAxis,
   kBenchString,
+  kDeskActs,
+  kDeskWander,
   kPrint = 100
 };
 

@@ -187,6 +187,10 @@ std::string problem(const Scenario& s) {
        target_problem(s.target),
        outside({{"mechanics.creep_s", m.creep_time}}, 0.1, 1e6),
        outside({{"mechanics.friction_travel", m.friction_travel}}, 1e-3, 1),
+       outside({{"desk.length_s", s.desk.length}}, 1, 1e5),
+       outside({{"desk.gesture_share", s.desk.gesture_share}, {"desk.wander", s.desk.wander}}, 0,
+               1),
+       outside({{"desk.knock_m_per_s2", s.desk.knock}}, 0, 1e3),
        problem(s.disturbances, static_cast<int>(s.target.tags.size())),
        problem(s.bench, static_cast<int>(s.target.tags.size()))});
   if (found.empty() && window > true_period(s)) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "host/source/simulator/bench_settings.h"
+#include "host/source/simulator/desk_settings.h"
 #include "host/source/simulator/disturbances.h"
 
 namespace tagwrench::sim {
@@ -130,6 +131,7 @@ enum class Motion : std::uint8_t {
   drop,
   compound,
   hard,  ///< all of them in an order, with a size and at times drawn from the seed
+  desk,  ///< somebody works with it (desk_use.h)
 };
 
 struct Trajectory {
@@ -193,6 +195,7 @@ struct Scenario {
   Noise noise;
   Compression compression;
   Disturbances disturbances;
+  DeskSettings desk;    ///< of use where trajectory.motion is `desk`
   BenchSettings bench;  ///< of use where someone calibrates the simulated sensor
 };
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "host/config_error.h"
+#include "host/source/simulator/desk_use.h"
 
 namespace tagwrench {
 namespace {
@@ -23,6 +24,11 @@ const sim::Scenario& checked(const sim::Scenario& scenario) {
   const std::string problem = sim::problem(scenario);
   if (!problem.empty()) throw ConfigError("scenario: " + problem);
   return scenario;
+}
+
+std::unique_ptr<sim::AppliedLoad> person_at_desk(const sim::Scenario& scenario) {
+  if (scenario.trajectory.motion != sim::Motion::desk) return nullptr;
+  return std::make_unique<sim::DeskUse>(scenario);
 }
 
 Duration to_duration(double seconds) { return Duration(std::llround(1e9 * seconds)); }
@@ -54,11 +60,12 @@ SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live, sim::
     : scenario_(checked(scenario)),
       disturbances_(scenario.disturbances, scenario.seed, scenario.camera.width_px,
                     static_cast<int>(scenario.target.tags.size())),
-      load_(load),
+      desk_(load == nullptr ? person_at_desk(scenario) : nullptr),
+      load_(desk_ ? desk_.get() : load),
       renderer_(scenario),
       motion_(scenario.mechanics, sim::TrajectoryPlayer(scenario.trajectory, scenario.seed),
               -renderer_.half_window() - kWarmUp,
-              2 * longest_half_window(scenario) + 4 * sim::PlatformMotion::kStep, load),
+              2 * longest_half_window(scenario) + 4 * sim::PlatformMotion::kStep, load_),
       jpeg_(scenario.camera.width_px, scenario.camera.height_px, scenario.compression.jpeg_quality),
       pixels_(static_cast<std::size_t>(scenario.camera.width_px) *
               static_cast<std::size_t>(scenario.camera.height_px)) {

@@ -52,7 +52,7 @@ class SimulatorSource final : public FrameSource, private CameraLight {
 
   /// Throws ConfigError if the scenario cannot be simulated. `led`, borrowed, lights the scene in
   /// place of the scenario's even light, `load`, borrowed, loads the platform in place of the
-  /// scenario's trajectory, if there is one.
+  /// scenario's trajectory, if there is one; somebody at the desk is such a load too.
   SimulatorSource(const sim::Scenario& scenario, bool live, sim::LedLight* led = nullptr,
                   sim::AppliedLoad* load = nullptr);
 
@@ -90,6 +90,7 @@ class SimulatorSource final : public FrameSource, private CameraLight {
   std::uint64_t next_sequence_ = 0;
   std::uint32_t lost_ = 0;  ///< frames since the last one that was delivered
   sim::DisturbancePlayer disturbances_;
+  std::unique_ptr<sim::AppliedLoad> desk_;  ///< the scenario's own
   sim::AppliedLoad* load_;
   sim::Renderer renderer_;
   sim::PlatformMotion motion_;

@@ -134,6 +134,7 @@ Vector6 TrajectoryPlayer::applied_wrench(double absolute_time) const noexcept {
       return 0.5 * held(time, trajectory_.hold_time) * Vector6::Map(trajectory_.amplitude.data());
     case Motion::rest:
     case Motion::drop:
+    case Motion::desk:
       break;
   }
   return Vector6::Zero();

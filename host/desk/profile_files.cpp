@@ -1,0 +1,121 @@
+#include "host/desk/profile_files.h"
+
+#include <sys/inotify.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "host/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLongestFile = 65536;
+
+std::optional<std::string> read_whole(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text(kLongestFile + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (in.bad() || (!in.eof() && in.fail())) return {};
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+std::vector<std::string> yaml_files(const std::string& folder) {
+  std::vector<std::string> found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() == ".yaml") found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+bool ready_made(const std::string& name) {
+  const auto& ready = ready_profiles();
+  return std::any_of(ready.begin(), ready.end(),
+                     [&](const ReadyProfile& profile) { return profile.name == name; });
+}
+
+}  // namespace
+
+ProfileFiles::ProfileFiles(const std::vector<std::string>& chosen, const SensorConfig& sensor)
+    : defaults_(default_profile(sensor)) {
+  for (const std::string& what : chosen) {
+    std::error_code none;
+    if (ready_made(what)) {
+      profiles_.push_back(load_profile(what, sensor));
+    } else if (fs::is_directory(what, none)) {
+      const std::vector<std::string> files = yaml_files(what);
+      if (files.empty()) throw ConfigError(what + ": there is no profile in it (*.yaml)");
+      for (const std::string& file : files) take(file);
+    } else {
+      profiles_.push_back(load_profile(what, sensor));  // it says best what is wrong with the file
+      profiles_.pop_back();
+      take(what);
+    }
+  }
+  if (profiles_.empty()) profiles_.push_back(defaults_);
+  for (auto a = profiles_.begin(); a != profiles_.end(); ++a) {
+    for (auto b = std::next(a); b != profiles_.end(); ++b) {
+      if (a->name == b->name)
+        throw ConfigError("profile " + a->name + ": two have this name; change `name:` in one");
+    }
+  }
+  if (!files_.empty()) watch();
+}
+
+void ProfileFiles::take(const std::string& path) {
+  const std::optional<std::string> text = read_whole(path);
+  if (!text) throw ConfigError(path + ": cannot be read");
+  const fs::path whole = fs::absolute(path);
+  files_.push_back({whole.parent_path(), whole.filename(), *text, profiles_.size()});
+  profiles_.push_back(parse_profile(*text, path, defaults_));
+}
+
+/// Folders and not files: an editor puts a new file in the place of the old one.
+void ProfileFiles::watch() {
+  watch_.reset(inotify_init1(IN_CLOEXEC | IN_NONBLOCK));
+  bool good = static_cast<bool>(watch_);
+  for (const File& file : files_) {
+    good = good &&
+           inotify_add_watch(watch_.get(), file.folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO) >= 0;
+  }
+  if (!good)
+    throw ConfigError(std::string("profiles: cannot be watched: ") + std::strerror(errno) +
+                      "; raise fs.inotify.max_user_watches, or take ready-made ones");
+}
+
+std::vector<ProfileFiles::Change> ProfileFiles::reread() {
+  std::array<char, 4096> events;
+  while (::read(watch_.get(), events.data(), events.size()) > 0) {
+  }
+  std::vector<Change> changes;
+  for (File& file : files_) {
+    if (std::optional<Change> change = look_again(file)) changes.push_back(std::move(*change));
+  }
+  return changes;
+}
+
+std::optional<ProfileFiles::Change> ProfileFiles::look_again(File& file) {
+  const std::string path = file.folder + "/" + file.name;
+  std::optional<std::string> text = read_whole(path);
+  if (!text || *text == file.text) return {};
+  file.text = std::move(*text);
+  try {
+    Profile read = parse_profile(file.text, path, defaults_);
+    profiles_[file.profile] = std::move(read);
+    return Change{file.profile, "profile " + profiles_[file.profile].name + ": read again"};
+  } catch (const ConfigError& e) {
+    return Change{{}, std::string(e.what()) + "; the earlier profile stays"};
+  }
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,51 @@
+// Profiles, ready-made or on disk; those on disk are read again when somebody saves them.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/config/profile_config.h"
+#include "host/os/unique_fd.h"
+
+namespace tagwrench {
+
+class ProfileFiles {
+ public:
+  /// `chosen`: names of ready-made profiles, files, and folders of *.yaml, which come in the order
+  /// of their names. None: what the sensor itself says. Throws ConfigError: there is no such
+  /// profile, two have one name, or the first fault in a file.
+  ProfileFiles(const std::vector<std::string>& chosen, const SensorConfig& sensor);
+
+  /// At least one.
+  const std::vector<Profile>& profiles() const noexcept { return profiles_; }
+  /// Readable when a file may have changed; -1: none is on disk.
+  int fd() const noexcept { return watch_.get(); }
+
+  struct Change {
+    std::optional<std::size_t>
+        profile;       ///< that is new; none: the file is wrong, the earlier stays
+    std::string line;  ///< for people
+  };
+  /// Reads again what has changed. A file that is gone leaves what it said.
+  std::vector<Change> reread();
+
+ private:
+  struct File {
+    std::string folder;
+    std::string name;
+    std::string text;  ///< as it was read last
+    std::size_t profile = 0;
+  };
+  void take(const std::string& path);
+  void watch();
+  std::optional<Change> look_again(File& file);
+
+  Profile defaults_;
+  std::vector<Profile> profiles_;
+  std::vector<File> files_;
+  UniqueFd watch_;
+};
+
+}  // namespace tagwrench

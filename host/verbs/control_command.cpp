@@ -1,0 +1,37 @@
+#include "host/verbs/control_command.h"
+
+#include <cstdio>
+
+#include "host/desk/control_socket.h"
+#include "host/tell.h"
+
+namespace tagwrench {
+
+ControlCommand::ControlCommand(CLI::App& app)
+    : verb_(app.add_subcommand("control", "ask something of a sensor that runs")),
+      zero_(verb_->add_subcommand("zero", "what reads with hands off is nothing from now on")),
+      next_(verb_->add_subcommand("next", "the next of its profiles")),
+      profile_(verb_->add_subcommand("profile", "the profile of this name")) {
+  verb_->require_subcommand(1);
+  verb_->add_subcommand("status", "which profiles it has, and the one in force");
+  verb_->add_option("--name", name_, "of the sensor, as `tagwrench run --name` has it")
+      ->capture_default_str();
+  profile_->add_option("profile", profile_name_, "its name")->required();
+}
+
+int ControlCommand::run() const {
+  const std::string wish = zero_->parsed()      ? "zero"
+                           : next_->parsed()    ? "next"
+                           : profile_->parsed() ? "profile " + profile_name_
+                                                : "status";
+  const std::string answer = ask(control_path(name_), wish);
+  constexpr std::string_view kDone = "ok: ";
+  if (answer.starts_with(kDone)) {
+    std::fputs(answer.c_str() + kDone.size(), stdout);
+    return 0;
+  }
+  tell(answer.substr(0, answer.find('\n')));
+  return 1;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,82 @@
+#include "host/desk/desk.h"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <future>
+
+#include "tests/unit/desk/desk_folder.h"
+
+namespace tagwrench {
+namespace {
+
+class DeskTest : public test::DeskFolder {
+ protected:
+  /// Lets the desk do what it is woken for.
+  static std::string news(Desk& desk) {
+    pollfd waiting{desk.poll_fd(), POLLIN, 0};
+    EXPECT_EQ(::poll(&waiting, 1, 10'000), 1) << "it is not woken";
+    desk.service();
+    return desk.take_news();
+  }
+  std::string wish(Desk& desk, const std::string& text) {
+    auto answer = std::async(std::launch::async, [&] { return ask(path("control"), text); });
+    news_ = news(desk);
+    return answer.get();
+  }
+  /// Motion in x of a push of 0.3 N that has lasted.
+  static double push(Desk& desk) {
+    Sample sample;
+    sample.status = Status::ok;
+    sample.wrench_sigma.setConstant(1e-6);
+    for (int i = 0; i < 100; ++i) {
+      time_ += std::chrono::milliseconds(20);
+      sample.capture_time = TimePoint(time_);
+      sample.wrench[0] = i < 20 ? 0 : 0.3;
+      desk.shape(sample);
+    }
+    return sample.motion[0];
+  }
+  std::string news_;
+  inline static Duration time_{};
+};
+
+TEST_F(DeskTest, WishesAreGrantedAndAnswered) {
+  Desk desk(ProfileFiles({"cad", "game"}, sensor_), ControlSocket(path("control")), {});
+  EXPECT_EQ(wish(desk, "status"), "ok: profile cad of cad game\n");
+  EXPECT_EQ(wish(desk, "next"), "ok: game\n");
+  EXPECT_EQ(news_, "profile: game (as asked)");
+  EXPECT_EQ(desk.profile().name, "game");
+  EXPECT_EQ(wish(desk, "profile cad"), "ok: cad\n");
+  EXPECT_EQ(wish(desk, "profile chess"), "error: no profile 'chess'; there are cad, game\n");
+  EXPECT_EQ(desk.profile().name, "cad");
+  EXPECT_FALSE(desk.take_zero());
+  EXPECT_EQ(wish(desk, "zero").substr(0, 3), "ok:");
+  EXPECT_TRUE(desk.take_zero());
+  EXPECT_FALSE(desk.take_zero()) << "asked once";
+  EXPECT_EQ(wish(desk, "dance").substr(0, 6), "error:");
+}
+
+TEST_F(DeskTest, ASavedProfileIsInForceAtOnce) {
+  write("mine.yaml", "rate_hz: 50\ntranslation: 1\n");
+  Desk desk(ProfileFiles({path("mine.yaml")}, sensor_), {}, {});
+  const double before = push(desk);
+  EXPECT_GT(before, 0.1);
+  EXPECT_EQ(desk.period(), std::chrono::milliseconds(20));
+  write("mine.yaml", "rate_hz: 0\ntranslation: 0.5\n");
+  EXPECT_EQ(news(desk), "profile mine: read again");
+  EXPECT_NEAR(push(desk), before / 2, 1e-3);
+  EXPECT_EQ(desk.period(), Duration::zero());
+  write("mine.yaml", "translation: [\n");
+  EXPECT_NE(news(desk).find("the earlier profile stays"), std::string::npos);
+  EXPECT_NEAR(push(desk), before / 2, 1e-3);
+}
+
+TEST_F(DeskTest, NothingWakesOneThatCannotChange) {
+  Desk desk(sensor_);
+  pollfd waiting{desk.poll_fd(), POLLIN, 0};
+  EXPECT_EQ(::poll(&waiting, 1, 0), 0);
+}
+
+}  // namespace
+}  // namespace tagwrench
