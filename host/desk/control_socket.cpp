@@ -48,6 +48,8 @@ bool somebody_listens(const sockaddr_un& address) {
 
 }  // namespace
 
+bool listens(const std::string& path) { return somebody_listens(address_of(path)); }
+
 ControlWish parse_wish(std::string_view text) noexcept {
   using Kind = ControlWish::Kind;
   const std::string_view wish = trimmed(text);

@@ -49,6 +49,9 @@ class ControlSocket {
   socklen_t asker_size_ = 0;
 };
 
+/// Whether somebody listens there.
+bool listens(const std::string& path);
+
 /// Sends a wish to the sensor that listens at `path`, and waits for its answer. Throws ConfigError:
 /// nobody listens, or does not answer.
 std::string ask(const std::string& path, std::string_view wish);

@@ -263,16 +263,19 @@ std::optional<ControlSocket> control_of(const RunOptions& options) {
   const bool device = (specs.empty() && !options.record) ||
                       std::any_of(specs.begin(), specs.end(), is_input_device);
   if (!device && options.profiles.empty()) return {};
+  const bool on_hid = std::any_of(specs.begin(), specs.end(),
+                                  [](const Spec& spec) { return is_device(spec.kind); });
   try {
-    return ControlSocket(control_path(options.name));
+    const std::string path = control_path(options.name);
+    if (!on_hid || !listens(path)) return ControlSocket(path);
   } catch (const ConfigError& e) {
-    // Two devices with one serial number would be mixed up by whoever opens them by it.
-    const bool on_hid = std::any_of(specs.begin(), specs.end(),
-                                    [](const Spec& spec) { return is_device(spec.kind); });
-    if (on_hid) throw ConfigError(fmt::format("{}, or give this one another --name", e.what()));
     tell(fmt::format("running without `tagwrench control`: {}", e.what()));
     return {};
   }
+  // Two devices with one serial number would be mixed up by whoever opens them by it.
+  throw ConfigError(fmt::format(
+      "--name {}: a bridge of this name runs already; stop it, or give this one another name",
+      options.name));
 }
 
 void check_name(const std::string& name) {
