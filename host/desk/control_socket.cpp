@@ -37,7 +37,9 @@ const sockaddr* generic(const sockaddr_un& address) {
 
 UniqueFd datagram_socket() {
   UniqueFd made(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (!made) throw ConfigError(std::string("no socket to be had: ") + std::strerror(errno));
+  if (!made)
+    throw ConfigError(std::string("tagwrench control: no socket to be had: ") +
+                      std::strerror(errno) + "; end other programs");
   return made;
 }
 

@@ -35,7 +35,9 @@ Desk::Desk(ProfileFiles files, std::optional<ControlSocket> control,
       gestures_(gesture_options_),
       shaping_(profile().shaping),
       period_(period_of(profile().rate_hz)) {
-  if (!events_) throw ConfigError(std::string("epoll: ") + std::strerror(errno));
+  if (!events_)
+    throw ConfigError(std::string("profiles: no epoll to be had: ") + std::strerror(errno) +
+                      "; end other programs");
   add(events_, files_.fd());
   if (control_) add(events_, control_->fd());
   if (focus_) add(events_, focus_->fd());

@@ -1,6 +1,5 @@
 // Which program has the focus, as an X11 window manager tells (Extended Window Manager Hints 1.5,
-// _NET_ACTIVE_WINDOW; ICCCM 4.1.2.5, WM_CLASS). Wayland tells nobody; programs that run through
-// Xwayland are seen.
+// _NET_ACTIVE_WINDOW; ICCCM 4.1.2.5, WM_CLASS). Wayland tells nobody.
 #pragma once
 
 #include <memory>

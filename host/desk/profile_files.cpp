@@ -19,8 +19,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLongestFile = 65536;
+constexpr const char* kTooLong = ": longer than 64 kB; a profile is a page of text";
 
-std::optional<std::string> read_whole(const std::string& path) {
+/// One byte more of a file that is too long.
+std::optional<std::string> read_start(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   std::string text(kLongestFile + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
@@ -31,9 +33,14 @@ std::optional<std::string> read_whole(const std::string& path) {
 
 std::vector<std::string> yaml_files(const std::string& folder) {
   std::vector<std::string> found;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() == ".yaml") found.push_back(entry.path());
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".yaml") found.push_back(entry->path());
   }
+  if (error)
+    throw ConfigError(folder + ": cannot be read: " + error.message() +
+                      "; give --profile a folder of yours");
   std::sort(found.begin(), found.end());
   return found;
 }
@@ -73,8 +80,9 @@ ProfileFiles::ProfileFiles(const std::vector<std::string>& chosen, const SensorC
 }
 
 void ProfileFiles::take(const std::string& path) {
-  const std::optional<std::string> text = read_whole(path);
-  if (!text) throw ConfigError(path + ": cannot be read");
+  const std::optional<std::string> text = read_start(path);
+  if (!text) throw ConfigError(path + ": cannot be read; give --profile a file of yours");
+  if (text->size() > kLongestFile) throw ConfigError(path + kTooLong);
   const fs::path whole = fs::absolute(path);
   files_.push_back({whole.parent_path(), whole.filename(), *text, profiles_.size()});
   profiles_.push_back(parse_profile(*text, path, defaults_));
@@ -106,10 +114,11 @@ std::vector<ProfileFiles::Change> ProfileFiles::reread() {
 
 std::optional<ProfileFiles::Change> ProfileFiles::look_again(File& file) {
   const std::string path = file.folder + "/" + file.name;
-  std::optional<std::string> text = read_whole(path);
+  std::optional<std::string> text = read_start(path);
   if (!text || *text == file.text) return {};
   file.text = std::move(*text);
   try {
+    if (file.text.size() > kLongestFile) throw ConfigError(path + kTooLong);
     Profile read = parse_profile(file.text, path, defaults_);
     profiles_[file.profile] = std::move(read);
     return Change{file.profile, "profile " + profiles_[file.profile].name + ": read again"};

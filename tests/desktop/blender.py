@@ -78,17 +78,7 @@ def main():
         desktop.wait_until(lambda: view.lines() or process.poll() is not None, "Blender's view")
         desk.point(300, 250)  # over the view in three dimensions
         witness = desktop.Witness(desk.socket)
-        for axis in desktop.PUSHES:
-            before = view.go_home()
-            desk.screenshot(axis + "_before")
-            motions = witness.pushed(lambda: desk.push(axis, 0.35 if axis[0] == "m" else 0.2))
-            after = view.at_rest()
-            desk.screenshot(axis + "_after")
-            desktop.check_motions(axis, motions)
-            if axis[0] == "m":
-                check_turn(axis, motions, before, after)
-            else:
-                check_shift(axis, before, after)
+        desk.push_every_axis(view, witness, lambda axis: 0.35 if axis[0] == "m" else 0.2, check_turn, check_shift)
         check("Blender has stayed connected over six starts of the bridge", process.poll() is None)
     desktop.finish()
 

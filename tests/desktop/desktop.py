@@ -186,6 +186,20 @@ class Desk(contextlib.ExitStack):
             subprocess.run([self.tagwrench, "run", "--source", "sim:" + scenario, "--output", "spnav:" + self.socket,
                             "--seconds", "4.6"], env=self.environment, stdout=log, stderr=log, check=True)
 
+    def push_every_axis(self, view, witness, share_of, check_turn, check_shift):
+        """From the same view each time; a push of share_of(axis) of full scale, and what the view makes of it."""
+        for axis in PUSHES:
+            before = view.go_home()
+            self.screenshot(axis + "_before")
+            motions = witness.pushed(lambda: self.push(axis, share_of(axis)))
+            after = view.at_rest()
+            self.screenshot(axis + "_after")
+            check_motions(axis, motions)
+            if axis[0] == "m":
+                check_turn(axis, motions, before, after)
+            else:
+                check_shift(axis, before, after)
+
 
 def end(process):
     process.send_signal(signal.SIGTERM)

@@ -63,17 +63,7 @@ def main():
         desktop.wait_until(lambda: view.lines() or freecad.poll() is not None, "FreeCAD's view")
         desk.focus("FreeCAD")
         witness = desktop.Witness(desk.socket)
-        for axis in desktop.PUSHES:
-            before = view.go_home()
-            desk.screenshot(axis + "_before")
-            motions = witness.pushed(lambda: desk.push(axis, SHARES[axis]))
-            after = view.at_rest()
-            desk.screenshot(axis + "_after")
-            desktop.check_motions(axis, motions)
-            if axis[0] == "m":
-                check_turn(axis, motions, before, after)
-            else:
-                check_shift(axis, before, after)
+        desk.push_every_axis(view, witness, SHARES.get, check_turn, check_shift)
         check("FreeCAD has stayed connected over six starts of the bridge", freecad.poll() is None)
     desktop.finish()
 

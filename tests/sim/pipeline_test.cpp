@@ -49,6 +49,68 @@ TEST_F(PipelineLoop, ADisconnectedCameraIsNeutralAtOnceAndSaid) {
   EXPECT_EQ(recorder().notices.back(), "the camera went away");
 }
 
+/// Shows the next picture of the clip when asked to, then none.
+class AskedSource final : public FrameSource {
+ public:
+  AskedSource() { format_ = {640, 480, std::chrono::milliseconds(40), "asked"}; }
+  void ask() { ::eventfd_write(ready_.get(), 1); }
+  const SourceFormat& format() const noexcept override { return format_; }
+  int poll_fd() const noexcept override { return ready_.get(); }
+  ReadStatus read(Frame& frame) noexcept override {
+    std::uint64_t drained = 0;
+    if (::read(ready_.get(), &drained, sizeof drained) < 0) return ReadStatus::nothing;
+    if (next_ == kFrames) return ReadStatus::nothing;
+    frame = {};
+    frame.image = {Clip::get().pictures[static_cast<std::size_t>(next_)].data(), 640, 480, 640};
+    frame.latency_origin = std::chrono::steady_clock::now();
+    frame.capture_time = TimePoint{} + next_ * format_.period;
+    frame.sequence = static_cast<std::uint64_t>(next_++);
+    return ReadStatus::frame;
+  }
+  std::string detail() const override { return {}; }
+
+ private:
+  UniqueFd ready_{::eventfd(1, EFD_NONBLOCK)};
+  SourceFormat format_;
+  int next_ = 0;
+};
+
+TEST_F(PipelineLoop, DevicesMoveBetweenFramesAndAreNeutralAtOnceWhenTheyStop) {
+  AskedSource source;
+  auto device = std::make_unique<Recorder>();
+  int of_this_frame = 0;
+  int most = 0;
+  std::uint64_t last = 0;
+  device->on_move = [&](const Sample& sample) {
+    of_this_frame = sample.sequence == last ? of_this_frame + 1 : 1;
+    last = sample.sequence;
+    most = std::max(most, of_this_frame);
+    // The next frame when the device has moved three times on this one; a stalled machine loses it.
+    const bool numbers = carries_numbers(sample.status);
+    if (!numbers || of_this_frame == 3) source.ask();
+    if (sample.status == Status::lost && last + 1 == kFrames) ::eventfd_write(stop_.get(), 1);
+  };
+  RunLimits limits;
+  limits.time = std::chrono::seconds(60);  // only if no neutral move comes
+  const RunReport report = run(source, std::move(device), limits);
+  EXPECT_EQ(report.end, RunReport::End::interrupted) << "no neutral move came";
+  EXPECT_GE(most, 3) << "they moved with frames only";
+  EXPECT_GE(recorder().samples.size(), static_cast<std::size_t>(kFrames));
+  const Sample& end = recorder().moves.back();
+  EXPECT_EQ(end.status, Status::lost);
+  EXPECT_TRUE(end.motion.isZero());
+  EXPECT_EQ(end.buttons, 0U);
+  bool carried_on = false;
+  for (std::size_t i = 1; i < recorder().moves.size(); ++i) {
+    const Sample& before = recorder().moves[i - 1];
+    const Sample& after = recorder().moves[i];
+    ASSERT_LE(after.motion.cwiseAbs().maxCoeff(), 1);
+    carried_on = carried_on || (after.sequence == before.sequence &&
+                                carries_numbers(after.status) && after.motion != before.motion);
+  }
+  EXPECT_TRUE(carried_on) << "motion stands still between frames";
+}
+
 TEST_F(PipelineLoop, AFailedOutputEndsTheRunWithItsReason) {
   PlayedSource source(kFrames, PlayedSource::After::end);
   const RunReport report = run(source, std::make_unique<Recorder>([](const Sample& sample) {

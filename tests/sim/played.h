@@ -88,10 +88,16 @@ class Recorder final : public Output {
   explicit Recorder(std::function<SendStatus(const Sample&)> on_send = {})
       : on_send_(std::move(on_send)) {
     samples.reserve(4096);
+    moves.reserve(4096);
   }
   SendStatus send(const Sample& sample) noexcept override {
     samples.push_back(sample);
     return on_send_ ? on_send_(sample) : SendStatus::ok;
+  }
+  SendStatus move(const Sample& sample) noexcept override {
+    moves.push_back(sample);
+    if (on_move) on_move(sample);
+    return SendStatus::ok;
   }
   std::string failure() const override { return "recorder: broken on purpose"; }
   bool notice(std::string_view line) noexcept override {
@@ -100,6 +106,8 @@ class Recorder final : public Output {
   }
 
   std::vector<Sample> samples;
+  std::vector<Sample> moves;  ///< what an input device would show
+  std::function<void(const Sample&)> on_move;
   std::vector<std::string> notices;
 
  private:

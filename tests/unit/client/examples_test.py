@@ -114,8 +114,8 @@ class Programs(unittest.TestCase):
 
     def test_logger_says_that_nothing_is_there(self):
         with tempfile.TemporaryDirectory() as folder:
-            stub = os.path.join(folder, "hidraw.py")
-            with open(stub, "w", encoding="utf-8") as file:
+            no_devices = os.path.join(folder, "hidraw.py")
+            with open(no_devices, "w", encoding="utf-8") as file:
                 file.write("def enumerate(vendor, product):\n    return []\n")
             done = subprocess.run([sys.executable, "-B", f"{EXAMPLES}/log_events.py", f"{folder}/log.csv"], text=True,
                                   capture_output=True, env={**os.environ, "PYTHONPATH": folder}, stdin=subprocess.DEVNULL)

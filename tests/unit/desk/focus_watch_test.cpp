@@ -13,7 +13,9 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "host/desk/desk.h"
 #include "host/os/unique_fd.h"
+#include "host/source/simulator/folder_export.h"
 
 namespace tagwrench {
 namespace {
@@ -94,6 +96,23 @@ TEST_F(Focus, IsToldByTheClassOfTheWindowInLowerCase) {
   EXPECT_EQ(next(*watch), "doom");
   focus(nobody);
   EXPECT_EQ(next(*watch), "");
+}
+
+TEST_F(Focus, ChoosesTheProfileThatNamesTheProgramElseTheFirst) {
+  using std::string_literals::operator""s;
+  const SensorConfig sensor = parse_sensor(sim::sensor_yaml(sim::Scenario{}), "the test's sensor");
+  focus(window("freecad\0FreeCAD\0"s));
+  Desk desk(ProfileFiles({"game", "cad"}, sensor), {}, FocusWatch::open());
+  const auto in_force_is = [&](const std::string& name) {
+    for (pollfd waiting{desk.poll_fd(), POLLIN, 0};
+         desk.profile().name != name && ::poll(&waiting, 1, 10'000) == 1;)
+      desk.service();
+    return desk.profile().name == name;
+  };
+  EXPECT_TRUE(in_force_is("cad"));
+  EXPECT_EQ(desk.take_news(), "profile: cad (freecad)");
+  focus(window("mail\0Mail\0"s));
+  EXPECT_TRUE(in_force_is("game")) << "the first, for a program that none names";
 }
 
 TEST_F(Focus, AWindowThatIsGoneHasNoClass) {

@@ -40,10 +40,12 @@ TEST_F(ProfileFilesTest, WhatCannotBeIsRefusedAtTheStart) {
   write("a.yaml", "name: cad\n");
   write("bad.yaml", "name: bad\ntranslatoin: 1\n");
   std::filesystem::create_directory(path("empty"));
+  write("long.yaml", "name: long\n" + std::string(70'000, '#'));
   for (const std::vector<std::string>& chosen : {std::vector<std::string>{"cad", path("a.yaml")},
                                                  {path("bad.yaml")},
                                                  {path("empty")},
-                                                 {path("none.yaml")}})
+                                                 {path("none.yaml")},
+                                                 {path("long.yaml")}})
     EXPECT_THROW(ProfileFiles(chosen, sensor_), ConfigError) << chosen.back();
 }
 
@@ -69,6 +71,9 @@ TEST_F(ProfileFilesTest, AMistakeLeavesTheEarlierOneAndSaysTheLine) {
   EXPECT_FALSE(saved.profile);
   EXPECT_NE(saved.line.find("a.yaml:2"), std::string::npos) << saved.line;
   EXPECT_EQ(files.profiles()[0].shaping.translation, 0.5);
+  write("a.yaml", "translation: 2\n" + std::string(70'000, '#'));
+  EXPECT_FALSE(change(files).profile);
+  EXPECT_EQ(files.profiles()[0].shaping.translation, 0.5) << "half a file is none";
   std::filesystem::remove(path("a.yaml"));
   EXPECT_TRUE(files.reread().empty());
 }
