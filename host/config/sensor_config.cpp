@@ -12,7 +12,9 @@
 #include "host/config/calibration_file.h"
 #include "host/config/yaml_reader.h"
 #include "host/tracker/projection.h"
+#include "host/wrench/estimate.h"
 #include "host/wrench/spring_model.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 namespace {
@@ -326,7 +328,9 @@ Eigen::Matrix3d read_mounting(YamlReader node) {
 }
 
 ShapingOptions read_shaping(YamlReader node, ShapingOptions shaping) {
+  const Vector6 share = shaping.dead_zone.cwiseQuotient(shaping.full_scale);
   shaping.full_scale = force_and_torque(node, "full_scale_n", "full_scale_nm", shaping.full_scale);
+  shaping.dead_zone = share.cwiseProduct(shaping.full_scale);
   for (const auto& [key, first] : {std::pair{"dead_zone_n", 0}, std::pair{"dead_zone_nm", 3}}) {
     const std::vector<double> read = node.numbers_or(
         key,
@@ -373,7 +377,10 @@ SensorConfig read_sensor(YamlReader root, WrenchCalibration use) {
   sensor.target = read_target(root.child("target"));
   if (root.has("rest")) sensor.rest = read_rest(root.child("rest"), sensor.camera);
   sensor.wrench = read_wrench(root.child("wrench"), sensor, use);
-  if (root.has("mounting")) sensor.shaping.hid_R_camera = read_mounting(root.child("mounting"));
+  Eigen::Matrix3d hid_R_camera = sensor.shaping.hid_R_camera;
+  if (root.has("mounting")) hid_R_camera = read_mounting(root.child("mounting"));
+  const Vector6 range = range_through(WrenchEstimator(sensor.wrench).tool(), sensor.wrench.range);
+  sensor.shaping = shaping_for(range, hid_R_camera);
   if (root.has("shaping")) sensor.shaping = read_shaping(root.child("shaping"), sensor.shaping);
   if (root.has("spacemouse")) sensor.spacemouse = read_identity(root.child("spacemouse"));
   root.finish();

@@ -70,6 +70,11 @@ struct ShapingOptions {
   bool operator==(const ShapingOptions&) const = default;
 };
 
+/// For a sensor that measures up to +-`range`, N and N m as samples have them: two thirds of it are
+/// full deflection, and the dead zone keeps its share of that. An axis whose range is not known (as
+/// of range_through() in zero.h) keeps the defaults.
+ShapingOptions shaping_for(const Vector6& range, const Eigen::Matrix3d& hid_R_camera);
+
 /// Remembers the last frames. Depends on samples and their times alone, so that a replay gives the
 /// same. No heap.
 class Shaping {

@@ -130,6 +130,28 @@ TEST(SensorConfig, ReadsEveryOptionalKey) {
   EXPECT_EQ(s.spacemouse.product, 0x00ab);
 }
 
+TEST(SensorConfig, FullDeflectionIsTwoThirdsOfTheRangeAlongTheUsersAxesUnlessItIsGiven) {
+  const std::string sensor = std::string(kGood) +
+                             "  range_n: [3, 6, 12]\n"
+                             "  range_nm: [0.03, 0.06, 0.12]\n"
+                             "mounting: {right: +y, toward_user: +x, down: -z}\n";
+  const ShapingOptions usual;
+  const ShapingOptions s = parse_sensor(sensor, "sensor.yaml").shaping;
+  const Vector6 expected = (Vector6() << 4, 2, 8, 0.04, 0.02, 0.08).finished();  // N, N m
+  EXPECT_TRUE(s.full_scale.isApprox(expected)) << s.full_scale.transpose();
+  EXPECT_TRUE(s.dead_zone.cwiseQuotient(s.full_scale)
+                  .isApprox(usual.dead_zone.cwiseQuotient(usual.full_scale)));
+
+  const ShapingOptions given =
+      parse_sensor(sensor + "shaping: {full_scale_n: [0.01, 1, 1]}\n", "sensor.yaml").shaping;
+  EXPECT_EQ(given.full_scale[0], 0.01);
+  EXPECT_LT(given.dead_zone[0], 0.001) << "a dead zone that nobody gave fits the full scale";
+  EXPECT_DOUBLE_EQ(given.full_scale[5], 0.08);
+
+  const ShapingOptions unknown = parse_sensor(kGood, "sensor.yaml").shaping;
+  EXPECT_EQ(unknown, usual) << "nobody said what it measures";
+}
+
 struct BadCase {
   const char* name;
   const char* from;
