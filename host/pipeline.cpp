@@ -209,6 +209,7 @@ std::uint32_t Pipeline::pressed() const noexcept {
 void Pipeline::follow_zero(Sample& sample, const Vector6& noise) noexcept {
   if (zero_ == nullptr) return;
   if (desk_.take_zero()) zero_->ask();
+  if (source_.poll_fd() >= 0 && sleep_.woke(time_asleep())) zero_->wake();
   zero_->follow(sample, noise);
   if (const std::string_view line = zero_text(zero_->take_answer()); !line.empty()) say(line);
 }

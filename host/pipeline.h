@@ -14,6 +14,7 @@
 #include "host/frame_log.h"
 #include "host/output/dead_man.h"
 #include "host/output/output.h"
+#include "host/sleep_watch.h"
 #include "host/source/frame_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
@@ -80,6 +81,7 @@ class Pipeline {
   int stop_fd_;
   FrameLog* log_;
   ZeroTracking* zero_ = nullptr;
+  SleepWatch sleep_{time_asleep()};
 
   TimePoint start_{};
   TimePoint last_arrival_{};

@@ -2,7 +2,7 @@
 
 #include <iostream>
 
-#include "host/doctor.h"
+#include "host/doctor/doctor.h"
 
 namespace tagwrench {
 

@@ -87,7 +87,7 @@ void ZeroTracking::answer(const Sample& sample) noexcept {
       sample.zero_state == ZeroState::following || sample.zero_state == ZeroState::far;
   if (!range_known) {
     answer_ = ZeroAnswer::no_range;
-  } else if (at_rest && within(reading(), options_.reach)) {
+  } else if (at_rest && within(reading(), asked_ ? options_.reach : options_.band)) {
     options_.set += reading();
     answer_ = ZeroAnswer::done;
   } else if (sample.capture_time - *asked_at_ >= options_.patience) {
@@ -95,13 +95,14 @@ void ZeroTracking::answer(const Sample& sample) noexcept {
   } else {
     return;
   }
-  asked_ = false;
+  if (!asked_ && answer_ != ZeroAnswer::done) answer_ = ZeroAnswer::none;
+  asked_ = woke_ = false;
   asked_at_.reset();
 }
 
 void ZeroTracking::follow(Sample& sample, const Vector6& noise) noexcept {
   sample.zero_state = judge(sample, noise);
-  if (asked_) answer(sample);
+  if (asked_ || woke_) answer(sample);
   if (!follow_) sample.zero_state = ZeroState::off;
   if (sample.zero_state == ZeroState::following) {
     const double dt = seconds(sample.capture_time - last_);

@@ -95,6 +95,9 @@ class ZeroTracking {
   bool follows() const noexcept { return follow_; }
   /// Zero on demand, with the next sample at rest.
   void ask() noexcept { asked_ = true; }
+  /// The computer has slept, and what it left warm is cold: zero on demand where the zero may
+  /// follow, by no more than the band, and not a word if it cannot be.
+  void wake() noexcept { woke_ = woke_ || (follow_ && !asked_); }
   /// Told once for each ask().
   ZeroAnswer take_answer() noexcept { return std::exchange(answer_, ZeroAnswer::none); }
   /// How far it has moved from the one that was set, N and N m.
@@ -112,6 +115,7 @@ class ZeroTracking {
   StillMeter meter_;
   bool felt_ = false;  ///< somebody, since the start
   bool asked_ = false;
+  bool woke_ = false;
   std::optional<TimePoint> asked_at_;
   ZeroAnswer answer_ = ZeroAnswer::none;
   TimePoint last_{};

@@ -257,5 +257,30 @@ TEST(ZeroOnDemand, IsRefusedWhileHeldUnderALoadAndWithoutARange) {
   EXPECT_EQ(unknown.take_answer(), ZeroAnswer::no_range);
 }
 
+TEST(ZeroAfterSleep, TakesOffWhatCoolingHasMovedAtOnceButNoLoad) {
+  const auto touch_then = [](double part) {
+    return [part](double t) { return part_of_range(t < 2 ? 0.3 * std::sin(7 * t) : part); };
+  };
+  ZeroTracking cooled(zero_options());
+  play(cooled, 0, 2, touch_then(0.015));
+  cooled.wake();
+  const Sample last = play(cooled, 2, 11, touch_then(0.015), 2);
+  EXPECT_EQ(cooled.take_answer(), ZeroAnswer::done);
+  EXPECT_LT(largest_part(last.zero - part_of_range(0.015)), 1e-3);
+
+  ZeroTracking loaded(zero_options());
+  play(loaded, 0, 2, touch_then(0.05));
+  loaded.wake();
+  play(loaded, 2, 14, touch_then(0.05), 2);
+  EXPECT_EQ(loaded.take_answer(), ZeroAnswer::none) << "nobody asked";
+  EXPECT_TRUE(play(loaded, 14, 15, touch_then(0.05), 3).zero.isZero());
+
+  ZeroOptions fixed = zero_options();
+  fixed.follow = false;
+  ZeroTracking stays(fixed);
+  stays.wake();
+  EXPECT_TRUE(play(stays, 0, 6, touch_then(0.015), 2).zero.isZero());
+}
+
 }  // namespace
 }  // namespace tagwrench

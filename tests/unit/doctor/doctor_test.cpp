@@ -1,4 +1,4 @@
-#include "host/doctor.h"
+#include "host/doctor/doctor.h"
 
 #include <gtest/gtest.h>
 

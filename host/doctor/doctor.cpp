@@ -1,6 +1,5 @@
-#include "host/doctor.h"
+#include "host/doctor/doctor.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <grp.h>
 #include <sys/utsname.h>
@@ -15,11 +14,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <optional>
 #include <ostream>
 
+#include "host/doctor/access.h"
+#include "host/doctor/bridges.h"
+#include "host/doctor/cad_programs.h"
+#include "host/doctor/report.h"
 #include "host/link/serial_places.h"
-#include "host/os/unique_fd.h"
 #include "host/source/v4l2_nodes.h"
 
 namespace tagwrench {
@@ -27,28 +28,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum class Mark : std::uint8_t { ok, absent, missing };
-
-class Report {
- public:
-  explicit Report(std::ostream& out) : out_(out) {}
-  void line(Mark mark, std::string_view text) {
-    static constexpr std::array<std::string_view, 3> kMarks = {"ok", "--", "!!"};
-    out_ << kMarks[static_cast<std::size_t>(mark)] << "  " << text << '\n';
-  }
-
- private:
-  std::ostream& out_;
-};
-
 std::string read_file(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
-}
-
-bool present(const fs::path& path) {
-  std::error_code error;
-  return fs::exists(path, error);
 }
 
 std::string environment(const char* name) {
@@ -96,9 +78,12 @@ void say_cameras(Report& report) {
                               node.path));
     } else if (node.captures) {
       any = true;
-      report.line(Mark::ok, fmt::format("camera {}: {} ({}); modes: {}; can be locked: {}",
-                                        node.path, node.card, node.driver, describe(node.modes, 6),
-                                        node.controls.empty() ? "nothing" : node.controls));
+      const std::string holders = holders_text(node.path);
+      report.line(
+          Mark::ok,
+          fmt::format("camera {}: {} ({}){}; modes: {}; can be locked: {}", node.path, node.card,
+                      node.driver, holders.empty() ? "" : ", in use by " + holders,
+                      describe(node.modes, 6), node.controls.empty() ? "nothing" : node.controls));
     } else if (node.error != 0) {
       report.line(Mark::absent, fmt::format("camera {}: does not answer: {}", node.path,
                                             std::strerror(node.error)));
@@ -129,81 +114,6 @@ void say_serial_ports(Report& report) {
   }
   if (ports.empty())
     report.line(Mark::absent, "no USB serial port: no board for light and load cells");
-}
-
-/// Whether a virtual device can be made through this node.
-bool say_device_node(Report& report, const char* path, const char* module, const char* use) {
-  const UniqueFd fd(::open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC));
-  if (fd) {
-    report.line(Mark::ok, fmt::format("{} can be opened ({})", path, use));
-    return true;
-  }
-  const int error = errno;
-  // The node may be a promise of a module that opening it would load.
-  if (error == ENOENT || error == ENODEV || error == ENXIO) {
-    const bool loaded = present(fs::path("/sys/module") / module);
-    report.line(Mark::missing,
-                fmt::format("{}: {}; needed for {}: sudo modprobe {}", path,
-                            loaded ? "the module is loaded but there is no device node"
-                                   : "the module is not loaded",
-                            use, module));
-  } else if (error == EACCES || error == EPERM) {
-    report.line(Mark::missing,
-                fmt::format("{}: no permission; needed for {}: install 70-tagwrench.rules (next "
-                            "line), or run with sudo",
-                            path, use));
-  } else {
-    report.line(Mark::missing, fmt::format("{}: cannot be opened: {}; needed for {}", path,
-                                           std::strerror(error), use));
-  }
-  return false;
-}
-
-void say_udev_rule(Report& report) {
-  for (const char* folder :
-       {"/etc/udev/rules.d", "/run/udev/rules.d", "/usr/local/lib/udev/rules.d",
-        "/usr/lib/udev/rules.d", "/lib/udev/rules.d"}) {
-    const fs::path rule = fs::path(folder) / "70-tagwrench.rules";
-    if (!present(rule)) continue;
-    report.line(Mark::ok, fmt::format("udev rule {}", rule.string()));
-    return;
-  }
-  report.line(::getuid() == 0 ? Mark::absent : Mark::missing,
-              "no udev rule, so only root can make devices: sudo cmake --install build (or copy "
-              "host/output/70-tagwrench.rules to /etc/udev/rules.d), then sudo udevadm control "
-              "--reload && sudo udevadm trigger");
-}
-
-std::optional<int> pid_of(std::string_view name) {
-  std::error_code error;
-  fs::directory_iterator it("/proc", error);
-  for (; !error && it != fs::directory_iterator(); it.increment(error)) {
-    const std::string folder = it->path().filename().string();
-    int pid = 0;
-    const auto [end, bad] = std::from_chars(folder.data(), folder.data() + folder.size(), pid);
-    if (bad != std::errc{} || end != folder.data() + folder.size()) continue;
-    if (read_file(it->path() / "comm") == std::string(name) + "\n") return pid;
-  }
-  return std::nullopt;
-}
-
-void say_spacenavd(Report& report) {
-  const auto pid = pid_of("spacenavd");
-  const bool socket = present("/var/run/spnav.sock");
-  if (pid && socket) {
-    report.line(Mark::ok, fmt::format("spacenavd runs (pid {}), socket /var/run/spnav.sock", *pid));
-  } else if (pid) {
-    report.line(Mark::missing,
-                fmt::format("spacenavd runs (pid {}) without /var/run/spnav.sock: sudo systemctl "
-                            "restart spacenavd",
-                            *pid));
-  } else {
-    report.line(
-        Mark::absent,
-        fmt::format("spacenavd does not run{}; Blender, FreeCAD and others need it: sudo apt "
-                    "install spacenavd",
-                    socket ? " (a left-over /var/run/spnav.sock is there)" : ""));
-  }
 }
 
 void say_other_devices(Report& report) {
@@ -274,8 +184,11 @@ int run_doctor(std::ostream& out) {
   const bool uhid =
       say_device_node(report, "/dev/uhid", "uhid", "the outputs spacemouse and wrench");
   const bool uinput = say_device_node(report, "/dev/uinput", "uinput", "the output joystick");
-  say_udev_rule(report);
-  say_spacenavd(report);
+  say_rule(report);
+  say_hidraw(report);
+  say_bridges(report);
+  say_spnav(report, look_at_spnav());
+  say_sandboxes(report);
   say_other_devices(report);
   return uhid && uinput ? 0 : 1;
 }
