@@ -24,8 +24,6 @@ constexpr Duration kFirstConversion = std::chrono::milliseconds(1500);
 constexpr double kMostSpread = 15;
 constexpr double kLeastNoise_counts = 0.5;
 
-TimePoint clock_now() { return std::chrono::steady_clock::now(); }
-
 /// Mean and scatter of a cell's next conversions.
 struct Mean {
   int count = 0;

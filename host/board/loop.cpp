@@ -21,8 +21,6 @@ using std::chrono::seconds;
 constexpr Duration kPatience = seconds(6);  ///< an Arduino's boot loader takes two of them
 constexpr Duration kSettling = seconds(4);
 
-TimePoint clock_now() { return std::chrono::steady_clock::now(); }
-
 link::CellInput cell_input(const std::string& name) {
   if (name == "b32") return link::CellInput::b32;
   if (name == "a64") return link::CellInput::a64;

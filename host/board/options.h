@@ -6,8 +6,15 @@
 #include <vector>
 
 #include "host/link/cell_calibration.h"
+#include "host/types.h"
 
 namespace tagwrench {
+
+inline TimePoint clock_now() { return std::chrono::steady_clock::now(); }
+
+inline Duration in_seconds(double seconds) {
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+}
 
 struct BoardOptions {
   std::string port;  ///< path, usb:VID:PID[:SERIAL], or empty: the only one

@@ -18,14 +18,8 @@ namespace {
 using link::OptoforceReading;
 using std::chrono::milliseconds;
 
-constexpr Duration kPatience = std::chrono::seconds(3);
+constexpr Duration kLongestSilence = std::chrono::seconds(3);
 constexpr const char* kAxes[] = {"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
-
-TimePoint clock_now() { return std::chrono::steady_clock::now(); }
-
-Duration in_seconds(double seconds) {
-  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
-}
 
 std::string json_line(const OptoforceReading& reading) {
   std::string values;
@@ -77,7 +71,7 @@ class ForceWatch {
       sensor_.service();
       for (OptoforceReading reading; good && sensor_.next(reading);) good = show(reading);
       watch_port();
-      if (nothing() && clock_now() - begin > kPatience) break;
+      if (nothing() && clock_now() - begin > kLongestSilence) break;
     }
     if (nothing() && !stopped_) return say_nothing();
     const auto& counters = sensor_.counters();

@@ -9,12 +9,6 @@
 namespace tagwrench {
 namespace {
 
-TimePoint clock_now() { return std::chrono::steady_clock::now(); }
-
-Duration in_seconds(double seconds) {
-  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
-}
-
 /// One board, one stream of lines.
 class Watch {
  public:

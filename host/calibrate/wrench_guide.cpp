@@ -14,7 +14,6 @@ namespace {
 using Line = GuideLine::Kind;
 
 constexpr double kOtherClock = 1.0;  // s between what a reading says and when it came
-constexpr double kSilence = 1.0;     // s
 constexpr double kKeep = 3.0;        // s of readings
 constexpr double kWellCovered = 0.95;
 constexpr double kTouch = 0.1;    // of a push's force: it has begun
@@ -164,7 +163,7 @@ const StepRecord* WrenchGuide::rest_of_reference(double time) {
     leave_out("there is no rest to count it from");
     return nullptr;
   }
-  if (last_reading_ && time - last_reading_->time <= kSilence) return rest;
+  if (last_reading_ && time - last_reading_->time <= kLongestSilence) return rest;
   phase_ = Phase::waiting;
   complain_of_silence();
   return nullptr;

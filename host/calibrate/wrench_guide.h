@@ -19,6 +19,9 @@ namespace tagwrench {
 /// Readings of a push or a movement are kept from so long before its first frame, s.
 inline constexpr double kReadingsBeforeTaking = 0.5;
 
+/// After so long without a reading there is no reference, s.
+inline constexpr double kLongestSilence = 1.0;
+
 struct GuideOptions {
   Matrix6 stiffness = Matrix6::Identity();  ///< of the spring model
   Vector6 range = Vector6::Ones();          ///< full load per axis, N and N m

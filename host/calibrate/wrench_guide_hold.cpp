@@ -16,7 +16,6 @@ constexpr double kBump = 0.01;   // of the range: a rest may differ by so much f
 constexpr int kMostBumps = 6;    // unattended
 constexpr double kOwnWeight = 0.03;  // of the range: less does not tell how the sensor lies
 constexpr double kTimeToAct = 8.0;   // s that a person has before it is said, or taken as done
-constexpr double kSilence = 1.0;     // s
 // All loads count from the rests: what is steady must have become so before the second that is
 // taken began, else the last of a push or of a swing is in it.
 constexpr double kSettled = 0.5;  // s
@@ -61,8 +60,8 @@ bool WrenchGuide::has_moved(const Hold& hold) {
 void WrenchGuide::watch_hold() {
   const Hold hold = hold_.look();
   const bool of_cell = plan_.reference != ReferenceKind::masses;
-  if (of_cell && !(last_reading_ && now_ - last_reading_->time < kSilence)) {
-    if (now_ - *asked_time_ > 2 * kSilence) complain_of_silence();
+  if (of_cell && !(last_reading_ && now_ - last_reading_->time < kLongestSilence)) {
+    if (now_ - *asked_time_ > 2 * kLongestSilence) complain_of_silence();
     return;
   }
   const bool moved = has_moved(hold);

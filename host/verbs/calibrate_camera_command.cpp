@@ -16,13 +16,13 @@
 #include "host/input.h"
 #include "host/source/images.h"
 #include "host/tell.h"
+#include "host/verbs/exit_status.h"
 
 namespace tagwrench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kStopped = 1;
 constexpr int kViewsFromCamera = 20;
 constexpr int kViewsFromFolders = 60;
 constexpr Duration kSayEvery = std::chrono::seconds(2);
@@ -298,7 +298,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   std::unique_ptr<ViewCollector> collector = collect(options, board, record, stop);
   if (!collector) {
     tell("stopped; nothing was written");
-    return kStopped;
+    return kExitStopped;
   }
   collector->check();
   if (collector->mirrored() != record.sensor.camera.mirrored) {
@@ -318,7 +318,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   check_fit(fit, coverage);
   if (signalled(stop)) {
     tell("stopped; nothing was written");
-    return kStopped;
+    return kExitStopped;
   }
   write_sensor(record.text, {camera_section(fit.camera, fit)}, record.target);
   report(fit, views, coverage, record);

@@ -16,6 +16,7 @@
 #include "host/input.h"
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
+#include "host/verbs/exit_status.h"
 #include "host/verbs/zero_command.h"
 
 namespace tagwrench {
@@ -24,7 +25,6 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kStopped = 1;
 constexpr std::size_t kMostKeyframes = 150;
 constexpr double kSecondsFromCamera = 30;
 constexpr Duration kSayEvery = std::chrono::seconds(2);
@@ -169,7 +169,7 @@ void write(const fs::path& sensor, const std::string& text, const fs::path& appe
 
 int stopped() {
   tell("stopped; nothing was written");
-  return kStopped;
+  return kExitStopped;
 }
 
 }  // namespace

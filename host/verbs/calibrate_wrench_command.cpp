@@ -20,6 +20,7 @@
 #include "host/verbs/calibrate_wrench/replay.h"
 #include "host/verbs/calibrate_wrench/result.h"
 #include "host/verbs/calibrate_wrench/run.h"
+#include "host/verbs/exit_status.h"
 #include "host/verbs/hands_off.h"
 #include "host/verbs/recording_sensor.h"
 
@@ -28,7 +29,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kStopped = 1;
 constexpr int kRecordingFailed = 1;
 constexpr int kAttempts = 3;  // of the simulated person
 constexpr double kUnknownRange = 1e8;
@@ -211,7 +211,7 @@ int say_stopped(GuideEnd end, const WrenchGuide& guide, const fs::path& progress
            : fmt::format("stopped after {} steps, which are kept in {}; --resume goes on; the "
                          "calibration in force stays",
                          guide.records().size(), progress.string()));
-  return kStopped;
+  return kExitStopped;
 }
 
 /// Ends a recording. False: it is not whole.

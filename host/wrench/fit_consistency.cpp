@@ -29,7 +29,6 @@ constexpr std::array<Hypothesis, 6> kHypotheses{{
     {0.03, true, 1.5},
     {0.03, false, 2.0},
 }};
-constexpr double kConstantPart = 0.1;  // of the model's error, without load
 constexpr double kMostLeftOut = 0.25;  // of the steps with a load
 constexpr double kDoubt = 20;          // of chi^2: another step is e^10 times less likely
 

@@ -32,7 +32,6 @@ double median(std::vector<double> values) {
 /// median block as likely as it should be.
 ErrorModel robust_error(const Problem& problem,
                         const std::vector<std::vector<Prediction>>& held_out) {
-  constexpr double kConstantPart = 0.1;
   const auto of_size = [&](double size) {
     return ErrorModel{size * kConstantPart * problem.scale, size * problem.scale};
   };

@@ -11,7 +11,7 @@
 namespace tagwrench::sim {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double kMostSigmas = 3;
 constexpr double kKnock = 0.05;        // s that a bump or a slip takes
 constexpr double kHandEase = 0.5;      // s to take hold of the platform and to let it go
@@ -111,9 +111,9 @@ Bench::Action& Bench::add(What what, double begin) noexcept {
   action.ease_in = action.ease_out = settings_.times.load;
   Random random = Random::numbered(seed_, kBenchAction, action.number);
   for (double& frequency : action.sway_hz) frequency = random.uniform(0.3, 0.8);
-  for (double& phase : action.sway_phase) phase = random.uniform(0, 2 * kPi);
+  for (double& phase : action.sway_phase) phase = random.uniform(0, 2 * pi);
   action.tremor_hz = random.uniform(8, 12);
-  action.tremor_phase = random.uniform(0, 2 * kPi);
+  action.tremor_phase = random.uniform(0, 2 * pi);
   return action;
 }
 
@@ -217,7 +217,7 @@ double Bench::hands(const Action& action, double time) const noexcept {
 
 double Bench::tremor(const Action& action, double time) const noexcept {
   return 1 + std::numbers::sqrt2 * settings_.errors.tremor *
-                 std::sin(2 * kPi * action.tremor_hz * time + action.tremor_phase);
+                 std::sin(2 * pi * action.tremor_hz * time + action.tremor_phase);
 }
 
 double Bench::push_force(const Action& action, double time) const noexcept {
@@ -228,7 +228,7 @@ double Bench::push_force(const Action& action, double time) const noexcept {
   Random random = Random::numbered(seed_, kBenchStroke, action.number * 1000 + stroke);
   const double share = random.uniform(0.75, 0.95);
   const double phase = std::pow(strokes - static_cast<double>(stroke), random.uniform(0.8, 1.25));
-  const double sine = std::sin(kPi * phase);
+  const double sine = std::sin(pi * phase);
   const double released = 1 - eased(time - action.end, action.ease_out);
   return action.size * share * sine * sine * tremor(action, time) * released;
 }
@@ -236,7 +236,7 @@ double Bench::push_force(const Action& action, double time) const noexcept {
 Eigen::Vector3d Bench::push_direction(const Action& action, double time) const noexcept {
   const double amplitude = std::numbers::sqrt2 * settings_.errors.sway_rad;
   const auto sway = [&](std::size_t axis) {
-    return amplitude * std::sin(2 * kPi * action.sway_hz[axis] * time + action.sway_phase[axis]);
+    return amplitude * std::sin(2 * pi * action.sway_hz[axis] * time + action.sway_phase[axis]);
   };
   return tilted(action.direction, sway(0), sway(1));
 }

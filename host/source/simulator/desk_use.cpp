@@ -11,7 +11,7 @@
 namespace tagwrench::sim {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double kBeforeGesture = 0.5;  // s of rest at least
 constexpr double kAfterGesture = 0.8;
 constexpr double kFingerReach = 6e-3;  // m from the middle
@@ -30,7 +30,7 @@ double bell(double x) {
 
 double beat(double time, double length, double sharpness) {
   if (time <= 0 || time >= length) return 0;
-  return std::pow(std::sin(kPi * time / length), sharpness);
+  return std::pow(std::sin(pi * time / length), sharpness);
 }
 
 double log_uniform(Random& random, double low, double high) {
@@ -48,7 +48,7 @@ void add_tremor(DeskAct& act, Random& random) {
   act.tremor = random.uniform(0.01, 0.05);
   act.sway_hz = random.uniform(0.3, 1.5);
   act.sway = random.uniform(0, 0.2);
-  act.phase = random.uniform(0, 2 * kPi);
+  act.phase = random.uniform(0, 2 * pi);
 }
 
 /// Share of its peak that an act has reached, without tremor.
@@ -91,7 +91,7 @@ DeskUse::DeskUse(const Scenario& scenario)
     for (int i = 0; i < 6; ++i) way[i] = random.uniform(-1, 1) * range_[i];
     way *= settings_.wander * (minutes < 15 ? 0.15 : 0.35);
     wander_.push_back(
-        {1 / (60 * minutes), random.uniform(0, 2 * kPi), stiffness_matrix.ldlt().solve(way)});
+        {1 / (60 * minutes), random.uniform(0, 2 * pi), stiffness_matrix.ldlt().solve(way)});
   }
 }
 
@@ -257,8 +257,8 @@ Vector6 DeskUse::wrench(double time, const Vector6& /*displacement*/) noexcept {
   if (share <= 0) return Vector6::Zero();
   const double since = time - act.begin;
   const double gone = since / (act.end - act.begin);
-  const double tremor = act.tremor * std::sin(2 * kPi * act.tremor_hz * since + act.phase);
-  const double sway = act.sway * std::sin(2 * kPi * act.sway_hz * since);
+  const double tremor = act.tremor * std::sin(2 * pi * act.tremor_hz * since + act.phase);
+  const double sway = act.sway * std::sin(2 * pi * act.sway_hz * since);
   return share * (1 + tremor + sway) * ((1 - gone) * act.peak + gone * act.turned);
 }
 
@@ -271,7 +271,7 @@ Eigen::Vector3d DeskUse::gravity_change(double time) noexcept {
 Vector6 DeskUse::rest_change(double time) noexcept {
   Vector6 sum = Vector6::Zero();
   for (const Wander& w : wander_) {
-    sum += (std::sin(2 * kPi * w.hz * time + w.phase) - std::sin(w.phase)) * w.displacement;
+    sum += (std::sin(2 * pi * w.hz * time + w.phase) - std::sin(w.phase)) * w.displacement;
   }
   return sum;
 }

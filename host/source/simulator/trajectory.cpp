@@ -9,7 +9,7 @@
 namespace tagwrench::sim {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double kGravity = 9.81;          // m/s^2
 constexpr double kRampTime = 0.3;          // s, a hand taking hold or letting go
 constexpr double kStepOn = 1.0;            // s
@@ -33,7 +33,7 @@ double smooth_step(double time, double length) {
 }
 
 double half_sine(double time, double length) {
-  return time < 0 || time > length ? 0.0 : std::sin(kPi * time / length);
+  return time < 0 || time > length ? 0.0 : std::sin(pi * time / length);
 }
 
 // Acceleration of something that is let go at 0 and lands. The camera looks up: gravity points
@@ -59,7 +59,7 @@ TrajectoryPlayer::TrajectoryPlayer(const Trajectory& trajectory, std::uint64_t s
     for (int i = 0; i < kTones; ++i) {
       // One tone in each fifth of the band, so that no two axes move alike and the band is filled.
       axis[i].frequency = trajectory.bandwidth * (i + random.uniform(0.3, 1.0)) / kTones;
-      axis[i].phase = random.uniform(0, 2 * kPi);
+      axis[i].phase = random.uniform(0, 2 * pi);
       axis[i].weight = random.uniform(0.5, 1.0);
       sum += axis[i].weight;
     }
@@ -93,7 +93,7 @@ Vector6 TrajectoryPlayer::sweep(double time) const noexcept {
   const double turns = std::abs(ratio) < 1e-9 ? trajectory_.sweep_from * local
                                               : scale / ratio * std::expm1(ratio * local / length);
   const double fade = smooth_step(local, 0.5) * smooth_step(length - local, 0.5);
-  return on_axis(fade * std::sin(2 * kPi * turns));
+  return on_axis(fade * std::sin(2 * pi * turns));
 }
 
 Vector6 TrajectoryPlayer::tap(double time) const noexcept {
@@ -106,7 +106,7 @@ Vector6 TrajectoryPlayer::compound(double time) const noexcept {
   for (int axis = 0; axis < 6; ++axis) {
     double sum = 0;
     for (const Tone& tone : tones_[axis]) {
-      sum += tone.weight * std::sin(2 * kPi * tone.frequency * time + tone.phase);
+      sum += tone.weight * std::sin(2 * pi * tone.frequency * time + tone.phase);
     }
     // The tones rarely agree; without the gain the hand would seldom reach half of the amplitude.
     wrench[axis] = fade * trajectory_.amplitude[axis] * std::tanh(1.5 * sum) / std::tanh(1.5);
@@ -192,7 +192,7 @@ Vector6 TrajectoryPlayer::hard(double time) const noexcept {
     case Event::hold:
       return eased * event.wrench;
     case Event::sway:
-      return eased * std::sin(2 * kPi * event.frequency * local) * event.wrench;
+      return eased * std::sin(2 * pi * event.frequency * local) * event.wrench;
     case Event::shove:
       return event.wrench;
     case Event::tap:

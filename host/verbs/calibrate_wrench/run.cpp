@@ -22,13 +22,13 @@ using Clock = std::chrono::steady_clock;
 constexpr Duration kLiveEvery = std::chrono::milliseconds(200);
 constexpr int kPatience_ms = 200;
 
-double seconds(TimePoint time) {
+double clock_seconds(TimePoint time) {
   return std::chrono::duration<double>(time.time_since_epoch()).count();
 }
 
 ReferenceSample to_sample(const ReferenceReading& reading) {
   ReferenceSample out;
-  out.time = seconds(reading.time);
+  out.time = clock_seconds(reading.time);
   for (int i = 0; i < 6; ++i) {
     out.value[i] = reading.value[static_cast<std::size_t>(i)];
     out.sigma[i] = reading.sigma[static_cast<std::size_t>(i)];
@@ -157,7 +157,7 @@ class Runner {
     const bool news = track.hint != last_hint_ || is_trouble(track.hint);
     if (track.hint != Hint::none && news) say(hint_text(track.hint, track.details));
     if (track.hint != Hint::none) last_hint_ = track.hint;
-    const double time = seconds(frame.capture_time);
+    const double time = clock_seconds(frame.capture_time);
     if (!first_time_) first_time_ = time;
     if (run_.seconds && time - *first_time_ > *run_.seconds) {
       end_ = GuideEnd::stopped;
