@@ -49,12 +49,13 @@ TEST_F(VariantTravel, NothingCollidesBeforeTheStops) {
   }
 }
 
-/// The corners of the travel, and turning about each axis, as OpenSCAD's `travel`: mm, degrees. The
-/// rest is left to the triangles above: an intersection of such solids takes OpenSCAD 2 s.
+/// Two opposite corners of the travel, and turning about each axis, as OpenSCAD's `travel`: mm,
+/// degrees. The rest is left to the triangles above: an intersection of such solids takes OpenSCAD
+/// 2 s.
 std::string corners_and_turns(const std::vector<Vector6>& travel) {
   std::set<std::string> rows;
   for (const Vector6& d : travel) {
-    const bool corner = (d.head<3>().array() != 0).all(), turn = (d.head<3>().array() == 0).all();
+    const bool corner = d[0] * d[1] > 0 && d[1] * d[2] > 0, turn = (d.head<3>().array() == 0).all();
     if (!corner && !turn) continue;
     std::ostringstream row;
     row << '[';
