@@ -12,11 +12,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <climits>
 #include <cstring>
 #include <string>
 
 #include "host/config_error.h"
+#include "host/os/close_files.h"
 
 namespace tagwrench {
 
@@ -54,25 +54,6 @@ void write_neutral(const std::vector<DeadManDevice>& devices) {
   for (const DeadManDevice& device : devices) {
     for (const std::vector<std::uint8_t>& bytes : device.neutral) write_once(device.fd, bytes);
   }
-}
-
-void close_gap(unsigned first, unsigned last) {
-  if (first > last || close_range(first, last, 0) == 0) return;
-  const long limit = std::min<long>(sysconf(_SC_OPEN_MAX), 65536);  // kernels before 5.9
-  for (unsigned fd = first; fd <= last && static_cast<long>(fd) < limit; ++fd) {
-    ::close(static_cast<int>(fd));
-  }
-}
-
-/// `kept` in rising order.
-void close_all_but(const std::vector<int>& kept) {
-  unsigned next = 0;
-  for (const int fd : kept) {
-    const auto number = static_cast<unsigned>(fd);
-    if (number > next) close_gap(next, number - 1);
-    next = std::max(next, number + 1);
-  }
-  close_gap(next, UINT_MAX);
 }
 
 void leave_terminal() {

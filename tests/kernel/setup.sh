@@ -9,7 +9,7 @@ mkdir -p "$1" && dir=$(readlink -f "$1") || exit 1
 export PATH=$PATH:/usr/sbin:/sbin LC_ALL=C
 
 # What the guests load. Their dependencies come along.
-guest_modules="uinput uhid hid-generic evdev joydev vivid videobuf2-v4l2 videobuf2-vmalloc xhci-pci ftdi_sio"
+guest_modules="uinput uhid hid-generic evdev joydev vivid videobuf2-v4l2 videobuf2-vmalloc xhci-pci ftdi_sio dummy_hcd libcomposite usb_f_hid usbhid"
 initramfs_modules="virtio_pci virtio_console 9pnet_virtio 9p overlay"
 
 unavailable() {

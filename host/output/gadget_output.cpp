@@ -1,0 +1,217 @@
+#include "host/output/gadget_output.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <utility>
+
+#include "host/config_error.h"
+#include "host/os/close_files.h"
+#include "host/output/hid_report.h"
+#include "host/output/shown.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr std::uint16_t k3dconnexion = 0x256f;
+constexpr int kPatience_ms = 300;  // with a computer that takes rest in its own time
+
+using Packet =
+    std::array<std::uint8_t, SpacemouseReport().size() + SpacemouseButtonReport().size()>;
+
+Packet packet(const Counts6& counts, std::uint32_t pressed) noexcept {
+  Packet bytes;
+  const SpacemouseReport motion = spacemouse_report(counts);
+  const SpacemouseButtonReport buttons = spacemouse_button_report(pressed);
+  std::copy(motion.begin(), motion.end(), bytes.begin());
+  std::copy(buttons.begin(), buttons.end(), bytes.begin() + motion.size());
+  return bytes;
+}
+
+std::vector<std::uint8_t> neutral(GadgetFace face) {
+  if (face == GadgetFace::spacemouse) {
+    const Packet rest = packet({}, 0);
+    return {rest.begin(), rest.end()};
+  }
+  const WrenchReport rest = neutral_wrench_report();
+  return {rest.begin(), rest.end()};
+}
+
+std::string_view news_text(GadgetNews news) noexcept {
+  switch (news) {
+    case GadgetNews::taken:
+      return "gadget: the other computer takes reports";
+    case GadgetNews::nobody:
+      return "gadget: no computer at the other end; goes on when there is one";
+    case GadgetNews::asleep:
+      return "gadget: the other computer does not ask for reports (asleep?); goes on when it does";
+    case GadgetNews::gone:
+      return "gadget: it was taken down; goes on after `tagwrench gadget up`";
+    case GadgetNews::led_off:
+      return "gadget: LED off";
+    case GadgetNews::led_on:
+      return "gadget: LED on";
+    case GadgetNews::none:
+      break;
+  }
+  return {};
+}
+
+std::string up_command(const GadgetOptions& options) {
+  std::string command = "sudo tagwrench gadget up";
+  if (options.face.value_or(GadgetFace::spacemouse) != GadgetFace::spacemouse)
+    command += fmt::format(" --face {}", face_name(*options.face));
+  if (options.name != GadgetOptions().name) command += " --name " + options.name;
+  return command;
+}
+
+[[noreturn]] void cannot_open(const GadgetOptions& options, const OpenedNode& node) {
+  const std::string which = std::string(kGadgetPrefix) + options.name;
+  if (node.error == EWOULDBLOCK) {
+    throw ConfigError(fmt::format(
+        "gadget {}: another bridge writes to {}; stop it, or give this one a gadget of its own",
+        which, node.path));
+  }
+  if (node.error == EACCES || node.error == EPERM) {
+    throw ConfigError(
+        fmt::format("gadget {}: {}: permission denied; install 70-tagwrench.rules in "
+                    "/etc/udev/rules.d and join the group input, or run as root",
+                    which, node.path));
+  }
+  throw ConfigError(fmt::format("gadget {}: {}: {}; make it anew: {}", which,
+                                node.path.empty() ? "no device node" : node.path,
+                                std::strerror(node.error == 0 ? ENOENT : node.error),
+                                up_command(options)));
+}
+
+}  // namespace
+
+GadgetPort find_gadget(const GadgetOptions& options) {
+  GadgetFiles files;
+  const GadgetTree tree(files, options.places.gadgets());
+  const std::optional<GadgetFound> found = tree.find(options.name);
+  const std::string which = std::string(kGadgetPrefix) + options.name;
+  if (!found || !found->whole || !found->face) {
+    throw ConfigError(
+        fmt::format("gadget {}: it is not up; make it: {}", which, up_command(options)));
+  }
+  if (options.face && options.face != found->face) {
+    throw ConfigError(fmt::format("gadget {}: it is up with the face {}; use that one, or: {}",
+                                  which, face_name(*found->face), up_command(options)));
+  }
+  GadgetPort port;
+  port.face = *found->face;
+  port.spnav_order = found->id.vendor != k3dconnexion;
+  port.folder = options.places.devices;
+  port.open = [places = options.places, function = tree.function(options.name, port.face)] {
+    return open_gadget_node(GadgetFiles(), places, function);
+  };
+  port.node = port.open();
+  if (!port.node.fd) cannot_open(options, port.node);
+  return port;
+}
+
+GadgetOutput::GadgetOutput(GadgetPort port)
+    : face_(port.face), spnav_order_(port.spnav_order), open_(port.open) {
+  start_keeper(std::move(port));
+}
+
+void GadgetOutput::start_keeper(GadgetPort port) {
+  const auto fail = [](const char* what) {
+    throw ConfigError(
+        fmt::format("gadget: {}: {}; end other programs", what, std::strerror(errno)));
+  };
+  UniqueFd watch = watch_nodes(port.folder);
+  int ends[2];
+  if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0)
+    fail("cannot make a socket");
+  link_.reset(ends[0]);
+  UniqueFd keeper_end(ends[1]);
+  std::vector<int> kept{keeper_end.get(), watch.get(), port.node.fd.get()};
+  std::sort(kept.begin(), kept.end());
+
+  // Ctrl-C is for the bridge: the keeper ends with its link.
+  sigset_t all, before;
+  sigfillset(&all);
+  ::pthread_sigmask(SIG_SETMASK, &all, &before);
+  keeper_ = ::fork();
+  if (keeper_ == 0) {
+    ::setsid();
+    ::prctl(PR_SET_NAME, "tw-gadget");  // so that a kill by the bridge's name spares it
+    close_all_but(kept);
+    GadgetKeeper(face_, std::move(keeper_end), std::move(watch), std::move(port.node),
+                 std::move(port.open))
+        .run();
+    ::_exit(0);
+  }
+  const int error = errno;
+  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  errno = error;
+  if (keeper_ < 0) fail("cannot start its process");
+}
+
+GadgetOutput::~GadgetOutput() {
+  if (keeper_ <= 0) return;
+  const bool there = !lost_;
+  ::shutdown(link_.get(), SHUT_WR);  // the guardian's duplicate cannot keep it open
+  pollfd gone{link_.get(), 0, 0};
+  if (::poll(&gone, 1, kPatience_ms) > 0) ::waitpid(keeper_, nullptr, 0);
+  if (there) return;
+  try {
+    if (const OpenedNode node = open_(); node.fd) rest_gadget(node.fd.get(), face_);
+  } catch (const std::exception&) {
+    return;  // out of memory: what can be said is failure()
+  }
+}
+
+SendStatus GadgetOutput::put(std::span<const std::uint8_t> reports) noexcept {
+  if (lost_) return SendStatus::failed;
+  if (::send(link_.get(), reports.data(), reports.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0)
+    return SendStatus::ok;
+  if (errno == EAGAIN || errno == EINTR) return SendStatus::skipped;
+  lost_ = true;
+  return SendStatus::failed;
+}
+
+SendStatus GadgetOutput::send(const Sample& sample) noexcept {
+  return face_ == GadgetFace::wrench ? put(wrench_report(sample)) : SendStatus::ok;
+}
+
+SendStatus GadgetOutput::move(const Sample& sample) noexcept {
+  if (face_ != GadgetFace::spacemouse) return SendStatus::ok;
+  Counts6 counts{};
+  std::uint32_t pressed = 0;
+  if (carries_numbers(shown_status(sample))) {
+    pressed = sample.buttons;
+    counts = to_counts(sample.motion, kSpacemouseLimit_counts);
+    if (spnav_order_) counts = to_spnav_order(counts);
+  }
+  return put(packet(counts, pressed));
+}
+
+std::string GadgetOutput::failure() const {
+  return "gadget: the process that writes to it (tw-gadget) has ended; start again";
+}
+
+std::string_view GadgetOutput::service() noexcept {
+  std::array<std::uint8_t, 16> message;
+  const ssize_t got = ::recv(link_.get(), message.data(), message.size(), MSG_DONTWAIT);
+  lost_ = lost_ || got == 0;
+  return got > 0 ? news_text(static_cast<GadgetNews>(message[0])) : std::string_view();
+}
+
+void GadgetOutput::add_to(std::vector<DeadManDevice>& devices) const {
+  devices.push_back({link_.get(), {neutral(face_)}, {}});
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,266 @@
+#include "host/output/gadget_tree.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include "host/config_error.h"
+#include "host/os/unique_fd.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr const char* kEnglish = "strings/0x409";
+constexpr const char* kConfiguration = "configs/c.1";
+
+// bmAttributes and bMaxPower (USB 2.0, table 9-10): what a port gives at most, or next to nothing.
+constexpr int kBusPowered = 0x80;
+constexpr int kSelfPowered = 0xc0;
+constexpr int kMostFromBus_mA = 500;
+constexpr int kLeastFromBus_mA = 2;
+
+std::string hex(std::uint16_t number) { return fmt::format("0x{:04x}", number); }
+
+std::optional<std::uint16_t> parse_hex(std::string_view text) noexcept {
+  if (text.starts_with("0x")) text.remove_prefix(2);
+  std::uint16_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, 16);
+  if (error != std::errc() || end != text.data() + text.size()) return {};
+  return number;
+}
+
+int errno_of(bool done) { return done ? 0 : errno; }
+
+}  // namespace
+
+int GadgetFiles::make_folder(const std::string& path) {
+  return errno_of(::mkdir(path.c_str(), 0755) == 0);
+}
+
+int GadgetFiles::remove_folder(const std::string& path) {
+  return errno_of(::rmdir(path.c_str()) == 0);
+}
+
+int GadgetFiles::write(const std::string& path, std::string_view bytes) {
+  const UniqueFd file(::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW));
+  if (!file) return errno;
+  const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
+  if (written < 0) return errno;
+  return static_cast<std::size_t>(written) == bytes.size() ? 0 : EIO;
+}
+
+int GadgetFiles::link(const std::string& target, const std::string& path) {
+  return errno_of(::symlink(target.c_str(), path.c_str()) == 0);
+}
+
+int GadgetFiles::unlink(const std::string& path) { return errno_of(::unlink(path.c_str()) == 0); }
+
+std::vector<std::string> GadgetFiles::list(const std::string& path) const {
+  std::vector<std::string> names;
+  std::error_code none;
+  std::filesystem::directory_iterator at(path, none);
+  for (; !none && at != std::filesystem::directory_iterator(); at.increment(none))
+    names.push_back(at->path().filename().string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+bool GadgetFiles::exists(const std::string& path) const {
+  return ::access(path.c_str(), F_OK) == 0;
+}
+
+std::string GadgetFiles::line(const std::string& path) const {
+  const UniqueFd file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  std::array<char, 255> bytes;
+  const ssize_t got = file ? ::read(file.get(), bytes.data(), bytes.size()) : -1;
+  if (got <= 0) return {};
+  const std::string_view text(bytes.data(), static_cast<std::size_t>(got));
+  std::string line(text.substr(0, text.find('\n')));
+  for (char& c : line) {
+    if (std::isprint(static_cast<unsigned char>(c)) == 0) c = '?';
+  }
+  return line;
+}
+
+std::optional<std::string> GadgetFound::name() const {
+  if (!folder.starts_with(kGadgetPrefix)) return {};
+  return folder.substr(kGadgetPrefix.size());
+}
+
+GadgetTree::GadgetTree(GadgetFiles& files, std::string root)
+    : files_(files), root_(std::move(root)) {}
+
+std::string GadgetTree::path(std::string_view name) const {
+  check_gadget_name(name);
+  return fmt::format("{}/{}{}", root_, kGadgetPrefix, name);
+}
+
+std::string GadgetTree::function(std::string_view name, GadgetFace face) const {
+  return fmt::format("{}/functions/hid.{}", path(name), face_name(face));
+}
+
+GadgetFound GadgetTree::look(const std::string& folder) const {
+  const std::string gadget = root_ + "/" + folder;
+  GadgetFound found;
+  found.folder = folder;
+  found.udc = files_.line(gadget + "/UDC");
+  found.serial = files_.line(fmt::format("{}/{}/serialnumber", gadget, kEnglish));
+  found.id.vendor = parse_hex(files_.line(gadget + "/idVendor")).value_or(0);
+  found.id.product = parse_hex(files_.line(gadget + "/idProduct")).value_or(0);
+  found.self_powered =
+      parse_hex(files_.line(fmt::format("{}/{}/bmAttributes", gadget, kConfiguration))) ==
+      kSelfPowered;
+  for (const std::string& function : files_.list(gadget + "/functions")) {
+    if (!function.starts_with("hid.")) continue;
+    const std::optional<GadgetFace> face = face_of(std::string_view(function).substr(4));
+    if (!face) continue;
+    found.face = face;
+    found.whole = !found.udc.empty() &&
+                  files_.exists(fmt::format("{}/{}/{}", gadget, kConfiguration, function));
+  }
+  return found;
+}
+
+std::vector<GadgetFound> GadgetTree::all() const {
+  std::vector<GadgetFound> gadgets;
+  for (const std::string& folder : files_.list(root_)) gadgets.push_back(look(folder));
+  return gadgets;
+}
+
+std::optional<GadgetFound> GadgetTree::find(std::string_view name) const {
+  const std::string gadget = path(name);
+  if (!files_.exists(gadget)) return {};
+  return look(gadget.substr(root_.size() + 1));
+}
+
+void GadgetTree::need(int error, const std::string& what) const {
+  if (error == 0) return;
+  const char* remedy = "look for the cause with: sudo dmesg | tail";
+  if (error == EACCES || error == EPERM) remedy = "run it as root: sudo tagwrench gadget up";
+  if (error == ENOENT && what.find("/functions/") != std::string::npos)
+    remedy = "this kernel has no HID function (CONFIG_USB_CONFIGFS_F_HID): sudo modprobe usb_f_hid";
+  if (error == EBUSY && what.ends_with("/UDC"))
+    remedy = "something else has taken the controller; see: tagwrench gadget status";
+  throw ConfigError(fmt::format("gadget {}: {}; {}", what, std::strerror(error), remedy));
+}
+
+void GadgetTree::make(const GadgetSpec& spec) {
+  const std::string gadget = path(spec.name);
+  const std::string function = GadgetTree::function(spec.name, spec.face);
+  const std::string texts = fmt::format("{}/{}", gadget, kEnglish);
+  const std::string configuration = fmt::format("{}/{}", gadget, kConfiguration);
+  const auto folder = [this](const std::string& at) { need(files_.make_folder(at), at); };
+  const auto set = [this](const std::string& at, std::string_view value) {
+    need(files_.write(at, value), at);
+  };
+
+  folder(gadget);
+  set(gadget + "/idVendor", hex(spec.id.vendor));
+  set(gadget + "/idProduct", hex(spec.id.product));
+  set(gadget + "/bcdDevice", "0x0100");
+  set(gadget + "/bcdUSB", "0x0200");
+  folder(texts);
+  set(texts + "/manufacturer", kGadgetManufacturer);
+  set(texts + "/product", face_product(spec.face));
+  set(texts + "/serialnumber", fmt::format("{}{}", kGadgetPrefix, spec.name));
+
+  folder(function);
+  set(function + "/protocol", "0");
+  set(function + "/subclass", "0");
+  // What the other computer sends then comes by its control pipe, which never makes it wait for a
+  // bridge that is not there. Older kernels have the other way only.
+  if (const std::string pipe = function + "/no_out_endpoint"; files_.exists(pipe)) set(pipe, "1");
+  set(function + "/report_length", std::to_string(face_report_length(spec.face)));
+  const std::vector<std::uint8_t> descriptor = face_descriptor(spec.face);
+  set(function + "/report_desc",
+      {reinterpret_cast<const char*>(descriptor.data()), descriptor.size()});
+
+  folder(configuration);
+  set(configuration + "/bmAttributes",
+      std::to_string(spec.self_powered ? kSelfPowered : kBusPowered));
+  set(configuration + "/MaxPower",
+      std::to_string(spec.self_powered ? kLeastFromBus_mA : kMostFromBus_mA));
+  folder(configuration + "/strings/0x409");
+  set(configuration + "/strings/0x409/configuration", face_product(spec.face));
+  const std::string member = fmt::format("{}/hid.{}", configuration, face_name(spec.face));
+  need(files_.link(function, member), member);
+  set(gadget + "/UDC", spec.udc);
+}
+
+void GadgetTree::up(const GadgetSpec& spec) {
+  down(spec.name);
+  try {
+    make(spec);
+  } catch (const ConfigError&) {
+    remove(path(spec.name));
+    throw;
+  }
+}
+
+/// In the order that configfs demands: from the leaves to the root. Goes on after a failure; the
+/// first one is returned.
+int GadgetTree::remove(const std::string& gadget) {
+  int failed = 0;
+  const auto note = [&failed](int error) {
+    if (failed == 0 && error != ENOENT) failed = error;
+  };
+  if (!files_.line(gadget + "/UDC").empty()) note(files_.write(gadget + "/UDC", "\n"));
+  const std::string configurations = gadget + "/configs";
+  for (const std::string& configuration : files_.list(configurations)) {
+    const std::string folder = configurations + "/" + configuration;
+    for (const std::string& member : files_.list(folder)) {
+      const std::string link = folder + "/" + member;
+      if (std::filesystem::is_symlink(link)) note(files_.unlink(link));
+    }
+    for (const std::string& language : files_.list(folder + "/strings"))
+      note(files_.remove_folder(folder + "/strings/" + language));
+    note(files_.remove_folder(folder));
+  }
+  for (const std::string& function : files_.list(gadget + "/functions"))
+    note(files_.remove_folder(gadget + "/functions/" + function));
+  for (const std::string& language : files_.list(gadget + "/strings"))
+    note(files_.remove_folder(gadget + "/strings/" + language));
+  note(files_.remove_folder(gadget));
+  return failed;
+}
+
+void GadgetTree::down(std::string_view name) {
+  const std::string gadget = path(name);
+  if (!files_.exists(gadget)) return;
+  if (const int error = remove(gadget); error != 0 && files_.exists(gadget)) {
+    const bool denied = error == EACCES || error == EPERM;
+    throw ConfigError(fmt::format(
+        "gadget {}: cannot be taken away: {}; {}", gadget, std::strerror(error),
+        denied ? "run it as root: sudo tagwrench gadget down" : "end what uses it and try again"));
+  }
+}
+
+void check_gadget_name(std::string_view name) {
+  const bool usable = !name.empty() && name.size() <= 32 &&
+                      std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                        return std::isalnum(c) != 0 || c == '-' || c == '_';
+                      });
+  if (usable) return;
+  throw ConfigError(
+      fmt::format("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name));
+}
+
+std::optional<UsbId> parse_usb_id(std::string_view text) noexcept {
+  if (text.size() != 9 || text[4] != ':' || text.find('x') != text.npos) return {};
+  const auto vendor = parse_hex(text.substr(0, 4));
+  const auto product = parse_hex(text.substr(5));
+  if (!vendor || !product) return {};
+  return UsbId{*vendor, *product};
+}
+
+}  // namespace tagwrench

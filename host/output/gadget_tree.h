@@ -1,0 +1,101 @@
+// A USB gadget of ours in configfs (Linux Documentation/usb/gadget_configfs.rst): made step by
+// step, taken away step by step, found again after a crash.
+//
+// All gadgets of ours are named tagwrench-NAME, and nothing outside of such a folder is ever
+// written. Its one function is named after the face: hid.spacemouse or hid.wrench.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/output/gadget_face.h"
+
+namespace tagwrench {
+
+inline constexpr std::string_view kGadgetPrefix = "tagwrench-";
+
+/// The file system as gadgets need it. Paths are absolute; numbers returned are 0 or an errno.
+class GadgetFiles {
+ public:
+  GadgetFiles() = default;
+  GadgetFiles(const GadgetFiles&) = delete;
+  GadgetFiles& operator=(const GadgetFiles&) = delete;
+  virtual ~GadgetFiles() = default;
+
+  virtual int make_folder(const std::string& path);
+  virtual int remove_folder(const std::string& path);
+  /// In one write(), as attributes want it.
+  virtual int write(const std::string& path, std::string_view bytes);
+  virtual int link(const std::string& target, const std::string& path);
+  virtual int unlink(const std::string& path);
+
+  /// Names, sorted; none if there is no such folder.
+  std::vector<std::string> list(const std::string& path) const;
+  bool exists(const std::string& path) const;
+  /// The first line, at most 255 printable characters: whoever wrote it, it can be shown. Empty if
+  /// it cannot be read.
+  std::string line(const std::string& path) const;
+};
+
+struct GadgetSpec {
+  std::string name;  ///< of the sensor; the gadget and its serial number are tagwrench-NAME
+  GadgetFace face = GadgetFace::spacemouse;
+  UsbId id;
+  bool self_powered = false;  ///< the board has a supply of its own
+  std::string udc;            ///< the controller
+};
+
+/// What configfs tells of a gadget.
+struct GadgetFound {
+  std::string folder;  ///< "tagwrench-sensor", or whatever another's is called
+  std::optional<GadgetFace> face;
+  UsbId id;
+  std::string serial;
+  std::string udc;  ///< empty: bound to none
+  bool self_powered = false;
+  bool whole = false;  ///< and bound
+
+  /// Ours: the name without the prefix.
+  std::optional<std::string> name() const;
+};
+
+class GadgetTree {
+ public:
+  /// `root` is configfs's usb_gadget folder. Borrows `files`.
+  GadgetTree(GadgetFiles& files, std::string root);
+
+  std::vector<GadgetFound> all() const;
+  /// Ours of this name, half made or whole.
+  std::optional<GadgetFound> find(std::string_view name) const;
+  /// Where its HID function is; the attribute `dev` there names the character device.
+  std::string function(std::string_view name, GadgetFace face) const;
+
+  /// Makes it and binds it to its controller; what is left over of an earlier one goes first.
+  /// Throws ConfigError, and then nothing of it is left.
+  void up(const GadgetSpec& spec);
+
+  /// Takes it away, whole or half made; done if it is not there. Throws ConfigError if something
+  /// stays.
+  void down(std::string_view name);
+
+ private:
+  std::string path(std::string_view name) const;
+  void make(const GadgetSpec& spec);
+  int remove(const std::string& gadget);
+  void need(int error, const std::string& what) const;
+  GadgetFound look(const std::string& folder) const;
+
+  GadgetFiles& files_;
+  std::string root_;
+};
+
+/// Throws ConfigError unless it can be the name of a sensor: 1 to 32 letters, digits, - and _.
+void check_gadget_name(std::string_view name);
+
+/// "256f:c62e"
+std::optional<UsbId> parse_usb_id(std::string_view text) noexcept;
+
+}  // namespace tagwrench

@@ -1,0 +1,37 @@
+// `tagwrench gadget`: this computer as a USB device of another one.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "host/output/gadget_kernel.h"
+#include "host/output/gadget_tree.h"
+
+namespace tagwrench {
+
+/// Declares itself on the command line; must outlive the parsing.
+class GadgetCommand {
+ public:
+  explicit GadgetCommand(CLI::App& app);
+
+  bool parsed() const { return verb_->parsed(); }
+  /// Returns the exit status. Throws ConfigError with what is missing.
+  int run() const;
+
+ private:
+  void up() const;
+  void down() const;
+  void status() const;
+
+  CLI::App* verb_;
+  CLI::App* up_;
+  CLI::App* down_;
+  KernelPlaces places_;
+  std::string name_ = "sensor";
+  std::string face_ = "spacemouse";
+  std::string id_;
+  std::string udc_;
+  bool self_powered_ = false;
+};
+
+}  // namespace tagwrench
