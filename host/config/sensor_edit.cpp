@@ -219,6 +219,32 @@ std::string with_keys(std::string_view yaml, const SectionEdit& edit, const std:
   return apply(yaml, std::move(replacements));
 }
 
+std::string with_value(std::string_view yaml, const std::vector<std::string>& path,
+                       const std::string& value, const std::string& name) {
+  const YamlDocument document = yaml_spans(yaml, name);
+  if (document.root.kind != YamlNode::Kind::mapping)
+    throw ConfigError(
+        fmt::format("{}: expected 'key: value' lines at the top level, found none", name));
+  const YamlNode* mapping = &document.root;
+  for (std::size_t depth = 0; depth < path.size(); ++depth) {
+    const std::size_t at = find_value(*mapping, path[depth]);
+    const bool last = depth + 1 == path.size();
+    const bool deeper = at > 0 && !last && mapping->children[at].kind == YamlNode::Kind::mapping &&
+                        !mapping->children[at].children.empty();
+    if (deeper) {
+      mapping = &mapping->children[at];
+      continue;
+    }
+    std::string rest = value;
+    for (std::size_t i = path.size() - 1; i > depth; --i)
+      rest = fmt::format("{{{}: {}}}", path[i], rest);
+    if (at > 0) return apply(yaml, {replacement(yaml, *mapping, at, rest)});
+    const YamlEntry entry{path[depth], rest};
+    return apply(yaml, {addition(yaml, *mapping, {&entry})});
+  }
+  return std::string(yaml);
+}
+
 void check_replaceable(const fs::path& path) {
   const fs::path real = resolved(path);
   std::error_code error;

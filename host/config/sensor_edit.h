@@ -28,6 +28,12 @@ struct SectionEdit {
 /// naming `name`, if the text is not a YAML mapping or the section is no mapping.
 std::string with_keys(std::string_view yaml, const SectionEdit& edit, const std::string& name);
 
+/// `yaml` with `value`, in flow notation, at a key below the keys of others; mappings that are
+/// missing are added, and a value that is no mapping but should be one is replaced. Throws as
+/// with_keys().
+std::string with_value(std::string_view yaml, const std::vector<std::string>& path,
+                       const std::string& value, const std::string& name);
+
 /// Throws ConfigError unless `path` (or what it links to) is a regular file that may be replaced,
 /// or a new name in a folder that can be written.
 void check_replaceable(const std::filesystem::path& path);

@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -52,19 +53,32 @@ bool somebody_listens(const sockaddr_un& address) {
 
 bool listens(const std::string& path) { return somebody_listens(address_of(path)); }
 
-ControlWish parse_wish(std::string_view text) noexcept {
+ControlWish parse_wish(std::string_view bytes) noexcept {
   using Kind = ControlWish::Kind;
-  const std::string_view wish = trimmed(text);
-  if (wish == "zero") return {Kind::zero, {}};
-  if (wish == "next") return {Kind::next_profile, {}};
-  if (wish == "status") return {Kind::status, {}};
-  constexpr std::string_view kProfile = "profile ";
-  if (wish.starts_with(kProfile)) return {Kind::profile, trimmed(wish.substr(kProfile.size()))};
-  return {Kind::unknown, wish};
+  const std::string_view wish = trimmed(bytes);
+  const std::size_t line_end = std::min(wish.find('\n'), wish.size());
+  const std::string_view line = wish.substr(0, line_end);
+  const std::string_view text = wish.substr(std::min(line_end + 1, wish.size()));
+  const std::size_t word_end = std::min(line.find(' '), line.size());
+  const std::string_view word = line.substr(0, word_end);
+  const std::string_view name = trimmed(line.substr(word_end));
+  if (word == "try" && !name.empty()) return {Kind::attempt, name, text};
+  if (!text.empty()) return {Kind::unknown, word};
+  if (word == "profile" && !name.empty()) return {Kind::profile, name};
+  if (word == "window") return {Kind::window, name};
+  if (word == "show") return {Kind::show, name};
+  if (!name.empty()) return {Kind::unknown, word};
+  if (word == "zero") return {Kind::zero};
+  if (word == "next") return {Kind::next_profile};
+  if (word == "status") return {Kind::status};
+  if (word == "live") return {Kind::live};
+  if (word == "keep") return {Kind::keep};
+  if (word == "revert") return {Kind::revert};
+  return {Kind::unknown, word};
 }
 
 ControlSocket::ControlSocket(std::string path)
-    : path_(std::move(path)), socket_(datagram_socket()) {
+    : path_(std::move(path)), socket_(datagram_socket()), wish_(kLongestWish) {
   const sockaddr_un address = address_of(path_);
   if (::bind(socket_.get(), generic(address), sizeof address) == 0) return;
   int error = errno;
@@ -94,32 +108,48 @@ ControlWish ControlSocket::next() noexcept {
   return parse_wish({wish_.data(), static_cast<std::size_t>(size)});
 }
 
-void ControlSocket::answer(std::string_view line) noexcept {
+std::string_view ControlSocket::asker() const noexcept {
+  if (asker_size_ <= sizeof(sa_family_t)) return {};
+  return {asker_.sun_path, std::min<std::size_t>(asker_size_, sizeof asker_) - sizeof(sa_family_t)};
+}
+
+void ControlSocket::answer(std::string_view text) noexcept {
   if (asker_size_ <= sizeof(sa_family_t)) return;  // he has no address
   // One who does not listen any more is not waited for.
   [[maybe_unused]] const ssize_t sent =
-      ::sendto(socket_.get(), line.data(), line.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+      ::sendto(socket_.get(), text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
                reinterpret_cast<const sockaddr*>(&asker_), asker_size_);
 }
 
-std::string ask(const std::string& path, std::string_view wish) {
-  const sockaddr_un address = address_of(path);
-  const UniqueFd socket = datagram_socket();
+ControlClient::ControlClient(const std::string& path) : path_(path), socket_(datagram_socket()) {
+  const sockaddr_un address = address_of(path_);
   const sa_family_t family = AF_UNIX;  // alone, it asks for a name of the kernel's choice
   sockaddr own{};
   own.sa_family = family;
-  if (::bind(socket.get(), &own, sizeof family) != 0 ||
-      ::connect(socket.get(), generic(address), sizeof address) != 0 ||
-      ::send(socket.get(), wish.data(), wish.size(), MSG_NOSIGNAL) < 0)
-    throw ConfigError(path + ": nobody listens (" + std::strerror(errno) +
-                      "); start `tagwrench run` first, as the same user");
-  pollfd waiting{socket.get(), POLLIN, 0};
-  std::array<char, 512> line{};
+  if (::bind(socket_.get(), &own, sizeof family) != 0 ||
+      ::connect(socket_.get(), generic(address), sizeof address) != 0)
+    fail();
+}
+
+void ControlClient::fail() const {
+  throw ConfigError(path_ + ": nobody listens (" + std::strerror(errno) +
+                    "); start `tagwrench run` first, as the same user");
+}
+
+std::string ControlClient::ask(std::string_view wish) {
+  if (::send(socket_.get(), wish.data(), wish.size(), MSG_NOSIGNAL) < 0) fail();
+  pollfd waiting{socket_.get(), POLLIN, 0};
+  std::string answer(ControlSocket::kLongestAnswer, '\0');
   const ssize_t size = ::poll(&waiting, 1, kPatience_ms) > 0
-                           ? ::recv(socket.get(), line.data(), line.size(), 0)
+                           ? ::recv(socket_.get(), answer.data(), answer.size(), 0)
                            : -1;
-  if (size < 0) throw ConfigError(path + ": no answer within 2 s; is `tagwrench run` stopped?");
-  return {line.data(), static_cast<std::size_t>(size)};
+  if (size < 0) throw ConfigError(path_ + ": no answer within 2 s; is `tagwrench run` stopped?");
+  answer.resize(static_cast<std::size_t>(size));
+  return answer;
+}
+
+std::string ask(const std::string& path, std::string_view wish) {
+  return ControlClient(path).ask(wish);
 }
 
 std::string control_path(const std::string& sensor) {

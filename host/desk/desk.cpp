@@ -1,6 +1,7 @@
 #include "host/desk/desk.h"
 
 #include <sys/epoll.h>
+#include <sys/timerfd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -35,15 +36,23 @@ Desk::Desk(ProfileFiles files, std::optional<ControlSocket> control,
       gestures_(gesture_options_),
       shaping_(profile().shaping),
       period_(period_of(profile().rate_hz)) {
-  if (!events_)
-    throw ConfigError(std::string("profiles: no epoll to be had: ") + std::strerror(errno) +
-                      "; end other programs");
   add(events_, files_.fd());
-  if (control_) add(events_, control_->fd());
-  if (focus_) add(events_, focus_->fd());
+  if (control_) {
+    lapse_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
+    add(events_, control_->fd());
+    add(events_, lapse_.get());
+  }
+  if (!events_ || (control_ && !lapse_))
+    throw ConfigError(std::string("profiles: no epoll or timer to be had: ") +
+                      std::strerror(errno) + "; end other programs");
+  if (focus_) {
+    add(events_, focus_->fd());
+    take_focus();  // what has come already wakes nobody
+  }
 }
 
 void Desk::shape(Sample& sample) noexcept {
+  if (last_program_) take_program();
   const GestureResult gesture = gestures_.feel(sample);
   if (gesture.hold_motion) {
     shaping_.suppress(sample);
@@ -54,12 +63,14 @@ void Desk::shape(Sample& sample) noexcept {
   if (gesture.command == GestureCommand::zero) zero_wanted_ = true;
   if (gesture.command == GestureCommand::next_profile)
     use((current_ + 1) % files_.profiles().size(), "by a gesture");
+  latest_ = {sample.status, sample.wrench, sample.motion, sample.buttons};
 }
 
 void Desk::service() noexcept {
   try {
     if (files_.fd() >= 0) take_files();
     if (control_) take_wishes();
+    if (trial_) take_lapse();
     if (focus_) take_focus();
   } catch (const std::exception&) {
     news_ = {};  // out of memory: unsaid, and what was in force stays
@@ -73,56 +84,35 @@ void Desk::take_files() {
   }
 }
 
-void Desk::take_wishes() {
-  while (true) {
-    const ControlWish wish = control_->next();
-    if (wish.kind == ControlWish::Kind::none) return;
-    control_->answer(granted(wish));
-  }
-}
-
-std::string Desk::granted(const ControlWish& wish) {
-  using Kind = ControlWish::Kind;
-  const std::vector<Profile>& all = files_.profiles();
-  switch (wish.kind) {
-    case Kind::none:
-      return {};
-    case Kind::zero:
-      zero_wanted_ = true;
-      return "ok: as soon as nobody touches the sensor\n";
-    case Kind::next_profile:
-      use((current_ + 1) % all.size(), "as asked");
-      return "ok: " + profile().name + "\n";
-    case Kind::profile: {
-      const auto found = std::find_if(all.begin(), all.end(),
-                                      [&](const Profile& p) { return p.name == wish.name; });
-      if (found != all.end()) {
-        use(static_cast<std::size_t>(found - all.begin()), "as asked");
-        return "ok: " + profile().name + "\n";
-      }
-      std::string known;
-      for (const Profile& p : all) known += (known.empty() ? "" : ", ") + p.name;
-      return "error: no profile '" + std::string(wish.name) + "'; there are " + known + "\n";
-    }
-    case Kind::status: {
-      std::string line = "ok: profile " + profile().name + " of";
-      for (const Profile& p : all) line += " " + p.name;
-      return line + "\n";
-    }
-    case Kind::unknown:
-      break;
-  }
-  return "error: wishes are zero, next, profile NAME and status\n";
-}
-
 /// A program that no profile is for gets the first one.
-void Desk::take_focus() {
-  const std::optional<std::string> program = focus_->changed();
-  if (!program) return;
+void Desk::use_for(std::string_view program) {
   const std::vector<Profile>& all = files_.profiles();
   const auto found =
-      std::find_if(all.begin(), all.end(), [&](const Profile& p) { return serves(p, *program); });
-  use(found == all.end() ? 0 : static_cast<std::size_t>(found - all.begin()), *program);
+      std::find_if(all.begin(), all.end(), [&](const Profile& p) { return serves(p, program); });
+  use(found == all.end() ? 0 : static_cast<std::size_t>(found - all.begin()), program);
+}
+
+void Desk::take_focus() {
+  const std::optional<Focus> focus = focus_->changed();
+  if (!focus) return;
+  focus_told_ = focus->told;
+  if (focus->ended) focus_.reset();  // or its descriptor would wake us for ever
+  if (focus_told_) {
+    use_for(focus->program);
+  } else if (!program_.empty()) {
+    use_for(program_);
+  }
+}
+
+void Desk::take_program() noexcept {
+  const std::string_view now = last_program_();
+  if (now == program_) return;
+  try {
+    program_ = now;
+    if (!focus_told_ && !program_.empty()) use_for(program_);
+  } catch (const std::exception&) {
+    return;  // out of memory: the profile stays
+  }
 }
 
 void Desk::use(std::size_t profile, std::string_view because) noexcept {
@@ -130,7 +120,8 @@ void Desk::use(std::size_t profile, std::string_view because) noexcept {
   current_ = profile;
   apply();
   try {
-    news_ = "profile: " + files_.profiles()[current_].name + " (" + std::string(because) + ")";
+    news_ = "profile: " + files_.profiles()[current_].name + " (" + std::string(because) + ")" +
+            (trial_ ? ", after `tagwrench tune`" : "");
   } catch (const std::exception&) {
     news_ = {};  // out of memory: unsaid
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 
 #include "host/desk/control_socket.h"
 #include "host/desk/focus_watch.h"
+#include "host/desk/live.h"
 #include "host/desk/profile_files.h"
 #include "host/os/unique_fd.h"
 #include "host/types.h"
@@ -26,6 +28,12 @@ class Desk {
   /// The first profile is in force until somebody says otherwise. Throws ConfigError if the system
   /// has no more descriptors.
   Desk(ProfileFiles files, std::optional<ControlSocket> control, std::optional<FocusWatch> focus);
+
+  /// Where the focus is not known, the program chooses that connected last: `last_program` gives
+  /// its name, empty if none is connected, and is asked with every sample.
+  void follow_programs(std::function<std::string_view()> last_program) {
+    last_program_ = std::move(last_program);
+  }
 
   /// Fills sample.motion, and adds what gestures press to sample.buttons. No heap, unless a gesture
   /// changes the profile.
@@ -47,25 +55,56 @@ class Desk {
   /// Changed files, wishes, the focus.
   void service() noexcept;
 
-  const Profile& profile() const noexcept { return files_.profiles()[current_]; }
+  /// In force: the one on trial, else the one chosen.
+  const Profile& profile() const noexcept {
+    return trial_ ? trial_->profile : files_.profiles()[current_];
+  }
 
  private:
+  /// What somebody tries who tunes a profile. It ends when he does not ask for a while: he is gone.
+  struct Trial {
+    std::size_t of = 0;  ///< the profile that it stands for
+    Profile profile;
+    std::string owner;  ///< ControlSocket::asker()
+  };
+
   void use(std::size_t profile, std::string_view because) noexcept;
+  void use_for(std::string_view program);
   void apply() noexcept;
   void take_files();
   void take_wishes();
   void take_focus();
+  void take_program() noexcept;
+  void take_lapse();
   std::string granted(const ControlWish& wish);
+  std::string choose(std::string_view name);
+  std::string window(std::string_view program);
+  std::string live() const;
+  std::string show(std::string_view name) const;
+  std::string attempt(const ControlWish& wish);
+  std::string keep();
+  std::string revert();
+  std::optional<std::size_t> find(std::string_view name) const noexcept;
+  std::string unknown(std::string_view name) const;
+  bool asker_tries() const noexcept;
+  void extend_trial() noexcept;
+  void end_trial() noexcept;
 
   ProfileFiles files_;
   std::optional<ControlSocket> control_;
   std::optional<FocusWatch> focus_;
-  UniqueFd events_;  ///< epoll of the three
+  UniqueFd lapse_;   ///< timer: a trial's end
+  UniqueFd events_;  ///< epoll of them all
   std::size_t current_ = 0;
+  std::optional<Trial> trial_;
   GestureOptions gesture_options_;
   Gestures gestures_;
   Shaping shaping_;
   Duration period_{};
+  bool focus_told_ = false;
+  std::function<std::string_view()> last_program_;
+  std::string program_;  ///< the last that it gave
+  LiveReading latest_;
   bool zero_wanted_ = false;
   std::string news_;
 };

@@ -1,5 +1,6 @@
-// Which program has the focus, as an X11 window manager tells (Extended Window Manager Hints 1.5,
-// _NET_ACTIVE_WINDOW; ICCCM 4.1.2.5, WM_CLASS). Wayland tells nobody.
+// Which program has the focus, where the desktop tells: window managers of X11, i3, sway, KDE.
+// Other Wayland desktops tell nobody but their own extensions, and those may say it by `tagwrench
+// control window`.
 #pragma once
 
 #include <memory>
@@ -8,26 +9,35 @@
 
 namespace tagwrench {
 
+class FocusSource;
+
+/// What is said of the focus.
+struct Focus {
+  bool told = false;      ///< false: nobody knows which window has it
+  std::string program{};  ///< the class or the application id of that window, in lower case; empty
+                          ///< if it has none
+  bool ended = false;     ///< nothing will ever be said any more
+};
+
 class FocusWatch {
  public:
-  /// Of the display that $DISPLAY names; nothing if there is none.
+  /// Of the desktop that $SWAYSOCK, $I3SOCK, the session's D-Bus or $DISPLAY lead to, the first
+  /// that answers; nothing if there is none.
   static std::optional<FocusWatch> open();
 
   FocusWatch(FocusWatch&&) noexcept;
-  FocusWatch& operator=(FocusWatch&&) = delete;
+  FocusWatch& operator=(FocusWatch&&) noexcept;
   ~FocusWatch();
 
   /// Readable when changed() has something to do.
   int fd() const noexcept;
-  /// The class of the window that got the focus since the last call, in lower case; empty for one
-  /// without a class. Nothing: it is where it was, or nobody tells any more.
-  std::optional<std::string> changed() noexcept;
+  /// What is new since the last call; nothing: it is where it was.
+  std::optional<Focus> changed() noexcept;
 
  private:
-  struct Connection;
-  explicit FocusWatch(std::unique_ptr<Connection> connection);
+  explicit FocusWatch(std::unique_ptr<FocusSource> source);
 
-  std::unique_ptr<Connection> connection_;
+  std::unique_ptr<FocusSource> source_;
 };
 
 }  // namespace tagwrench

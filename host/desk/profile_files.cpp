@@ -101,11 +101,24 @@ void ProfileFiles::watch() {
                       "; raise fs.inotify.max_user_watches, or take ready-made ones");
 }
 
+std::string ProfileFiles::file_of(std::size_t profile) const {
+  for (const File& file : files_) {
+    if (file.profile == profile) return file.folder + "/" + file.name;
+  }
+  return {};
+}
+
+Profile ProfileFiles::parse(const std::string& text, std::size_t profile) const {
+  const std::string file = file_of(profile);
+  return parse_profile(text, file.empty() ? profiles_[profile].name : file, defaults_);
+}
+
 std::vector<ProfileFiles::Change> ProfileFiles::reread() {
   std::array<char, 4096> events;
-  while (::read(watch_.get(), events.data(), events.size()) > 0) {
-  }
+  bool any = false;
+  while (::read(watch_.get(), events.data(), events.size()) > 0) any = true;
   std::vector<Change> changes;
+  if (!any) return changes;
   for (File& file : files_) {
     if (std::optional<Change> change = look_again(file)) changes.push_back(std::move(*change));
   }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/config/profile_config.h"
@@ -20,6 +21,13 @@ class ProfileFiles {
 
   /// At least one.
   const std::vector<Profile>& profiles() const noexcept { return profiles_; }
+  /// Where a profile is on disk; empty if it is not.
+  std::string file_of(std::size_t profile) const;
+  /// What a text says that would stand in a profile's place. Throws ConfigError: the first fault.
+  Profile parse(const std::string& text, std::size_t profile) const;
+  /// Until its file is saved again.
+  void replace(std::size_t profile, Profile by) { profiles_[profile] = std::move(by); }
+
   /// Readable when a file may have changed; -1: none is on disk.
   int fd() const noexcept { return watch_.get(); }
 
@@ -28,7 +36,7 @@ class ProfileFiles {
         profile;       ///< that is new; none: the file is wrong, the earlier stays
     std::string line;  ///< for people
   };
-  /// Reads again what has changed. A file that is gone leaves what it said.
+  /// Reads again what has changed, if fd() is readable. A file that is gone leaves what it said.
   std::vector<Change> reread();
 
  private:

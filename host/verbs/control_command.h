@@ -20,8 +20,10 @@ class ControlCommand {
   CLI::App* zero_;
   CLI::App* next_;
   CLI::App* profile_;
+  CLI::App* window_;
   std::string name_ = "sensor";
   std::string profile_name_;
+  std::string program_;
 };
 
 }  // namespace tagwrench

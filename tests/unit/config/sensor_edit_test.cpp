@@ -194,5 +194,27 @@ TEST_F(SensorFile, IsCheckedBeforeTheWork) {
   EXPECT_THROW(read_text(folder_), ConfigError);
 }
 
+TEST(WithValue, IsPutWhereItsKeysLeadAndAllElseStays) {
+  const std::string yaml =
+      "# mine\ntranslation: 1   # times\naxes:\n  x: {full_scale_n: 0.5}   # light\nlock: none\n";
+  const auto with = [&](const std::vector<std::string>& path) {
+    return with_value(yaml, path, "2", "mine.yaml");
+  };
+  const auto replaced = [&](const std::string& old, const std::string& by) {
+    std::string text = yaml;
+    return text.replace(text.find(old), old.size(), by);
+  };
+  EXPECT_EQ(with({"translation"}), replaced("translation: 1", "translation: 2"));
+  EXPECT_EQ(with({"rotation"}), yaml + "rotation: 2\n");
+  EXPECT_EQ(with({"axes", "x", "full_scale_n"}), replaced("0.5", "2"));
+  EXPECT_EQ(with({"axes", "x", "limit"}), replaced("0.5}", "0.5, limit: 2}"));
+  EXPECT_EQ(with({"axes", "y", "limit"}), replaced("lock", "  y: {limit: 2}\nlock"));
+  EXPECT_EQ(with({"gestures", "press_ms"}), yaml + "gestures: {press_ms: 2}\n");
+  EXPECT_EQ(with({"lock", "deep", "er"}), replaced("none", "{deep: {er: 2}}"))
+      << "what should be a mapping becomes one";
+  EXPECT_EQ(with_value("{a: {}}", {"a", "b"}, "2", "mine.yaml"), "{a: {b: 2}}");
+  EXPECT_THROW(with_value("- 1\n", {"a"}, "2", "mine.yaml"), ConfigError);
+}
+
 }  // namespace
 }  // namespace tagwrench

@@ -20,7 +20,18 @@ TEST(ControlWishText, IsReadWithBlanksAroundItsWords) {
   EXPECT_EQ(parse_wish("status").kind, Kind::status);
   EXPECT_EQ(parse_wish("profile  my game ").kind, Kind::profile);
   EXPECT_EQ(parse_wish("profile  my game ").name, "my game");
-  for (const char* nonsense : {"", " ", "zer", "zero 1", "profile", "Profile x"})
+  EXPECT_EQ(parse_wish("window Org.Blender ").name, "Org.Blender");
+  EXPECT_EQ(parse_wish("window").kind, Kind::window);
+  EXPECT_EQ(parse_wish("show").kind, Kind::show);
+  EXPECT_EQ(parse_wish("live").kind, Kind::live);
+  EXPECT_EQ(parse_wish("keep").kind, Kind::keep);
+  EXPECT_EQ(parse_wish("revert").kind, Kind::revert);
+  const ControlWish attempt = parse_wish("try my game\nlock: none\n# end\n");
+  EXPECT_EQ(attempt.kind, Kind::attempt);
+  EXPECT_EQ(attempt.name, "my game");
+  EXPECT_EQ(attempt.text, "lock: none\n# end");
+  for (const char* nonsense : {"", " ", "zer", "zero 1", "profile", "Profile x", "try", "try\nx: 1",
+                               "live now", "profile a\nb", "next\n\nx"})
     EXPECT_EQ(parse_wish(nonsense).kind, Kind::unknown) << nonsense;
 }
 

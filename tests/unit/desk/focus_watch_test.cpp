@@ -12,6 +12,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "host/desk/desk.h"
 #include "host/os/unique_fd.h"
@@ -23,6 +24,9 @@ namespace {
 class Focus : public testing::Test {
  protected:
   void SetUp() override {
+    // Not the desktop of whoever runs this.
+    for (const char* other : {"SWAYSOCK", "I3SOCK", "WAYLAND_DISPLAY"}) ::unsetenv(other);
+    ::setenv("DBUS_SESSION_BUS_ADDRESS", "unix:path=/nowhere", 1);
     int ends[2];
     ASSERT_EQ(::pipe(ends), 0);
     const UniqueFd said(ends[0]);
@@ -72,7 +76,7 @@ class Focus : public testing::Test {
   }
   static std::string next(FocusWatch& watch) {
     for (pollfd waiting{watch.fd(), POLLIN, 0}; ::poll(&waiting, 1, 10'000) == 1;) {
-      if (const auto name = watch.changed()) return *name;
+      if (const auto focus = watch.changed()) return focus->told ? focus->program : "unknown";
     }
     return "nothing";
   }
@@ -123,6 +127,34 @@ TEST_F(Focus, AWindowThatIsGoneHasNoClass) {
   ASSERT_TRUE(watch);
   focus(gone);
   EXPECT_EQ(next(*watch), "");
+}
+
+TEST_F(Focus, BesideWaylandNoWindowOfX11MeansOneOfWayland) {
+  using std::string_literals::operator""s;
+  ::setenv("WAYLAND_DISPLAY", "wayland-0", 1);
+  auto watch = FocusWatch::open();
+  ::unsetenv("WAYLAND_DISPLAY");
+  ASSERT_TRUE(watch);
+  const xcb_window_t cad = window("freecad\0FreeCAD\0"s);
+  focus(cad);
+  EXPECT_EQ(next(*watch), "freecad");
+  focus(XCB_WINDOW_NONE);
+  EXPECT_EQ(next(*watch), "unknown");
+  focus(cad);
+  EXPECT_EQ(next(*watch), "freecad");
+}
+
+TEST_F(Focus, AnXServerThatEndsDoesNotKeepTheDeskAwake) {
+  const SensorConfig sensor = parse_sensor(sim::sensor_yaml(sim::Scenario{}), "the test's sensor");
+  Desk desk(ProfileFiles({"game", "cad"}, sensor), {}, FocusWatch::open());
+  xcb_disconnect(std::exchange(x_, nullptr));
+  ::kill(server_, SIGKILL);
+  ::waitpid(std::exchange(server_, -1), nullptr, 0);
+  pollfd waiting{desk.poll_fd(), POLLIN, 0};
+  ASSERT_EQ(::poll(&waiting, 1, 10'000), 1);
+  desk.service();
+  desk.service();  // the first has taken what was said before the end
+  EXPECT_EQ(::poll(&waiting, 1, 0), 0) << "it would spin";
 }
 
 TEST_F(Focus, WithoutAnXServerThereIsNone) {
