@@ -45,6 +45,10 @@ bool decode_plain(std::span<const std::uint8_t> text, std::uint32_t white,
 bool decode_binary(std::span<const std::uint8_t> data, std::uint32_t white,
                    std::vector<std::uint8_t>& grey) {
   const bool wide = white > 255;
+  if (white == 255 && data.size() >= grey.size()) {
+    std::copy_n(data.begin(), grey.size(), grey.begin());
+    return true;
+  }
   if (data.size() / (wide ? 2 : 1) < grey.size()) return false;
   for (std::size_t i = 0; i < grey.size(); ++i) {
     const std::uint32_t count =

@@ -1,0 +1,74 @@
+// Both ends of the spnav socket within the benchmark: its keeper, and a program that reads events.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "host/os/unique_fd.h"
+#include "host/output/spnav_keeper.h"
+#include "host/types.h"
+
+namespace tagwrench::bench {
+
+/// A folder that goes with its contents.
+class HidFolder {
+ public:
+  HidFolder();
+  ~HidFolder();
+  HidFolder(const HidFolder&) = delete;
+  HidFolder& operator=(const HidFolder&) = delete;
+  std::string file(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+/// The keeper, in a thread instead of a process.
+class HidKeeper {
+ public:
+  explicit HidKeeper(const std::string& path);
+  ~HidKeeper();
+  HidKeeper(const HidKeeper&) = delete;
+  HidKeeper& operator=(const HidKeeper&) = delete;
+  double cpu_seconds() const;  ///< so far
+
+ private:
+  UniqueFd stop_;
+  UniqueFd stopped_;
+  std::optional<SpnavKeeper> keeper_;
+  std::thread thread_;
+};
+
+struct SpnavEvent {
+  TimePoint time{};
+  std::array<std::int32_t, 6> motion{};
+  bool zero() const { return motion == std::array<std::int32_t, 6>{}; }
+};
+
+/// Connects as libspnav does, version 1 of the protocol.
+UniqueFd connect_as_program(const std::string& path);
+
+/// Reads motion events until the keeper ends.
+class SpnavListener {
+ public:
+  explicit SpnavListener(const std::string& path);
+  ~SpnavListener();
+  SpnavListener(const SpnavListener&) = delete;
+  SpnavListener& operator=(const SpnavListener&) = delete;
+  /// What has come so far; ends the listening.
+  const std::vector<SpnavEvent>& events();
+
+ private:
+  void listen();
+
+  UniqueFd socket_;
+  std::vector<SpnavEvent> events_;
+  std::thread thread_;
+};
+
+}  // namespace tagwrench::bench
