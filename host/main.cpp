@@ -23,11 +23,14 @@
 #include "host/verbs/design_command.h"
 #include "host/verbs/doctor_command.h"
 #include "host/verbs/export_command.h"
+#include "host/verbs/gadget_command.h"
+#include "host/verbs/manual_command.h"
 #include "host/verbs/read_command.h"
 #include "host/verbs/record_command.h"
 #include "host/verbs/run_command.h"
 #include "host/verbs/spnav_command.h"
 #include "host/verbs/tags_command.h"
+#include "host/verbs/tune_command.h"
 #include "host/verbs/zero_command.h"
 
 namespace {
@@ -51,6 +54,8 @@ constexpr const char* kOutputs =
     "  wrench                        HID force-torque sensor in N and N m\n"
     "  joystick                      six-axis joystick for games\n"
     "  spnav[:PATH]                  the socket of libspnav programs, without any device\n"
+    "  gadget[:spacemouse|:wrench]   a USB device of another computer, after `tagwrench gadget "
+    "up`\n"
     "  reference:FILE                as csv, beside the load cells of --board at the same time\n"
     "Without it: terminal, and every device that this machine allows";
 
@@ -63,7 +68,8 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
     words += " " + reached->get_name();
   }
   std::string verbs;
-  for (const CLI::App* verb : reached->get_subcommands([](const CLI::App*) { return true; }))
+  for (const CLI::App* verb :
+       reached->get_subcommands([](const CLI::App* verb) { return !verb->get_group().empty(); }))
     verbs += (verbs.empty() ? "" : ", ") + verb->get_name();
   const std::vector<std::string> rest = reached->remaining();
   if (verbs.empty() || (!rest.empty() && rest[0][0] == '-'))
@@ -92,7 +98,9 @@ int dispatch(int argc, char** argv) {
 
   tagwrench::RunOptions run_options;
   CLI::App* run = app.add_subcommand("run", "track the tags, compute the wrench, feed the outputs");
-  run->add_option("--sensor", run_options.sensor, "sensor.yaml of this sensor");
+  run->add_option("--sensor", run_options.sensor,
+                  "sensor.yaml of this sensor; without it, for a camera, the one "
+                  "in\n~/.config/tagwrench if it is there");
   run->add_option("--source", run_options.source, kSources);
   run->add_option("--output", run_options.outputs, kOutputs);
   run->add_option("--profile", run_options.profiles,
@@ -107,6 +115,8 @@ int dispatch(int argc, char** argv) {
   run->add_option("--seconds", run_options.seconds, "end after S seconds")->check(duration);
   run->add_flag("--fast", run_options.fast,
                 "sources that are not live run as fast as they can, no frame dropped");
+  run->add_flag("--wait", run_options.wait,
+                "for the camera, if it is not there: what a service wants");
   run->add_flag("--no-zero-tracking", run_options.no_zero_tracking,
                 "the zero does not follow what reads while nobody touches the sensor");
   run->add_option("--board", run_options.board,
@@ -141,8 +151,11 @@ int dispatch(int argc, char** argv) {
   tagwrench::DesignCommand design(app);
 
   tagwrench::ControlCommand control(app);
+  tagwrench::TuneCommand tune(app);
   tagwrench::SpnavCommand spnav(app);
+  tagwrench::GadgetCommand gadget(app);
   tagwrench::DoctorCommand doctor(app, duration);
+  tagwrench::ManualCommand manual(app);
 
   try {
     app.parse(argc, argv);
@@ -166,8 +179,11 @@ int dispatch(int argc, char** argv) {
   if (certificate.parsed()) return certificate.run();
   if (design.parsed()) return design.run();
   if (control.parsed()) return control.run();
+  if (tune.parsed()) return tune.run();
   if (spnav.parsed()) return spnav.run();
+  if (gadget.parsed()) return gadget.run();
   if (doctor.parsed()) return doctor.run();
+  if (manual.parsed()) return manual.run();
   if (sim->parsed()) {
     const tagwrench::sim::Scenario described =
         scenario.empty() ? tagwrench::sim::Scenario{} : tagwrench::load_scenario(scenario);

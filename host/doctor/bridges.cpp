@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "host/config_error.h"
 #include "host/desk/control_socket.h"
+#include "host/os/config_folder.h"
 #include "host/os/runtime_folder.h"
 
 namespace tagwrench {
@@ -23,13 +23,6 @@ bool unit_installed() {
     if (fs::exists(fs::path(folder) / kUnit, error)) return true;
   }
   return false;
-}
-
-fs::path configuration() {
-  if (const char* folder = std::getenv("XDG_CONFIG_HOME"); folder != nullptr && *folder == '/')
-    return folder;
-  const char* home = std::getenv("HOME");
-  return fs::path(home != nullptr ? home : "/") / ".config";
 }
 
 }  // namespace
@@ -74,7 +67,7 @@ void say_bridges(Report& report) {
     report.line(Mark::ok, fmt::format("`tagwrench run` runs as '{}'", name));
   if (names.empty()) report.line(Mark::absent, "`tagwrench run` does not run");
   if (!unit_installed()) return;
-  if (starts_at_login(configuration())) {
+  if (starts_at_login(fs::path(config_folder()).parent_path())) {
     report.line(Mark::ok,
                 "it starts when you log in; `systemctl --user status tagwrench` and "
                 "`journalctl --user -u tagwrench` say how it fares");

@@ -116,6 +116,17 @@ void say_serial_ports(Report& report) {
     report.line(Mark::absent, "no USB serial port: no board for light and load cells");
 }
 
+/// Ports by which this board could be a USB device of another computer; most computers have none.
+void say_device_ports(Report& report) {
+  std::error_code error;
+  fs::directory_iterator it("/sys/class/udc", error);
+  for (; !error && it != fs::directory_iterator(); it.increment(error)) {
+    report.line(Mark::ok, fmt::format("USB device port {}: `sudo tagwrench gadget up` makes it a "
+                                      "puck for another computer, `gadget status` says how it is",
+                                      it->path().filename().string()));
+  }
+}
+
 void say_other_devices(Report& report) {
   const auto devices = other_6dof_devices(read_file("/proc/bus/input/devices"));
   if (devices.empty()) report.line(Mark::ok, "no other 6-DOF device competes for spacenavd");
@@ -190,6 +201,7 @@ int run_doctor(std::ostream& out) {
   say_spnav(report, look_at_spnav());
   say_sandboxes(report);
   say_other_devices(report);
+  say_device_ports(report);
   return uhid && uinput ? 0 : 1;
 }
 

@@ -6,7 +6,6 @@
 
 #include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -14,6 +13,7 @@
 #include <sstream>
 
 #include "host/config_error.h"
+#include "host/os/config_folder.h"
 #include "host/os/unique_fd.h"
 
 namespace tagwrench::link {
@@ -112,19 +112,13 @@ std::string id_text(const UniqueId& id) {
 }
 
 std::string cell_file_path(const std::string& board_id) {
-  const char* config = std::getenv("XDG_CONFIG_HOME");
-  const char* home = std::getenv("HOME");
-  fs::path folder;
-  if (config != nullptr && *config == '/') {
-    folder = config;
-  } else if (home != nullptr && *home == '/') {
-    folder = fs::path(home) / ".config";
-  } else {
+  const fs::path folder = config_folder();
+  if (folder.empty()) {
     throw ConfigError(
         "board: neither XDG_CONFIG_HOME nor HOME says where calibrations are kept; give --cells "
         "FILE");
   }
-  return (folder / "tagwrench" / fmt::format("board-{}.json", board_id)).string();
+  return (folder / fmt::format("board-{}.json", board_id)).string();
 }
 
 CellCalibrations load_cells(const std::string& path, const std::string& board_id,

@@ -1,7 +1,6 @@
 #include "host/verbs/run_command.h"
 
 #include <fmt/format.h>
-#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,75 +10,36 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "host/board/run_board.h"
 #include "host/config/sensor_config.h"
 #include "host/config_error.h"
 #include "host/input.h"
 #include "host/output/csv.h"
+#include "host/output/gadget_output.h"
 #include "host/output/joystick.h"
 #include "host/output/jsonl.h"
+#include "host/output/service_watch.h"
 #include "host/output/spacemouse.h"
 #include "host/output/spnav_output.h"
 #include "host/output/terminal.h"
 #include "host/output/wrench_hid.h"
 #include "host/pipeline.h"
 #include "host/source/region_source.h"
-#include "host/source/v4l2_nodes.h"
 #include "host/tell.h"
 #include "host/verbs/count_text.h"
+#include "host/verbs/run_input.h"
 
 namespace tagwrench {
 namespace {
-
-/// Whether the source shows the sensor's tags within `patience`. A signal ends the search; the loop
-/// then sees it too.
-bool sees_tags(Input& input, Duration patience) {
-  Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
-  const UniqueFd stop = signals_as_fd();
-  const TimePoint until = std::chrono::steady_clock::now() + patience;
-  for (TimePoint now; (now = std::chrono::steady_clock::now()) < until;) {
-    pollfd fds[2] = {{input.source->poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - now);
-    if (::poll(fds, 2, static_cast<int>(left.count()) + 1) <= 0) continue;
-    if (fds[1].revents != 0) return true;
-    Frame frame;
-    if (input.source->read(frame) != ReadStatus::frame) continue;
-    const Track track = tracker.track(frame);
-    if (track.tags_held > 0 || track.hint == Hint::image_looks_mirrored) return true;
-  }
-  return false;
-}
-
-/// The first camera that sees the tags; the simulated sensor where there is none.
-Input find_input(const RunOptions& options) {
-  constexpr Duration kPatience = std::chrono::seconds(2);
-  if (!options.sensor.empty())
-    load_sensor(options.sensor);  // a mistake in it must not look like a missing camera
-  int cameras = 0;
-  for (const CameraNode& node : list_camera_nodes()) {
-    if (!node.captures) continue;
-    try {
-      Input input = open_input({options.sensor, "v4l2:" + node.path, options.fast});
-      ++cameras;
-      if (input.source->format().width == input.sensor.camera.width_px &&
-          sees_tags(input, kPatience))
-        return input;
-    } catch (const ConfigError& e) {
-      tell(e.what());
-    }
-  }
-  tell(cameras == 0 ? "no camera found: showing the simulated sensor (--source v4l2:/dev/videoN "
-                      "picks a camera)"
-                    : "no camera sees the tags: showing the simulated sensor (--source "
-                      "v4l2:/dev/videoN insists)");
-  return open_input({"", "sim", options.fast});  // --sensor describes the camera that is not there
-}
 
 /// The outputs, and the devices among them that a guardian must bring to rest.
 struct Outputs {
   std::vector<std::unique_ptr<Output>> all;
   std::vector<DeadManDevice> devices;
+  const SpnavOutput* programs = nullptr;  ///< knows those that are connected
 };
 
 /// HID_UNIQ of both devices, and what clients show of them.
@@ -107,20 +67,38 @@ void add_device(Outputs& outputs, const std::string& kind, const SensorConfig& s
     device->add_to(outputs.devices);
     outputs.all.push_back(std::move(device));
   } else {
-    auto device = std::make_unique<JoystickOutput>(JoystickOptions{});
+    JoystickOptions options;  // uinput has no serial number: the name tells two apart
+    if (name != RunOptions().name) options.name += " " + name;
+    auto device = std::make_unique<JoystickOutput>(options);
     device->add_to(outputs.devices);
     outputs.all.push_back(std::move(device));
   }
 }
 
-std::unique_ptr<Output> spnav(const std::string& socket, const SensorConfig& sensor) {
+void add_gadget(Outputs& outputs, const std::string& face, const std::string& name) {
+  GadgetOptions options;
+  options.name = name;
+  options.face = face_of(face);
+  auto gadget = std::make_unique<GadgetOutput>(find_gadget(options));
+  gadget->add_to(outputs.devices);
+  outputs.all.push_back(std::move(gadget));
+}
+
+void add_spnav(Outputs& outputs, const std::string& socket, const SensorConfig& sensor) {
   SpnavOptions options;
   options.socket = socket;
   options.vendor = sensor.spacemouse.vendor;
   options.product = sensor.spacemouse.product;
   auto output = std::make_unique<SpnavOutput>(options);
   tell(output->advice());
-  return output;
+  outputs.programs = output.get();
+  outputs.all.push_back(std::move(output));
+}
+
+/// The program that connected last of those that are connected.
+std::string_view last_program(const SpnavOutput& output) {
+  if (output.programs().empty()) return {};
+  return output.programs().back().name.data();
 }
 
 std::unique_ptr<Output> terminal(const Input& input, bool stdout_taken) {
@@ -150,6 +128,10 @@ bool is_device(const std::string& kind) {
   return kind == "spacemouse" || kind == "wrench" || kind == "joystick";
 }
 
+bool is_gadget(const Spec& spec) {
+  return spec.kind == "gadget" && (spec.argument.empty() || face_of(spec.argument));
+}
+
 bool is_file(const std::string& kind) {
   return kind == "jsonl" || kind == "csv" || kind == "reference";
 }
@@ -158,14 +140,14 @@ bool is_file(const std::string& kind) {
 void check_outputs(const std::vector<Spec>& specs, bool with_board) {
   for (std::size_t i = 0; i < specs.size(); ++i) {
     const Spec& spec = specs[i];
-    const bool known = spec.kind == "spnav" ||
+    const bool known = spec.kind == "spnav" || is_gadget(spec) ||
                        (spec.argument.empty() ? spec.kind == "terminal" || is_device(spec.kind)
                                               : is_file(spec.kind));
     const std::string text = spec.argument.empty() ? spec.kind : spec.kind + ":" + spec.argument;
     if (!known) {
       throw ConfigError(fmt::format(
           "--output {}: not an output; use terminal, jsonl:FILE, csv:FILE, reference:FILE, "
-          "spacemouse, wrench, joystick or spnav[:PATH]",
+          "spacemouse, wrench, joystick, spnav[:PATH] or gadget[:spacemouse|:wrench]",
           text));
     }
     if (spec.kind == "reference" && !with_board) {
@@ -181,7 +163,7 @@ void check_outputs(const std::vector<Spec>& specs, bool with_board) {
                               text));
       }
     }
-    if (spec.argument.empty() || spec.argument == "-") continue;
+    if (spec.argument.empty() || spec.argument == "-" || is_gadget(spec)) continue;
     const std::filesystem::path path = spec.argument;
     const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
     const bool exists = ::access(path.c_str(), F_OK) == 0;
@@ -231,7 +213,8 @@ Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* bo
   const std::vector<Spec> specs = output_specs(options);
   for (const Spec& spec : specs) {
     if (is_device(spec.kind)) add_device(outputs, spec.kind, input.sensor, options.name);
-    if (spec.kind == "spnav") outputs.all.push_back(spnav(spec.argument, input.sensor));
+    if (spec.kind == "gadget") add_gadget(outputs, spec.argument, options.name);
+    if (spec.kind == "spnav") add_spnav(outputs, spec.argument, input.sensor);
   }
   // Only a source that waits for its reader may be made to wait.
   const bool lossless = options.fast && input.source->poll_fd() < 0;
@@ -254,7 +237,8 @@ Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* bo
 }
 
 bool is_input_device(const Spec& spec) {
-  return spec.kind == "spacemouse" || spec.kind == "joystick" || spec.kind == "spnav";
+  return spec.kind == "spacemouse" || spec.kind == "joystick" || spec.kind == "spnav" ||
+         (spec.kind == "gadget" && spec.argument != "wrench");
 }
 
 /// Where wishes come in, for who has a device on his desk.
@@ -262,9 +246,9 @@ std::optional<ControlSocket> control_of(const RunOptions& options) {
   const std::vector<Spec> specs = output_specs(options);
   const bool device = (specs.empty() && !options.record) ||
                       std::any_of(specs.begin(), specs.end(), is_input_device);
-  if (!device && options.profiles.empty()) return {};
   const bool on_hid = std::any_of(specs.begin(), specs.end(),
                                   [](const Spec& spec) { return is_device(spec.kind); });
+  if (!device && !on_hid && options.profiles.empty()) return {};
   try {
     const std::string path = control_path(options.name);
     if (!on_hid || !listens(path)) return ControlSocket(path);
@@ -365,10 +349,12 @@ std::string summary(const RunReport& report, const SensorConfig& sensor) {
 
 }  // namespace
 
-int run(const RunOptions& options) {
+int run(const RunOptions& given) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
-  output_specs(options);          // refused before anything is opened or lit
-  check_name(options.name);
+  output_specs(given);            // refused before anything is opened or lit
+  check_name(given.name);
+  const RunOptions options = with_own_sensor(given);
+  std::unique_ptr<ServiceWatch> watch = ServiceWatch::open();
   if (options.record) check_recording(*options.record);
   std::unique_ptr<RunBoard> board;
   if (!options.board.empty()) {
@@ -379,8 +365,9 @@ int run(const RunOptions& options) {
     if (!board->connected()) return 0;
   }
   // Last of all what does not wait: a camera's frames, the simulated sensor's second at rest.
-  Input input = options.source.empty() ? find_input(options)
-                                       : open_input({options.sensor, options.source, options.fast});
+  std::optional<Input> found = open_run_input(options, watch.get());
+  if (!found) return 0;
+  Input input = std::move(*found);
   const UniqueFd stop = signals_as_fd();
   check_size(input);
   check_appearance(input);
@@ -400,7 +387,13 @@ int run(const RunOptions& options) {
       zero_options(input.sensor, wrench.tool(), !options.no_zero_tracking);
   ZeroTracking zero(zero_limits);
   Outputs outputs = open_outputs(options, input, board.get());
+  if (many_profiles && outputs.programs != nullptr)
+    desk.follow_programs([&programs = *outputs.programs] { return last_program(programs); });
   tell("source: " + input.source->format().description);
+  if (watch != nullptr) {
+    watch->ready("source: " + input.source->format().description);
+    outputs.all.push_back(std::move(watch));
+  }
 
   RunLimits limits;
   if (options.frames) limits.frames = static_cast<std::uint64_t>(*options.frames);

@@ -11,7 +11,8 @@
 namespace tagwrench {
 
 struct RunOptions {
-  std::string sensor;  ///< path; empty: what the source suggests
+  std::string sensor;  ///< path; empty: for cameras sensor.yaml of the configuration folder, if it
+                       ///< is there, else what the source suggests
   std::string source;  ///< SRC; empty: a camera that sees the tags, else the simulated sensor
   std::vector<std::string>
       outputs;  ///< OUT; empty: terminal and every device that can be made here
@@ -20,6 +21,7 @@ struct RunOptions {
   std::optional<long> frames;
   std::optional<double> seconds;
   bool fast = false;
+  bool wait = false;                    ///< for a camera, instead of showing the simulated sensor
   std::string board;                    ///< its port; empty: there is none
   bool no_zero_tracking = false;        ///< the zero stays what sensor.yaml says
   std::optional<RecordOptions> record;  ///< what is to be kept of the run

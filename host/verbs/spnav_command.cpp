@@ -5,10 +5,12 @@
 
 #include <chrono>
 #include <csignal>
+#include <memory>
 #include <utility>
 
 #include "host/config_error.h"
 #include "host/input.h"
+#include "host/output/service_watch.h"
 #include "host/output/spnav_keeper.h"
 #include "host/output/spnav_link.h"
 #include "host/tell.h"
@@ -58,6 +60,8 @@ int SpnavCommand::run() const {
   if (inherited) options.idle_end = kIdle;
   tell(fmt::format("spnav: serving {}; programs find it when started with SPNAV_SOCKET={}", path,
                    path));
+  const std::unique_ptr<ServiceWatch> watch = inherited ? nullptr : ServiceWatch::open();
+  if (watch != nullptr) watch->ready("serving " + path);
   SpnavKeeper(std::move(sockets), options, stop.get()).run();
   return 0;
 }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr Duration kRounding = std::chrono::microseconds(1);  // of marks
 constexpr int kMostZeros = 100'000;
-constexpr double kLargest = 1e12;
+constexpr double kLargestNumber = 1e12;
 
 double seconds(TimePoint time) {
   return std::chrono::duration<double>(time.time_since_epoch()).count();
@@ -56,8 +56,8 @@ std::vector<NumberedReading> read_readings(record::RecordingReader& recording,
       const auto at = static_cast<std::size_t>(i);
       reading.sample.value[i] = row.value[at];
       reading.sample.sigma[i] = row.sigma[at];
-      numbers = numbers && std::abs(row.value[at]) < kLargest && row.sigma[at] >= 0 &&
-                row.sigma[at] < kLargest;
+      numbers = numbers && std::abs(row.value[at]) < kLargestNumber && row.sigma[at] >= 0 &&
+                row.sigma[at] < kLargestNumber;
     }
     if (!numbers) damaged(recording, "a reading of the reference is not in newtons");
     out.push_back(reading);

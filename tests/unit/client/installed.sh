@@ -5,7 +5,9 @@ set -eu
 build=$1 source=$2 cc=$3
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-cmake --install "$build" --component client --prefix "$folder/root" >/dev/null
+for component in library client; do
+  cmake --install "$build" --component "$component" --prefix "$folder/root" >/dev/null
+done
 metadata=$(find "$folder/root" -name tagwrench-hid.pc -printf '%h')
 library=$(dirname "$metadata")
 export PKG_CONFIG_PATH="$metadata" LD_LIBRARY_PATH="$library"
