@@ -18,7 +18,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Duration kPatience = seconds(6);  ///< an Arduino's boot loader takes two of them
+constexpr Duration kBoardPatience = seconds(6);  ///< an Arduino's boot loader takes two of them
 constexpr Duration kSettling = seconds(4);
 
 link::CellInput cell_input(const std::string& name) {
@@ -76,13 +76,13 @@ bool BoardLoop::connect() {
   const TimePoint begin = clock_now();
   bool said = false;
   while (session().state() != link::BoardState::ready) {
-    if (!turn(begin + kPatience)) return false;
+    if (!turn(begin + kBoardPatience)) return false;
     if (session().state() == link::BoardState::other_version) {
       throw ConfigError(fmt::format("{}: a board of another version cannot be used", link_.port()));
     }
     const Duration waited = clock_now() - begin;
-    if (waited >= kPatience) throw ConfigError(link_.why_no_board());
-    if (!said && waited > kPatience / 2) {
+    if (waited >= kBoardPatience) throw ConfigError(link_.why_no_board());
+    if (!said && waited > kBoardPatience / 2) {
       said = true;
       tell(fmt::format("{}: waiting for the board's answer", link_.port()));
     }

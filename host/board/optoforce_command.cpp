@@ -21,7 +21,7 @@ using std::chrono::milliseconds;
 constexpr Duration kLongestSilence = std::chrono::seconds(3);
 constexpr const char* kAxes[] = {"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
 
-std::string json_line(const OptoforceReading& reading) {
+std::string optoforce_json(const OptoforceReading& reading) {
   std::string values;
   for (std::size_t i = 0; i < reading.axes; ++i)
     values += fmt::format("{}{:.6g}", i == 0 ? "" : ",", reading.values[i]);
@@ -93,7 +93,7 @@ class ForceWatch {
   }
 
   bool show(const OptoforceReading& reading) {
-    if (options_.json) return out_.write(json_line(reading)) != SendStatus::failed;
+    if (options_.json) return out_.write(optoforce_json(reading)) != SendStatus::failed;
     if (clock_now() < next_line_) return true;
     next_line_ = clock_now() + in_seconds(options_.line_period);
     return out_.write(line_for_people(reading)) != SendStatus::failed;

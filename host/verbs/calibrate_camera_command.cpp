@@ -17,6 +17,7 @@
 #include "host/source/images.h"
 #include "host/tell.h"
 #include "host/verbs/exit_status.h"
+#include "host/verbs/today.h"
 
 namespace tagwrench {
 namespace {
@@ -35,13 +36,6 @@ struct Record {
   SensorConfig sensor;
   bool known = false;  ///< there was a --sensor; else the sensor is the paper's
 };
-
-std::string today() {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  std::tm local{};
-  ::localtime_r(&now, &local);
-  return fmt::format("{:04}-{:02}-{:02}", local.tm_year + 1900, local.tm_mon + 1, local.tm_mday);
-}
 
 SectionEdit camera_section(const CameraModel& camera, const CameraFit& fit) {
   const auto& [k1, k2, p1, p2, k3] = camera.distortion;

@@ -27,10 +27,10 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostKeyframes = 150;
 constexpr double kSecondsFromCamera = 30;
-constexpr Duration kSayEvery = std::chrono::seconds(2);
+constexpr Duration kAdviseEvery = std::chrono::seconds(2);
 
 /// Says what to do, and every two seconds how far it is.
-class Guide {
+class MotionGuide {
  public:
   void say(const TargetRecorder& record, const Track& track) {
     if (track.hint == Hint::moved_while_learning)
@@ -40,7 +40,7 @@ class Guide {
       told_to_move_ = true;
       tell("rest learned; now tilt and push the platform slowly, every way");
     }
-    if (Clock::now() - said_ < kSayEvery) return;
+    if (Clock::now() - said_ < kAdviseEvery) return;
     said_ = Clock::now();
     if (!record.rest_known()) {
       tell(fmt::format("{} frames; waiting for all tags, at rest", record.counts().frames));
@@ -68,7 +68,7 @@ bool watch(FrameSource& source, const CalibrateTargetOptions& options, const Uni
   const double seconds = options.seconds.value_or(
       ends || options.frames ? std::numeric_limits<double>::infinity() : kSecondsFromCamera);
   std::optional<TimePoint> first;
-  Guide guide;
+  MotionGuide guide;
   while (!options.frames || record.counts().frames < *options.frames) {
     Frame frame;
     const Next next = next_frame(source, stop, frame);
@@ -195,7 +195,7 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   TimePoint said = Clock::now();
   const TargetEstimate estimate =
       TargetAdjuster(record.at_rest()).adjust(record.keyframes(), [&](double share) {
-        if (Clock::now() - said >= kSayEvery) {
+        if (Clock::now() - said >= kAdviseEvery) {
           said = Clock::now();
           tell(fmt::format("{:.0f} %", 100 * share));
         }

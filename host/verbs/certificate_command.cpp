@@ -21,6 +21,7 @@
 #include "host/tell.h"
 #include "host/verbs/certificate_facts.h"
 #include "host/verbs/recorded_trial.h"
+#include "host/verbs/today.h"
 
 namespace tagwrench {
 namespace {
@@ -29,12 +30,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kName = "certificate";  // where --out is a folder
 constexpr std::size_t kNumberLength = 12;     // hexadecimal digits
-
-std::string today() {
-  return fmt::format(
-      "{:%Y-%m-%d}",
-      fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
-}
 
 /// The calibration that a sensor.yaml names. Throws ConfigError.
 fs::path calibration_of(const std::string& sensor) {

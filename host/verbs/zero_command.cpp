@@ -10,6 +10,7 @@
 #include "host/verbs/bench_input.h"
 #include "host/verbs/check_text.h"
 #include "host/verbs/hands_off.h"
+#include "host/verbs/today.h"
 
 namespace tagwrench {
 namespace {
@@ -30,8 +31,6 @@ std::string in_words(const Vector6& wrench) {
   return fmt::format("{:.4f} {:.4f} {:.4f} N, {:.3f} {:.3f} {:.3f} mN m", wrench[0], wrench[1],
                      wrench[2], wrench[3] * 1e3, wrench[4] * 1e3, wrench[5] * 1e3);
 }
-
-std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::localtime(std::time(nullptr))); }
 
 /// What stands in the way of a zero: a sensor that is not what was calibrated must not have its
 /// fault taken off as if it were drift. Empty if nothing does.
