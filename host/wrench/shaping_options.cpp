@@ -7,10 +7,7 @@ ShapingOptions shaping_for(const Vector6& range, const Eigen::Matrix3d& hid_R_ca
   constexpr double kFullScale = 2.0 / 3;  // what is left is for the hand that pushes too hard
   ShapingOptions options;
   options.hid_R_camera = hid_R_camera;
-  Matrix6 turn = Matrix6::Zero();
-  turn.topLeftCorner<3, 3>() = hid_R_camera;
-  turn.bottomRightCorner<3, 3>() = hid_R_camera;
-  const Vector6 felt = range_through(turn, range);
+  const Vector6 felt = range_along(hid_R_camera, range);
   for (int i = 0; i < 6; ++i) {
     if (felt[i] <= 0) continue;
     const double full_scale = kFullScale * felt[i];

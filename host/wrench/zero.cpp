@@ -132,4 +132,11 @@ Vector6 range_through(const Matrix6& tool, const Vector6& range) {
   return felt;
 }
 
+Vector6 range_along(const Eigen::Matrix3d& turn, const Vector6& range) {
+  Matrix6 both = Matrix6::Zero();
+  both.topLeftCorner<3, 3>() = turn;
+  both.bottomRightCorner<3, 3>() = turn;
+  return range_through(both, range);
+}
+
 }  // namespace tagwrench

@@ -125,5 +125,7 @@ class ZeroTracking {
 /// The range, N and N m, along the axes and about the origin that `tool` leads to. An axis that
 /// mixes in one whose range is not known has none either.
 Vector6 range_through(const Matrix6& tool, const Vector6& range);
+/// The same along other axes: the rows of `turn`.
+Vector6 range_along(const Eigen::Matrix3d& turn, const Vector6& range);
 
 }  // namespace tagwrench
