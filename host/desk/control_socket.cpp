@@ -137,10 +137,16 @@ void ControlClient::fail() const {
 }
 
 std::string ControlClient::ask(std::string_view wish) {
-  if (::send(socket_.get(), wish.data(), wish.size(), MSG_NOSIGNAL) < 0) fail();
+  const auto send = [&] {
+    return ::send(socket_.get(), wish.data(), wish.size(), MSG_NOSIGNAL) >= 0;
+  };
+  pollfd room{socket_.get(), POLLOUT, 0};  // many ask at once, or it is stopped
+  bool sent = send();
+  if (!sent && errno == EAGAIN && ::poll(&room, 1, kPatience_ms) > 0) sent = send();
+  if (!sent && errno != EAGAIN) fail();
   pollfd waiting{socket_.get(), POLLIN, 0};
   std::string answer(ControlSocket::kLongestAnswer, '\0');
-  const ssize_t size = ::poll(&waiting, 1, kPatience_ms) > 0
+  const ssize_t size = sent && ::poll(&waiting, 1, kPatience_ms) > 0
                            ? ::recv(socket_.get(), answer.data(), answer.size(), 0)
                            : -1;
   if (size < 0) throw ConfigError(path_ + ": no answer within 2 s; is `tagwrench run` stopped?");

@@ -108,8 +108,14 @@ void Desk::take_program() noexcept {
   const std::string_view now = last_program_();
   if (now == program_) return;
   try {
+    if (program_.empty()) before_programs_ = current_;
     program_ = now;
-    if (!focus_told_ && !program_.empty()) use_for(program_);
+    if (focus_told_) return;
+    if (!program_.empty()) {
+      use_for(program_);
+    } else {
+      use(before_programs_, "the program has gone");
+    }
   } catch (const std::exception&) {
     return;  // out of memory: the profile stays
   }

@@ -103,7 +103,8 @@ class Desk {
   Duration period_{};
   bool focus_told_ = false;
   std::function<std::string_view()> last_program_;
-  std::string program_;  ///< the last that it gave
+  std::string program_;              ///< the last that it gave
+  std::size_t before_programs_ = 0;  ///< the profile in force before there was one
   LiveReading latest_;
   bool zero_wanted_ = false;
   std::string news_;

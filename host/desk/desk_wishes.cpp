@@ -11,16 +11,18 @@
 namespace tagwrench {
 namespace {
 
+constexpr int kWishesAtOnce = 8;  // the others wait until the next picture has been seen to
 constexpr timespec kTrialPatience = {3, 0};  // who tries asks twenty times a second
 
 }  // namespace
 
 void Desk::take_wishes() {
-  while (true) {
+  for (int i = 0; i < kWishesAtOnce; ++i) {
     const ControlWish wish = control_->next();
     if (wish.kind == ControlWish::Kind::none) return;
     if (asker_tries()) extend_trial();
     control_->answer(granted(wish));
+    if (wish.kind == ControlWish::Kind::attempt) return;  // a profile's text takes longest
   }
 }
 
@@ -84,7 +86,11 @@ std::string Desk::choose(std::string_view name) {
 /// As if the desktop itself had told it. Without a name: nobody knows any more.
 std::string Desk::window(std::string_view program) {
   focus_told_ = !program.empty();
-  if (focus_told_) use_for(program);
+  if (focus_told_) {
+    use_for(program);
+  } else if (!program_.empty()) {
+    use_for(program_);
+  }
   return "ok: " + files_.profiles()[current_].name + "\n";
 }
 

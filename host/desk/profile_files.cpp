@@ -23,6 +23,8 @@ constexpr const char* kTooLong = ": longer than 64 kB; a profile is a page of te
 
 /// One byte more of a file that is too long.
 std::optional<std::string> read_start(const std::string& path) {
+  std::error_code none;
+  if (!fs::is_regular_file(path, none)) return {};  // a pipe would be waited for
   std::ifstream in(path, std::ios::binary);
   std::string text(kLongestFile + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
@@ -93,8 +95,12 @@ void ProfileFiles::watch() {
   watch_.reset(inotify_init1(IN_CLOEXEC | IN_NONBLOCK));
   bool good = static_cast<bool>(watch_);
   for (const File& file : files_) {
-    good = good &&
-           inotify_add_watch(watch_.get(), file.folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO) >= 0;
+    // And where a link leads to.
+    const fs::path real = fs::weakly_canonical(fs::path(file.folder) / file.name).parent_path();
+    for (const fs::path& folder : {fs::path(file.folder), real}) {
+      good = good &&
+             inotify_add_watch(watch_.get(), folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO) >= 0;
+    }
   }
   if (!good)
     throw ConfigError(std::string("profiles: cannot be watched: ") + std::strerror(errno) +

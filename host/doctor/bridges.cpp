@@ -60,8 +60,8 @@ void say_bridges(Report& report) {
   std::vector<std::string> names;
   try {
     names = running_sensors(runtime_folder());
-  } catch (const ConfigError&) {
-    names.clear();  // a folder that cannot be used; `run` says why
+  } catch (const ConfigError& e) {
+    report.line(Mark::missing, e.what());
   }
   for (const std::string& name : names)
     report.line(Mark::ok, fmt::format("`tagwrench run` runs as '{}'", name));

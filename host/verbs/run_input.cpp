@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <utility>
 
 #include "host/config/sensor_config.h"
@@ -97,9 +100,14 @@ RunOptions with_own_sensor(RunOptions options) {
   const bool camera = options.source.empty() || split_spec(options.source).kind == "v4l2";
   const std::string folder = config_folder();
   const std::string file = folder + "/sensor.yaml";
-  if (options.sensor.empty() && camera && !folder.empty() && ::access(file.c_str(), F_OK) == 0) {
+  if (!options.sensor.empty() || !camera || folder.empty()) return options;
+  struct stat found {};
+  if (::lstat(file.c_str(), &found) == 0) {
     options.sensor = file;
     tell("sensor: " + file);
+  } else if (errno != ENOENT && errno != ENOTDIR) {
+    throw ConfigError(file + ": cannot be looked at: " + std::strerror(errno) +
+                      "; make its folder yours, or name a file with --sensor");
   }
   return options;
 }

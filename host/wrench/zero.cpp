@@ -88,7 +88,14 @@ void ZeroTracking::answer(const Sample& sample) noexcept {
   if (!range_known) {
     answer_ = ZeroAnswer::no_range;
   } else if (at_rest && within(reading(), asked_ ? options_.reach : options_.band)) {
-    options_.set += reading();
+    if (asked_) {
+      options_.set += reading();
+    } else {
+      const Vector6 limit = options_.band * range_;
+      const Vector6 before = moved_;
+      moved_ = (moved_ + reading()).cwiseMin(limit).cwiseMax(-limit).eval();
+      taken_awake_ = moved_ - before;
+    }
     answer_ = ZeroAnswer::done;
   } else if (sample.capture_time - *asked_at_ >= options_.patience) {
     answer_ = at_rest ? ZeroAnswer::loaded : ZeroAnswer::moving;
@@ -103,6 +110,11 @@ void ZeroTracking::answer(const Sample& sample) noexcept {
 void ZeroTracking::follow(Sample& sample, const Vector6& noise) noexcept {
   sample.zero_state = judge(sample, noise);
   if (asked_ || woke_) answer(sample);
+  if (taken_awake_ && sample.zero_state == ZeroState::far &&
+      within(reading() + *taken_awake_, options_.capture)) {
+    moved_ -= *taken_awake_;
+    taken_awake_.reset();
+  }
   if (!follow_) sample.zero_state = ZeroState::off;
   if (sample.zero_state == ZeroState::following) {
     const double dt = seconds(sample.capture_time - last_);

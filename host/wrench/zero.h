@@ -95,8 +95,8 @@ class ZeroTracking {
   bool follows() const noexcept { return follow_; }
   /// Zero on demand, with the next sample at rest.
   void ask() noexcept { asked_ = true; }
-  /// The computer has slept, and what it left warm is cold: zero on demand where the zero may
-  /// follow, by no more than the band, and not a word if it cannot be.
+  /// The computer has slept, and what it left warm is cold: what reads next at rest is zero, where
+  /// the zero may follow and within the band. If it was a load, it is given back when that goes.
   void wake() noexcept { woke_ = woke_ || (follow_ && !asked_); }
   /// Told once for each ask().
   ZeroAnswer take_answer() noexcept { return std::exchange(answer_, ZeroAnswer::none); }
@@ -116,6 +116,7 @@ class ZeroTracking {
   bool felt_ = false;  ///< somebody, since the start
   bool asked_ = false;
   bool woke_ = false;
+  std::optional<Vector6> taken_awake_;  ///< what a wake has taken off, N and N m
   std::optional<TimePoint> asked_at_;
   ZeroAnswer answer_ = ZeroAnswer::none;
   TimePoint last_{};

@@ -171,6 +171,7 @@ void Tuning::granted(const Profile& told) {
 
 void Tuning::refused(std::string why) {
   note_ = std::move(why);
+  wanted_ = in_force_;
   text_ = text_in_force_;
   undoing_ = false;
   leaves_ = false;
@@ -203,6 +204,10 @@ Tuning::Wish Tuning::name_and_save() {
   text_ = text_in_force_;
   if (source_.new_file) {
     const std::string own_name = std::filesystem::path(file).stem().string();
+    if (own_name.find_first_of("\"\\") != std::string::npos) {
+      refused(file + ": a name has no \" and no \\ in it; type another");
+      return Wish::none;
+    }
     try {
       text_ = with_value(text_, {"name"}, "\"" + own_name + "\"", file);
       source_.file = file;

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/stat.h>
 
+#include <filesystem>
 #include <future>
 
 #include "tests/unit/desk/desk_folder.h"
@@ -70,6 +72,25 @@ TEST_F(DeskTest, ASavedProfileIsInForceAtOnce) {
   write("mine.yaml", "translation: [\n");
   EXPECT_NE(news(desk).find("the earlier profile stays"), std::string::npos);
   EXPECT_NEAR(push(desk), before / 2, 1e-3);
+}
+
+TEST_F(DeskTest, AProfileBehindALinkIsReadAgainWhereItLies) {
+  std::filesystem::create_directory(path("dots"));
+  write("dots/mine.yaml", "rate_hz: 50\n");
+  std::filesystem::create_symlink("dots/mine.yaml", path("mine.yaml"));
+  Desk desk(ProfileFiles({path("mine.yaml")}, sensor_), {}, {});
+  write("dots/mine.yaml", "rate_hz: 100\n");
+  EXPECT_EQ(news(desk), "profile mine: read again");
+  EXPECT_EQ(desk.period(), std::chrono::milliseconds(10));
+}
+
+TEST_F(DeskTest, APipeInTheProfilesPlaceIsNotWaitedFor) {
+  write("mine.yaml", "rate_hz: 50\n");
+  Desk desk(ProfileFiles({path("mine.yaml")}, sensor_), {}, {});
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  std::filesystem::rename(path("pipe"), path("mine.yaml"));
+  EXPECT_EQ(news(desk), "") << "and what was in force stays";
+  EXPECT_EQ(desk.period(), std::chrono::milliseconds(20));
 }
 
 TEST_F(DeskTest, NothingWakesOneThatCannotChange) {

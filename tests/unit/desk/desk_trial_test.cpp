@@ -169,10 +169,9 @@ TEST_F(Trial, TheProgramThatConnectedLastChoosesWhereNobodyTellsTheWindow) {
   asks(script, "window blender");
   EXPECT_EQ(in_force_with("other"), "cad") << "the window wins";
   asks(script, "window");
-  EXPECT_EQ(desk_->profile().name, "cad");
-  EXPECT_EQ(in_force_with("mail"), "mine") << "nobody tells any more";
+  EXPECT_EQ(desk_->profile().name, "mine") << "nobody tells any more: it is for the program";
   EXPECT_EQ(in_force_with("blender"), "cad");
-  EXPECT_EQ(in_force_with(""), "cad") << "none is connected: it stays";
+  EXPECT_EQ(in_force_with(""), "mine") << "none is connected: as before the first";
 }
 
 }  // namespace

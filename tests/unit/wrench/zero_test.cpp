@@ -268,6 +268,15 @@ TEST(ZeroAfterSleep, TakesOffWhatCoolingHasMovedAtOnceButNoLoad) {
   EXPECT_EQ(cooled.take_answer(), ZeroAnswer::done);
   EXPECT_LT(largest_part(last.zero - part_of_range(0.015)), 1e-3);
 
+  ZeroTracking carried(zero_options());
+  const auto lifted = [](double t) {
+    return part_of_range(t < 2 ? 0.3 * std::sin(7 * t) : t < 14 ? 0.019 : 0.0);
+  };
+  play(carried, 0, 3, lifted);
+  carried.wake();
+  EXPECT_GT(largest_part(play(carried, 3, 14, lifted, 2).zero), 0.018);
+  EXPECT_LT(largest_part(play(carried, 14, 24, lifted, 3).zero), 1e-3) << "it was a load";
+
   ZeroTracking loaded(zero_options());
   play(loaded, 0, 2, touch_then(0.05));
   loaded.wake();
