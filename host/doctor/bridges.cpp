@@ -65,7 +65,7 @@ void say_bridges(Report& report) {
   }
   for (const std::string& name : names)
     report.line(Mark::ok, fmt::format("`tagwrench run` runs as '{}'", name));
-  if (names.empty()) report.line(Mark::absent, "`tagwrench run` does not run");
+  if (names.empty()) report.line(Mark::absent, "no sensor runs, or it waits for its camera");
   if (!unit_installed()) return;
   if (starts_at_login(fs::path(config_folder()).parent_path())) {
     report.line(Mark::ok,

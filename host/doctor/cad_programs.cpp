@@ -102,7 +102,7 @@ void say_spnav(Report& report, const SpnavFacts& facts) {
                             facts.own_path));
   }
   if (facts.chosen_path.empty()) {
-    if (own && facts.system != SpnavServer::tagwrench) {
+    if (own && facts.system != SpnavServer::tagwrench && facts.system != SpnavServer::other) {
       report.line(
           Mark::absent,
           fmt::format("SPNAV_SOCKET is not set here, so programs use {}: put SPNAV_SOCKET={} "

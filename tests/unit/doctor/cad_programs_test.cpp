@@ -80,6 +80,8 @@ TEST(DoctorSpnav, OwnSocketIsNamedAndAWrongVariableIsAProblem) {
   facts.own_path = "/run/user/7/tagwrench/spnav.sock";
   facts.own = SpnavServer::tagwrench;
   EXPECT_NE(said(facts).find("SPNAV_SOCKET is not set here"), std::string::npos) << said(facts);
+  facts.system = SpnavServer::other;
+  EXPECT_EQ(said(facts).find("not set"), std::string::npos) << "spacenavd does it";
   facts.chosen_path = facts.own_path;
   facts.chosen = SpnavServer::tagwrench;
   EXPECT_EQ(said(facts).find("not set"), std::string::npos) << said(facts);
