@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 
 #include <filesystem>
 #include <future>
@@ -57,6 +59,20 @@ TEST_F(DeskTest, WishesAreGrantedAndAnswered) {
   EXPECT_TRUE(desk.take_zero());
   EXPECT_FALSE(desk.take_zero()) << "asked once";
   EXPECT_EQ(wish(desk, "dance").substr(0, 6), "error:");
+}
+
+TEST_F(DeskTest, AFloodOfWishesIsHeardBetweenPicturesAFewAtATime) {
+  Desk desk(ProfileFiles({"cad", "game"}, sensor_), ControlSocket(path("control")), {});
+  const UniqueFd flood(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path("control").copy(address.sun_path, sizeof address.sun_path - 1);
+  ASSERT_EQ(::connect(flood.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  for (int i = 0; i < 9; ++i) ASSERT_EQ(::send(flood.get(), "next", 4, 0), 4);
+  desk.service();
+  EXPECT_EQ(desk.profile().name, "cad") << "eight of nine are heard";
+  desk.service();
+  EXPECT_EQ(desk.profile().name, "game") << "and none is lost";
 }
 
 TEST_F(DeskTest, ASavedProfileIsInForceAtOnce) {
