@@ -1,61 +1,7 @@
 #!/bin/bash
 # nanopb.sh DIR: puts nanopb's runtime sources, which the board's firmware compiles, into DIR: pb.h, pb_common.c and so
-# on, from Debian's source package (the library package has no sources). Nothing is installed, apt's own lists stay as
-# they are, an ordinary user can run it. A second call finds DIR/ready and returns at once. Exit status 1 with one line
-# where they cannot be had.
-set -u
+# on, from Debian's source package (the library package has no sources), in the version of the generator; pb.h checks
+# whether they go together. See host/package/debian_source.sh.
 [ $# -eq 1 ] || { echo "usage: nanopb.sh DIR" >&2; exit 2; }
-export LC_ALL=C
-script=$(readlink -f "$0")
-mkdir -p "$1" && dir=$(readlink -f "$1") || exit 1
-files="pb.h pb_common.h pb_common.c pb_encode.h pb_encode.c pb_decode.h pb_decode.c"
-
-unavailable() {
-  echo "nanopb's sources unavailable: $1" >&2
-  exit 1
-}
-
-exec 9>"$dir/lock"
-flock 9
-# The sources must go with the generator, so its version belongs to the recipe.
-version=$(dpkg-query -W -f='${Version}' nanopb 2>/dev/null)
-recipe="$(sha256sum <"$script" | cut -d' ' -f1) ${version:-any}"
-[ "$(cat "$dir/ready" 2>/dev/null)" = "$recipe" ] && exit 0
-rm -f "$dir/ready"
-
-for need in apt-get:apt dpkg-source:dpkg-dev; do
-  command -v "${need%%:*}" >/dev/null || unavailable "install the Debian package ${need#*:}"
-done
-
-work=$dir/work
-log=$dir/fetch.log
-rm -rf "$work"
-mkdir -p "$work/parts" "$work/lists/partial" "$work/cache/archives/partial" || exit 1
-trap 'rm -rf "$work"' EXIT
-: >"$log"
-
-# The machine's own package sources, asked for source packages instead of binary ones; both formats that apt knows.
-for list in /etc/apt/sources.list /etc/apt/sources.list.d/*.list; do
-  [ -r "$list" ] || continue
-  sed -nE 's/^[[:space:]]*deb(-src)?[[:space:]]+/deb-src /p' "$list" | sort -u >"$work/parts/$(basename "$list" .list).list"
-done
-for list in /etc/apt/sources.list.d/*.sources; do
-  [ -r "$list" ] || continue
-  sed -E 's/^types:.*/Types: deb-src/I' "$list" >"$work/parts/$(basename "$list")"
-done
-
-apt=(apt-get -q -o Dir::Etc::SourceList=/dev/null -o "Dir::Etc::SourceParts=$work/parts" -o "Dir::State::Lists=$work/lists"
-  -o "Dir::Cache=$work/cache" -o APT::Sandbox::User=root)
-cd "$work" || exit 1
-# A package source of others may have no source packages, which update calls an error; what counts is the next step.
-"${apt[@]}" update >>"$log" 2>&1 || true
-# The archive may have replaced the generator's version by a newer one; pb.h checks whether they still go together.
-"${apt[@]}" source --download-only "nanopb${version:+=$version}" >>"$log" 2>&1 ||
-  "${apt[@]}" source --download-only nanopb >>"$log" 2>&1 ||
-  unavailable "apt-get cannot fetch the source package nanopb (see $log)"
-dpkg-source --extract nanopb_*.dsc unpacked >>"$log" 2>&1 || unavailable "cannot unpack the source package (see $log)"
-for file in $files; do
-  install -m 644 "unpacked/$file" "$dir/$file" || unavailable "the source package has no $file"
-done
-install -m 644 unpacked/LICENSE.txt "$dir/LICENSE.txt" || unavailable "the source package has no LICENSE.txt"
-echo "$recipe" >"$dir/ready"
+exec "$(dirname "$(readlink -f "$0")")/../host/package/debian_source.sh" "$1" nanopb nanopb \
+  pb.h pb_common.h pb_common.c pb_encode.h pb_encode.c pb_decode.h pb_decode.c LICENSE.txt

@@ -2,23 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <iterator>
-#include <opencv2/imgcodecs.hpp>
-#include <stdexcept>
 #include <vector>
 
-#include "host/config/sensor_edit.h"
 #include "host/config_error.h"
 #include "host/source/png.h"
 
 namespace tagwrench {
 namespace {
 
-constexpr float kCountsPerLevel = 256.0F;
 constexpr const char* kRemedy =
     "remove rest.appearance, and run `tagwrench calibrate target` for a new one";
 
@@ -58,25 +52,8 @@ RestImage load_rest_image(const std::filesystem::path& path, const CameraModel& 
   image.height = camera.height_px;
   image.level.reserve(counts.size());
   for (const std::uint16_t count : counts)
-    image.level.push_back(static_cast<float>(count) / kCountsPerLevel);
+    image.level.push_back(static_cast<float>(count) / kRestCountsPerLevel);
   return image;
-}
-
-void save_rest_image(const std::filesystem::path& path, const RestImage& image) {
-  if (image.width <= 0 || image.height <= 0 ||
-      image.level.size() !=
-          static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
-    throw std::invalid_argument("rest image: size and levels do not agree");
-  }
-  cv::Mat picture(image.height, image.width, CV_16UC1);
-  std::transform(image.level.begin(), image.level.end(), picture.ptr<std::uint16_t>(),
-                 [](float level) {
-                   return static_cast<std::uint16_t>(
-                       std::clamp(std::round(level * kCountsPerLevel), 0.0F, 65535.0F));
-                 });
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", picture, bytes);
-  write_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace tagwrench

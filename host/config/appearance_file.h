@@ -10,6 +10,8 @@
 
 namespace tagwrench {
 
+inline constexpr float kRestCountsPerLevel = 256.0F;
+
 /// Leaves `frames` at zero. Throws ConfigError, one line with path and remedy: no such file, no
 /// PNG, damaged, not 16-bit grey, not of the camera's size.
 RestImage load_rest_image(const std::filesystem::path& path, const CameraModel& camera);

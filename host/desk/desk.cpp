@@ -143,21 +143,4 @@ void Desk::apply() noexcept {
   period_ = period_of(profile().rate_hz);
 }
 
-std::string_view zero_text(ZeroAnswer answer) noexcept {
-  switch (answer) {
-    case ZeroAnswer::none:
-      return {};
-    case ZeroAnswer::done:
-      return "zero: what read is nothing now";
-    case ZeroAnswer::loaded:
-      return "zero: refused, something presses on the platform; take it off, or run `tagwrench "
-             "zero`";
-    case ZeroAnswer::moving:
-      return "zero: refused, the platform did not come to rest; let go of it";
-    case ZeroAnswer::no_range:
-      return "zero: refused, the sensor's range is not known; give wrench.range_n in sensor.yaml";
-  }
-  return {};
-}
-
 }  // namespace tagwrench

@@ -18,6 +18,7 @@
 #include "host/wrench/gestures.h"
 #include "host/wrench/shaping.h"
 #include "host/wrench/zero.h"
+#include "host/wrench/zero_text.h"
 
 namespace tagwrench {
 
@@ -109,8 +110,5 @@ class Desk {
   bool zero_wanted_ = false;
   std::string news_;
 };
-
-/// What became of a zero on demand, in words; empty for none.
-std::string_view zero_text(ZeroAnswer answer) noexcept;
 
 }  // namespace tagwrench

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <span>
 
 #include "host/tracker/corner_pose.h"
+#include "host/tracker/flipped.h"
 #include "host/tracker/picture_quality.h"
 #include "host/tracker/rotation.h"
 #include "host/tracker/square_reader.h"
@@ -119,13 +119,7 @@ std::vector<ReadSquare> read_others(const CameraModel& camera, const ImageView& 
                                     const HintDetails::Ids& missing) {
   const std::span<const std::int16_t> ids(missing.id.data(), missing.count);
   if (!camera.mirrored) return read_squares(image, finding.squares, family, ids);
-  const cv::Mat delivered(image.height, image.width, CV_8UC1,
-                          const_cast<std::uint8_t*>(image.pixels),  // only read
-                          static_cast<std::size_t>(image.stride));
-  cv::Mat flipped;
-  cv::flip(delivered, flipped, 1);
-  const ImageView view{flipped.data, flipped.cols, flipped.rows, static_cast<int>(flipped.step[0])};
-  return read_squares(view, finding.squares, family, ids);
+  return read_squares(FlippedImage(image).view(), finding.squares, family, ids);
 }
 
 /// Light and focus, if they are so bad that tags may not be found.
@@ -238,7 +232,7 @@ Diagnosis Diagnostician::not_held(TimePoint time, const KnownRest& rest, const I
     said_ = look;
     return look;
   } catch (const std::exception&) {
-    return {};  // an image that OpenCV refuses, or out of memory: nothing can be told
+    return {};  // an image that the library refuses, or out of memory: nothing can be told
   }
 }
 

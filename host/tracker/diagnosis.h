@@ -1,5 +1,4 @@
-// Why the target is not held, from what the camera shows: asked only then, now and then. Uses
-// OpenCV inside.
+// Why the target is not held, from what the camera shows: asked only then, now and then.
 #pragma once
 
 #include <optional>
@@ -23,7 +22,7 @@ struct Diagnosis {
 };
 
 /// Looks at one picture: the cause that explains most, or none when nothing is certain. Allocates;
-/// costs about as much as finding tags. Throws what OpenCV throws.
+/// costs about as much as finding tags. Throws what the library throws that finds them.
 Diagnosis diagnose(const CameraModel& camera, const TargetDescription& target,
                    const KnownRest& rest, const ImageView& image, const Finding& finding);
 

@@ -24,7 +24,7 @@ constexpr double kMargin = 0.3;         // of white around the square that is lo
 constexpr double kClear = 2;            // blurs between that and the paper's end
 
 /// Corners (8), logarithm of the blur, gain, its slopes to the right and down, offset.
-constexpr int kCorners = 8, kBlur = 8, kGain = 9, kOffset = 12, kUnknowns = 13;
+constexpr int kBlur = 8, kGain = 9, kOffset = 12, kUnknowns = 13;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 

@@ -276,7 +276,7 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
 /// sandwich estimator for clustered errors does (Liang and Zeger, Biometrika 73(1), 1986), and the
 /// covariance grows by the mean ratio, which is far less noisy than the sandwich itself.
 void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
-  double squares = 0, weights = 0, inside = 0, all = 0, believed = 0, noise = 0;
+  double squares = 0, inside = 0, all = 0, believed = 0, noise = 0;
   std::array<bool, kMaxTags> held{};
   for (std::size_t n = 0; n < sums_.size(); ++n) {
     const PixelPatch& patch = template_.patches[n];
@@ -284,7 +284,6 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
     if (good_[n] == 0) continue;
     believed += static_cast<double>(patch.pixels);
     squares += sums_[n].squares;
-    weights += sums_[n].weights;
     inside += sums_[n].inside;
     noise += patch.mean_noise * sums_[n].inside;
     held[patch.tag] = true;

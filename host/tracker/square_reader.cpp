@@ -1,11 +1,12 @@
 #include "host/tracker/square_reader.h"
 
 #include <algorithm>
-#include <opencv2/aruco.hpp>
-#include <opencv2/imgproc.hpp>
+#include <array>
+#include <cmath>
 #include <optional>
 
-#include "host/tracker/tag_dictionary.h"
+#include "host/tracker/square_pose.h"
+#include "host/tracker/tag_patterns.h"
 
 namespace tagwrench {
 namespace {
@@ -29,8 +30,6 @@ constexpr TagFamily kLargest[] = {
 /// Those of aruco_NxN with fewer ids come right before it in TagFamily, the smallest first.
 constexpr int kSmaller = 3;
 
-using Square = std::array<Eigen::Vector2d, 4>;
-
 double shortest_side_px(const Square& square) {
   double shortest = 1e9;
   for (std::size_t c = 0; c < 4; ++c)
@@ -39,53 +38,108 @@ double shortest_side_px(const Square& square) {
 }
 
 struct Bits {
-  cv::Mat inside;       ///< CV_8UC1, 1 is white; empty: not a tag of this many cells
+  std::vector<std::uint8_t>
+      inside;           ///< row by row, 1 is white; empty: not a tag of this many cells
   double impurity = 1;  ///< part of the pixels that differ from their cell
 };
 
-Bits read_bits(const cv::Mat& image, const Square& square, int bits) {
+/// A picture of the square alone, rows of cells * kCell_px pixels; 0 outside of the image.
+class FlatSquare {
+ public:
+  FlatSquare(const ImageView& image, const Square& square, int cells)
+      : side_(cells * kCell_px), level_(static_cast<std::size_t>(side_ * side_)) {
+    const Eigen::Matrix3d image_from_flat = square_homography(square);
+    for (int row = 0; row < side_; ++row) {
+      for (int column = 0; column < side_; ++column) {
+        const Eigen::Vector3d at =
+            image_from_flat * Eigen::Vector3d(2.0 * column / side_ - 1, 2.0 * row / side_ - 1, 1);
+        level_[index(row, column)] = interpolated(image, at.x() / at.z(), at.y() / at.z());
+      }
+    }
+  }
+
+  /// The level that parts black and white best (Otsu, IEEE Trans. SMC 9, 1979), and their means.
+  void part() {
+    std::array<int, 256> histogram{};
+    double all = 0;
+    for (const std::uint8_t level : level_) {
+      ++histogram[level];
+      all += level;
+    }
+    const auto count = static_cast<double>(level_.size());
+    double below = 0, sum = 0, best = 0;
+    for (int level = 0; level < 255; ++level) {
+      below += histogram[static_cast<std::size_t>(level)];
+      sum += static_cast<double>(level) * histogram[static_cast<std::size_t>(level)];
+      if (below == 0 || below == count) continue;
+      const double black = sum / below, white = (all - sum) / (count - below);
+      const double between = below * (count - below) * (white - black) * (white - black);
+      if (between <= best) continue;
+      best = between;
+      threshold_ = level;
+      contrast_ = white - black;
+    }
+  }
+
+  double contrast() const { return contrast_; }
+  /// White pixels of a cell, its margins left out.
+  int white_in(int cell_row, int cell_column) const {
+    int white = 0;
+    for (int row = kMargin_px; row < kCell_px - kMargin_px; ++row) {
+      for (int column = kMargin_px; column < kCell_px - kMargin_px; ++column)
+        white +=
+            level_[index(cell_row * kCell_px + row, cell_column * kCell_px + column)] > threshold_;
+    }
+    return white;
+  }
+
+ private:
+  std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(row * side_ + column);
+  }
+  static std::uint8_t interpolated(const ImageView& image, double x, double y) {
+    if (!(x >= 0 && y >= 0 && x < image.width - 1 && y < image.height - 1)) return 0;
+    const auto left = static_cast<int>(x), top = static_cast<int>(y);
+    const std::uint8_t* at = image.pixels + static_cast<std::ptrdiff_t>(top) * image.stride + left;
+    const double u = x - left, v = y - top;
+    const double upper = at[0] + u * (at[1] - at[0]);
+    const double lower = at[image.stride] + u * (at[image.stride + 1] - at[image.stride]);
+    return static_cast<std::uint8_t>(std::lround(upper + v * (lower - upper)));
+  }
+
+  int side_;
+  std::vector<std::uint8_t> level_;
+  int threshold_ = 0;
+  double contrast_ = 0;
+};
+
+Bits read_bits(const ImageView& image, const Square& square, int bits) {
   const int cells = bits + 2;
-  const auto size = static_cast<float>(cells * kCell_px);
-  const std::array<cv::Point2f, 4> to = {{{0, 0}, {size, 0}, {size, size}, {0, size}}};
-  std::array<cv::Point2f, 4> from;
-  for (std::size_t c = 0; c < 4; ++c)
-    from[c] = {static_cast<float>(square[c].x()), static_cast<float>(square[c].y())};
-  cv::Mat flat, ink;
-  cv::warpPerspective(image, flat, cv::getPerspectiveTransform(from.data(), to.data()),
-                      {cells * kCell_px, cells * kCell_px});
-  cv::threshold(flat, ink, 0, 1, cv::THRESH_BINARY | cv::THRESH_OTSU);
-  const double white_level = cv::mean(flat, ink)[0];
-  const double black_level = cv::mean(flat, 1 - ink)[0];
+  FlatSquare flat(image, square, cells);
+  flat.part();
   Bits read;
-  if (white_level - black_level < kLeastContrast) return read;
+  if (flat.contrast() < kLeastContrast) return read;
 
   constexpr int kLook_px = kCell_px - 2 * kMargin_px;
-  cv::Mat inside(bits, bits, CV_8UC1);
+  std::vector<std::uint8_t> inside;
   int differing = 0, white_cells = 0;
   for (int row = 0; row < cells; ++row) {
     for (int column = 0; column < cells; ++column) {
-      const int white = cv::countNonZero(
-          ink({column * kCell_px + kMargin_px, row * kCell_px + kMargin_px, kLook_px, kLook_px}));
+      const int white = flat.white_in(row, column);
       const bool is_white = 2 * white > kLook_px * kLook_px;
       differing += is_white ? kLook_px * kLook_px - white : white;
       const bool border = row == 0 || column == 0 || row == cells - 1 || column == cells - 1;
       if (border && is_white) return read;
       if (border) continue;
-      inside.at<std::uint8_t>(row - 1, column - 1) = is_white ? 1 : 0;
+      inside.push_back(is_white ? 1 : 0);
       white_cells += is_white ? 1 : 0;
     }
   }
   const double white_part = static_cast<double>(white_cells) / (bits * bits);
   if (white_part < kLeastWhite || white_part > 1 - kLeastWhite) return read;
   read.impurity = static_cast<double>(differing) / (cells * cells * kLook_px * kLook_px);
-  if (read.impurity < kMostImpure) read.inside = inside;
+  if (read.impurity < kMostImpure) read.inside = std::move(inside);
   return read;
-}
-
-std::optional<int> identify(TagFamily family, const cv::Mat& bits) {
-  int id = 0, rotation = 0;
-  if (!tag_dictionary(family)->identify(bits, id, rotation, 0)) return std::nullopt;
-  return id;
 }
 
 TagFamily smallest(TagFamily family, int id) {
@@ -99,27 +153,28 @@ TagFamily smallest(TagFamily family, int id) {
   return family;
 }
 
-std::optional<ReadSquare> recognise(const cv::Mat& bits, TagFamily expected,
-                                    std::span<const std::int16_t> missing) {
-  if (bits_per_side(expected) == bits.rows) {
-    cv::Mat flipped;
-    cv::flip(bits, flipped, 1);
-    const auto id = identify(expected, flipped);
+std::optional<ReadSquare> recognise(const std::vector<std::uint8_t>& white, int bits,
+                                    TagFamily expected, std::span<const std::int16_t> missing) {
+  if (bits_per_side(expected) == bits) {
+    std::vector<std::uint8_t> flipped = white;
+    for (auto row = flipped.begin(); row != flipped.end(); row += bits)
+      std::reverse(row, row + bits);
+    const auto id = identify_tag(expected, flipped);
     if (id && std::find(missing.begin(), missing.end(), *id) != missing.end())
       return ReadSquare{expected, *id, true};
-    if (const auto as_it_is = identify(expected, bits))
+    if (const auto as_it_is = identify_tag(expected, white))
       return ReadSquare{expected, *as_it_is, false};
   }
   for (const TagFamily family : kLargest) {
-    if (bits_per_side(family) != bits.rows) continue;
-    if (const auto id = identify(family, bits))
+    if (bits_per_side(family) != bits) continue;
+    if (const auto id = identify_tag(family, white))
       return ReadSquare{smallest(family, *id), *id, false};
   }
   return std::nullopt;
 }
 
 /// Cells of the wrong size do not fill with one colour: the purest reading that is a tag counts.
-std::optional<ReadSquare> read_square(const cv::Mat& image, const Square& square,
+std::optional<ReadSquare> read_square(const ImageView& image, const Square& square,
                                       TagFamily expected, std::span<const std::int16_t> missing) {
   std::optional<ReadSquare> best;
   double least = 1;
@@ -127,7 +182,7 @@ std::optional<ReadSquare> read_square(const cv::Mat& image, const Square& square
     if (shortest_side_px(square) < kLeastCell_px * (bits + 2)) continue;
     const Bits read = read_bits(image, square, bits);
     if (read.inside.empty() || read.impurity >= least) continue;
-    const std::optional<ReadSquare> tag = recognise(read.inside, expected, missing);
+    const std::optional<ReadSquare> tag = recognise(read.inside, bits, expected, missing);
     if (!tag) continue;
     best = tag;
     least = read.impurity;
@@ -139,9 +194,6 @@ std::optional<ReadSquare> read_square(const cv::Mat& image, const Square& square
 
 std::vector<ReadSquare> read_squares(const ImageView& image, const std::vector<Square>& squares,
                                      TagFamily expected, std::span<const std::int16_t> missing) {
-  const cv::Mat pixels(image.height, image.width, CV_8UC1,
-                       const_cast<std::uint8_t*>(image.pixels),  // only read
-                       static_cast<std::size_t>(image.stride));
   std::vector<Square> largest = squares;
   const std::size_t most = std::min(largest.size(), kMostSquares);
   std::partial_sort(
@@ -150,7 +202,7 @@ std::vector<ReadSquare> read_squares(const ImageView& image, const std::vector<S
   largest.resize(most);
   std::vector<ReadSquare> tags;
   for (const Square& square : largest) {
-    if (const auto tag = read_square(pixels, square, expected, missing)) tags.push_back(*tag);
+    if (const auto tag = read_square(image, square, expected, missing)) tags.push_back(*tag);
   }
   return tags;
 }

@@ -1,12 +1,11 @@
 // What is printed in a square that the sensor's family does not know: a tag of another family, or
-// one that was printed mirrored. Uses OpenCV inside.
+// one that was printed mirrored.
 #pragma once
 
-#include <array>
 #include <span>
 #include <vector>
 
-#include "host/tracker/target.h"
+#include "host/tracker/square_finder.h"
 
 namespace tagwrench {
 
@@ -18,9 +17,8 @@ struct ReadSquare {
 
 /// Reads without any error correction: what is not clearly a tag is left out. `squares` are corners
 /// in the image, clockwise, px. Flipped, a tag may read as another one of its family: whether one
-/// of `missing` is there mirrored is asked first. Allocates; throws what OpenCV throws.
-std::vector<ReadSquare> read_squares(const ImageView& image,
-                                     const std::vector<std::array<Eigen::Vector2d, 4>>& squares,
+/// of `missing` is there mirrored is asked first. Allocates.
+std::vector<ReadSquare> read_squares(const ImageView& image, const std::vector<Square>& squares,
                                      TagFamily expected, std::span<const std::int16_t> missing);
 
 }  // namespace tagwrench

@@ -60,4 +60,12 @@ TagPattern tag_pattern(TagFamily family, int id, double size, double border) {
   return pattern;
 }
 
+std::optional<int> identify_tag(TagFamily family, const std::vector<std::uint8_t>& white) {
+  const int bits = bits_per_side(family);
+  const cv::Mat cells(bits, bits, CV_8UC1, const_cast<std::uint8_t*>(white.data()));  // only read
+  int id = 0, rotation = 0;
+  if (!tag_dictionary(family)->identify(cells, id, rotation, 0)) return std::nullopt;
+  return id;
+}
+
 }  // namespace tagwrench

@@ -155,7 +155,7 @@ struct Tracker::State {
 
 void Tracker::State::find(const Frame& frame, Track& track) {
   finding = acquirer.find(frame.image);
-  searched = true;
+  searched = finding.looked;
   if (finding.other_way_round) track.hint = flip_hint();
 }
 
@@ -394,6 +394,8 @@ Tracker::Tracker(const CameraModel& camera, const TargetDescription& target,
     : state_(std::make_unique<State>(camera, target, rest)) {}
 
 Tracker::~Tracker() = default;
+
+const KnownRest& Tracker::rest() const noexcept { return state_->rest; }
 
 Track Tracker::track(const Frame& frame) noexcept {
   if (!state_->readable(frame.image)) {

@@ -1,6 +1,6 @@
 // Frame -> displacement of the platform from rest.
 //
-// acquire   image -> tag corners. OpenCV lives there; runs only while the target is not held.
+// acquire   image -> tag corners, by OpenCV; runs only while the target is not held.
 // refine    predicted pose + pixels -> pose with covariance, all tags as one rigid target.
 // rest      learns the rest pose and the tags' placement from the first frames.
 // diagnosis says why, while the target is not held.
@@ -14,6 +14,8 @@
 
 namespace tagwrench {
 
+struct KnownRest;  // tracker/diagnosis.h
+
 class Tracker {
  public:
   Tracker(const CameraModel& camera, const TargetDescription& target, const RestOptions& rest);
@@ -23,6 +25,9 @@ class Tracker {
 
   /// Never throws. Allocates only while the target is not held.
   Track track(const Frame& frame) noexcept;
+
+  /// The rest as it was given, or as it has been learned since.
+  const KnownRest& rest() const noexcept;
 
  private:
   struct State;
