@@ -110,7 +110,9 @@ Spec split_spec(const std::string& spec) {
 
 std::string paper_sensor_yaml() { return sim::sensor_yaml(sim::Scenario{}); }
 
-Input open_input(const InputOptions& options) {
+namespace {
+
+Input open_source(const InputOptions& options) {
   const Spec spec = split_spec(options.source);
   if (spec.kind == "sim") return open_simulator(options, spec.argument);
   if (spec.kind == "images" && !spec.argument.empty()) return open_images(options, spec.argument);
@@ -121,6 +123,14 @@ Input open_input(const InputOptions& options) {
       "--source {}: not a source; use sim, sim:SCENARIO.yaml, v4l2:/dev/videoN, images:DIR or "
       "recording:FILE",
       options.source));
+}
+
+}  // namespace
+
+Input open_input(const InputOptions& options) {
+  Input input = open_source(options);
+  input.spec = options.source;
+  return input;
 }
 
 void check_size(const Input& input) {

@@ -33,6 +33,7 @@ struct InputOptions {
 struct Input {
   SensorConfig sensor;
   std::unique_ptr<FrameSource> source;
+  std::string spec;         ///< SRC that it was opened with
   bool camera = false;      ///< a real one, that sees what an LED lights
   std::string sensor_name;  ///< path of the sensor.yaml that was loaded, or what stands for it
   std::string sensor_text;  ///< of a sensor that has no file

@@ -54,6 +54,7 @@ constexpr const char* kOutputs =
     "  wrench                        HID force-torque sensor in N and N m\n"
     "  joystick                      six-axis joystick for games\n"
     "  spnav[:PATH]                  the socket of libspnav programs, without any device\n"
+    "  web[:ADDRESS:PORT]            pages for a browser: 127.0.0.1:8137\n"
     "  gadget[:spacemouse|:wrench]   a USB device of another computer, after `tagwrench gadget "
     "up`\n"
     "  reference:FILE                as csv, beside the load cells of --board at the same time\n"
@@ -122,6 +123,15 @@ int dispatch(int argc, char** argv) {
   run->add_option("--board", run_options.board,
                   "serial port of the board that lights the tags and reads load cells:\n"
                   "a path, usb:VENDOR:PRODUCT[:SERIAL], or auto for the only one");
+  run->add_flag(
+      "--open", run_options.web.open,
+      "pages as with --output web, but beside the usual outputs, and open in the browser");
+  run->add_option("--web-token", run_options.web.token_file,
+                  "file with the token that pages need on an address that others reach;\n"
+                  "made where it is not there");
+  run->add_option("--recordings", run_options.web.recordings,
+                  "folder of what pages record; without it ~/.local/share/tagwrench/recordings");
+  run->add_option("--web-pages", run_options.web.pages)->group("");
   run->add_option("--cells", run_options.cells,
                   "calibration file of its load cells; without it the one kept for this board");
 

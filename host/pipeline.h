@@ -53,6 +53,8 @@ class Pipeline {
   /// Runs until a limit, the source's end, a stop or a failed output. Does not throw on account of
   /// the outside world.
   RunReport run(const RunLimits& limits);
+  /// While it runs, for its own thread.
+  const RunReport& so_far() const noexcept { return report_; }
 
  private:
   void step(Frame& frame) noexcept;

@@ -11,6 +11,10 @@ namespace tagwrench {
 namespace {
 
 constexpr Duration kPatience = std::chrono::milliseconds(500);
+constexpr std::uint16_t kTareConversions = 80;
+/// Of a resting cell's noise, from end to end of its conversions.
+constexpr double kMostTareSpread = 15;
+constexpr double kLeastTareNoise_counts = 0.5;
 
 std::string header() {
   std::string line(kCsvHeader.substr(0, kCsvHeader.size() - 1));
@@ -61,6 +65,7 @@ std::string BoardOutput::failure() const { return sink_ ? sink_->failure() : std
 std::string_view BoardOutput::service() noexcept {
   link_.service();
   take_readings();
+  take_tares();
   write_ripe(/*all=*/false);
   said_.clear();
   try {
@@ -81,8 +86,10 @@ void BoardOutput::take_readings() noexcept {
   if (record_) record_->state(session);
   for (link::CellReading r; session.next(r);) {
     if (record_) record_->cell(r);
-    if (r.channel < counts_.size() && !r.saturated)
+    if (r.channel < counts_.size() && !r.saturated) {
+      last_counts_[r.channel] = r.counts;
       counts_[r.channel].add(r.time.time, r.time.sigma, r.counts, 0, r.lost_before > 0);
+    }
   }
   for (link::ButtonReading r; session.next(r);) {
     if (record_) record_->button(r);
@@ -90,6 +97,38 @@ void BoardOutput::take_readings() noexcept {
     const std::uint32_t bit = std::uint32_t{1} << r.button;
     buttons_down_ = r.pressed ? buttons_down_ | bit : buttons_down_ & ~bit;
   }
+}
+
+/// One that moved meanwhile keeps its zero.
+void BoardOutput::take_tares() noexcept {
+  for (link::TareResult result{}; link_.session().next(result);) {
+    if (result.channel >= cells_.size()) continue;
+    link::CellCalibration& cell = cells_[result.channel];
+    if (!cell.calibrated) continue;
+    const double noise = std::max(cell.noise_counts, kLeastTareNoise_counts);
+    if (result.spread_counts > kMostTareSpread * noise) {
+      try {
+        found_ = fmt::format("load cell {} moved while it was tared; let it rest, then try again",
+                             result.channel);
+      } catch (const std::exception&) {
+        found_.clear();  // out of memory: unsaid
+      }
+      continue;
+    }
+    cell.zero_counts = result.mean_counts;
+  }
+}
+
+std::optional<link::Newtons> BoardOutput::felt(std::size_t channel) const noexcept {
+  if (channel >= cells_.size() || !cells_[channel].calibrated || !last_counts_[channel]) return {};
+  return cells_[channel].newtons(*last_counts_[channel]);
+}
+
+bool BoardOutput::tare(std::size_t channel) noexcept {
+  if (!felt(channel)) return false;
+  link_.session().tare(static_cast<std::uint8_t>(1U << channel), kTareConversions);
+  link_.send();
+  return true;
 }
 
 /// Whether nothing more will be known about the row's time.

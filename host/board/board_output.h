@@ -49,6 +49,11 @@ class BoardOutput final : public Output {
   std::string_view service() noexcept override;
   std::uint32_t pressed() const noexcept override { return buttons_down_; }
 
+  /// What a load cell feels now; nothing where it is not calibrated, or has not spoken yet.
+  std::optional<link::Newtons> felt(std::size_t channel) const noexcept;
+  /// From the next second's mean on it feels nothing. False: as above.
+  bool tare(std::size_t channel) noexcept;
+
   /// From now on all that the board says is recorded as well. Borrowed.
   void record_to(record::RecordingWriter& writer) { record_.emplace(writer, cells_); }
 
@@ -61,6 +66,7 @@ class BoardOutput final : public Output {
   static constexpr std::size_t kMostRows = 64;
 
   void take_readings() noexcept;
+  void take_tares() noexcept;
   bool ripe(const Row& row, TimePoint now) const noexcept;
   void write_ripe(bool all) noexcept;
   std::string_view text(const Row& row) noexcept;
@@ -70,6 +76,7 @@ class BoardOutput final : public Output {
   link::CellCalibrations cells_;
   Duration latency_;
   std::array<link::SampleHistory, link::kMostChannels> counts_;
+  std::array<std::optional<std::int32_t>, link::kMostChannels> last_counts_;
   std::uint32_t buttons_down_ = 0;  ///< bit 0 is the board's button 0
   std::optional<ReferenceComparison> comparison_;
   ReferenceMonitor monitor_{{}};

@@ -59,6 +59,7 @@ bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
   SteadyLamp lamp(loop_.link());
   if (!input.camera) {
     lamp.set_level(kUnseenLevel_permille);
+    settled_permille_ = led_permille_ = kUnseenLevel_permille;
     tell(fmt::format("the board's LED is on at {:.0f} %, but does not light this source",
                      kUnseenLevel_permille / 10));
     return true;
@@ -66,6 +67,8 @@ bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
   Acquirer finder(input.sensor.camera, input.sensor.target);
   const LightReport report =
       tagwrench::settle_light(*input.source, finder, input.sensor.camera.mirrored, lamp, stop);
+  settled_permille_ = led_permille_ = report.setting.led_permille;
+  exposure_us_ = report.setting.exposure_us;
   if (!report.stopped) tell(light_text(report));
   return !report.stopped;
 }
@@ -97,6 +100,29 @@ void RunBoard::compare(BoardOutput& output, const SensorConfig& sensor) const {
   const WrenchEstimator wrench(sensor.wrench);
   output.compare({line, wrench.tool(), range_through(wrench.tool(), sensor.wrench.range)});
   tell(fmt::format("every sample is compared with load cell {}", line.channel));
+}
+
+BoardReading RunBoard::reading() const noexcept {
+  BoardReading reading;
+  reading.led = led_permille_ / 1000;
+  reading.exposure_us = exposure_us_;
+  for (std::size_t i = 0; output_ != nullptr && i < reading.cells.size(); ++i) {
+    if (const std::optional<link::Newtons> felt = output_->felt(i))
+      reading.cells[i] = {true, felt->value, felt->sigma};
+  }
+  return reading;
+}
+
+void RunBoard::set_led(double level) noexcept {
+  SteadyLamp lamp(loop_.link());
+  led_permille_ = std::min(1000 * level, lamp.range_permille().most);
+  lamp.set_level(led_permille_);
+}
+
+void RunBoard::set_led_as_settled() noexcept { set_led(settled_permille_ / 1000); }
+
+bool RunBoard::tare(std::size_t channel) noexcept {
+  return output_ != nullptr && output_->tare(channel);
 }
 
 void RunBoard::record_to(record::RecordingWriter& writer) {

@@ -8,10 +8,11 @@
 #include "host/board/loop.h"
 #include "host/input.h"
 #include "host/output/output.h"
+#include "host/web/bridge/board_control.h"
 
 namespace tagwrench {
 
-class RunBoard {
+class RunBoard final : public BoardControl {
  public:
   /// Waits for the board, some seconds at most. Throws ConfigError if there is no board of ours, or
   /// its load cells' file cannot be used.
@@ -19,7 +20,7 @@ class RunBoard {
   RunBoard(const RunBoard&) = delete;
   RunBoard& operator=(const RunBoard&) = delete;
   /// Turns the light off.
-  ~RunBoard();
+  ~RunBoard() override;
 
   /// False if a signal ended the waiting.
   bool connected() const { return connected_; }
@@ -38,12 +39,21 @@ class RunBoard {
   void record_to(record::RecordingWriter& writer);
 
  private:
+  // BoardControl, of that output.
+  BoardReading reading() const noexcept override;
+  void set_led(double level) noexcept override;
+  void set_led_as_settled() noexcept override;
+  bool tare(std::size_t channel) noexcept override;
+
   void compare(BoardOutput& output, const SensorConfig& sensor) const;
 
   double rate_;  ///< conversions/s
   BoardLoop loop_;
   link::CellCalibrations cells_{};
   bool connected_ = false;
+  double settled_permille_ = 0;
+  double led_permille_ = 0;
+  double exposure_us_ = 0;  ///< 0: not known
   BoardOutput* output_ = nullptr;
 };
 

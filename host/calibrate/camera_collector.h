@@ -31,6 +31,8 @@ class ViewCollector {
   /// Of the image shown last.
   Look last_look() const { return last_look_; }
   bool mirrored() const { return finder_.mirrored(); }
+  /// Of the last live image in which the board was found, flipped back if mirrored.
+  const std::vector<BoardCorner>& last_corners() const { return previous_; }
   /// As given.
   const CameraModel& camera() const { return camera_; }
   /// Poses through what is known of the lens by now.

@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kLeastView = 1.5 * kDegree;
-constexpr std::size_t kLeastKeyframes = 20;
 constexpr double kLeastFollowed = 0.5;    // of the frames in motion
 constexpr double kLargestNoise_px = 0.3;  // of one edge
 constexpr double kLargestFocalError = 0.01;

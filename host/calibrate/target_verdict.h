@@ -23,6 +23,9 @@ ViewSpan view_span(const std::vector<Keyframe>& frames,
 /// The platform frame at rest: origin at the midpoint of the tag centres, axes along the camera's.
 Eigen::Isometry3d rest_platform(const std::vector<Eigen::Isometry3d>& camera_T_tag);
 
+/// So many different pictures at least a recording must have.
+inline constexpr std::size_t kLeastKeyframes = 20;
+
 /// Throws ConfigError, one line with what is missing and what to do, for a recording that cannot
 /// show where the tags sit: one tag only, no rest, tags lost, too few different pictures, seen from
 /// one side.

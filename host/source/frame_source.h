@@ -60,6 +60,12 @@ class FrameSource {
   /// Exposure and gain, where the source has them; owned by it. Valid for its lifetime.
   virtual CameraLight* camera_light() noexcept { return nullptr; }
 
+  /// Another value for a setting of the camera (a V4L2_CID_ number) that this source keeps fixed.
+  /// False: it does not, or the camera refuses.
+  virtual bool change_setting(std::uint32_t /*id*/, std::int64_t /*value*/) noexcept {
+    return false;
+  }
+
   /// One line about the frames that were delivered but could not be used; empty if there were none.
   virtual std::string unusable() const { return {}; }
 

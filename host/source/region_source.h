@@ -12,20 +12,29 @@ namespace tagwrench {
 
 class RegionSource final : public FrameSource {
  public:
-  explicit RegionSource(std::unique_ptr<FrameSource> inner) : inner_(std::move(inner)) {}
+  /// `narrow`: from the start; see narrow().
+  explicit RegionSource(std::unique_ptr<FrameSource> inner, bool narrow = true)
+      : inner_(std::move(inner)), narrow_(narrow) {}
+
+  /// Whether it delivers no more than was asked for, or all that the inner one does.
+  void narrow(bool on) noexcept { narrow_ = on; }
 
   const SourceFormat& format() const noexcept override { return inner_->format(); }
   int poll_fd() const noexcept override { return inner_->poll_fd(); }
   CameraLight* camera_light() noexcept override { return inner_->camera_light(); }
   std::string unusable() const override { return inner_->unusable(); }
   std::string detail() const override { return inner_->detail(); }
+  bool change_setting(std::uint32_t id, std::int64_t value) noexcept override {
+    return inner_->change_setting(id, value);
+  }
   RawFrame raw() const noexcept override { return inner_->raw(); }
 
   ReadStatus read(Frame& frame) noexcept override {
     const ReadStatus status = inner_->read(frame);
     if (status == ReadStatus::frame) {
       shown_ = frame.readable();
-      frame.decoded = common(shown_, wanted_.clipped(frame.image.width, frame.image.height));
+      if (narrow_)
+        frame.decoded = common(shown_, wanted_.clipped(frame.image.width, frame.image.height));
     }
     return status;
   }
@@ -51,6 +60,7 @@ class RegionSource final : public FrameSource {
   }
 
   std::unique_ptr<FrameSource> inner_;
+  bool narrow_;
   Region wanted_;
   Region shown_;  ///< of the last frame, by the inner source
 };

@@ -153,6 +153,12 @@ bool V4l2Source::set_control(std::uint32_t control, double value) noexcept {
   return controls_.change(port, control, std::llround(std::clamp(value, -kWide, kWide)));
 }
 
+bool V4l2Source::change_setting(std::uint32_t id, std::int64_t value) noexcept {
+  if (!device_) return false;
+  V4l2ControlPort port(device_->fd());
+  return controls_.change(port, id, value);
+}
+
 void V4l2Source::watch(int fd) const {
   epoll_event event{};
   event.events = EPOLLIN;

@@ -45,6 +45,7 @@ class V4l2Source final : public FrameSource, private CameraLight {
   std::string unusable() const override;
   /// Nothing where the exposure could not be locked.
   CameraLight* camera_light() noexcept override;
+  bool change_setting(std::uint32_t id, std::int64_t value) noexcept override;
 
   const SkippedFrames& skipped() const noexcept { return skipped_; }
 

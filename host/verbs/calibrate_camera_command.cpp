@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ctime>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "host/calibrate/board_spec.h"
@@ -16,6 +17,7 @@
 #include "host/input.h"
 #include "host/source/images.h"
 #include "host/tell.h"
+#include "host/verbs/events.h"
 #include "host/verbs/exit_status.h"
 #include "host/verbs/today.h"
 
@@ -186,6 +188,51 @@ class Guide {
   bool complete_ = false;
 };
 
+/// In how many views each of the 3 x 3 regions of the image holds corners, in reading order.
+std::array<int, 9> views_of_regions(const ViewCollector& collector) {
+  std::array<int, 9> counts{};
+  const CameraModel& camera = collector.camera();
+  for (const CameraView& view : collector.views()) {
+    std::array<bool, 9> here{};
+    for (const BoardCorner& corner : view.corners) {
+      const double x = corner.pixel.x() * 3 / camera.width_px;
+      const double y = corner.pixel.y() * 3 / camera.height_px;
+      const auto column = static_cast<std::size_t>(std::clamp(x, 0.0, 2.0));
+      here[3 * static_cast<std::size_t>(std::clamp(y, 0.0, 2.0)) + column] = true;
+    }
+    for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += here[i] ? 1 : 0;
+  }
+  return counts;
+}
+
+/// Where the board is in the image as the camera delivers it.
+std::vector<TagCorners> outline_of_board(const ViewCollector& collector, int width) {
+  if (collector.last_look() != Look::board) return {};
+  std::vector<std::array<double, 2>> px;
+  for (const BoardCorner& corner : collector.last_corners()) {
+    const double x = corner.pixel.x();
+    px.push_back({collector.mirrored() ? width - 1 - x : x, corner.pixel.y()});
+  }
+  return outline_of(px);
+}
+
+void tell_events(Events& events, const ViewCollector& collector, int wanted, const Frame& frame,
+                 bool taken) {
+  if (!events.on()) return;
+  const std::size_t views = collector.views().size();
+  if (taken || views == 0) {
+    events.coverage({{"regions", views_of_regions(collector)},
+                     {"views", views},
+                     {"wanted", wanted},
+                     {"missing", collector.coverage().missing()}});
+    events.progress(static_cast<double>(views) / std::max(1, wanted));
+  }
+  events.picture(frame.image, outline_of_board(collector, frame.image.width));
+  events.live(
+      fmt::format("{} of {} views; the board is {}", views, wanted,
+                  collector.last_look() == Look::board ? "seen" : words(collector.last_look())));
+}
+
 /// Until the views are complete, time is up, or a signal comes: then nothing.
 std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& options,
                                               const BoardSpec& board, const Record& record,
@@ -201,6 +248,7 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
   auto collector =
       std::make_unique<ViewCollector>(board, camera_for(record, source.format()), true);
   Guide guide;
+  Events events(options.events);
   const TimePoint end = options.seconds
                             ? Clock::now() + std::chrono::duration_cast<Duration>(
                                                  std::chrono::duration<double>(*options.seconds))
@@ -213,7 +261,9 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
     if (next == Next::end) break;
     if (next != Next::frame) continue;
     const std::string name = fmt::format("view {}", collector->views().size() + 1);
-    guide.say(collector->look(frame.image, name), *collector, wanted);
+    const Taken taken = collector->look(frame.image, name);
+    guide.say(taken, *collector, wanted);
+    tell_events(events, *collector, wanted, frame, taken == Taken::yes);
   }
   return collector;
 }

@@ -17,6 +17,7 @@ struct CalibrateCameraOptions {
   std::string out;                   ///< path; empty: `sensor`
   std::optional<int> views;
   std::optional<double> seconds;
+  int events = -1;  ///< descriptor, see Events
 };
 
 /// Returns the exit status. Throws ConfigError if it cannot start, or if the views are too poor;

@@ -1,5 +1,7 @@
 #include "host/verbs/calibrate_command.h"
 
+#include "host/verbs/events_option.h"
+
 namespace tagwrench {
 namespace {
 
@@ -65,6 +67,8 @@ CalibrateCommand::CalibrateCommand(CLI::App& app)
                    "use no more than S seconds; without it a folder is used up and anything else "
                    "for 30 s")
       ->check(duration());
+  add_events_option(*camera_, camera_options_.events);
+  add_events_option(*target_, target_options_.events);
   declare_wrench();
 }
 
@@ -111,6 +115,7 @@ void CalibrateCommand::declare_wrench() {
                     "spring model");
   wrench_->add_option("--seconds", o.seconds, "stop after S seconds of frames; --resume goes on")
       ->check(duration());
+  add_events_option(*wrench_, o.events);
   wrench_->callback([this, list, show] {
     if (list->count() > 0 || show->count() > 0) return;
     const bool recorded = wrench_options_.source.rfind("recording:", 0) == 0;

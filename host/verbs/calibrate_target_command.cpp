@@ -5,6 +5,7 @@
 #include <chrono>
 #include <filesystem>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "host/calibrate/target_recorder.h"
@@ -16,6 +17,7 @@
 #include "host/input.h"
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
+#include "host/verbs/events.h"
 #include "host/verbs/exit_status.h"
 #include "host/verbs/zero_command.h"
 
@@ -61,9 +63,29 @@ class MotionGuide {
   TimePoint said_ = Clock::now();
 };
 
+/// Of the time of a calibration, seeing takes the first part, the adjustment the rest.
+constexpr double kSeeingPart = 0.7;
+
+void tell_events(Events& events, const TargetRecorder& record, const Track& track,
+                 const Frame& frame, double part) {
+  if (!events.on()) return;
+  events.progress(kSeeingPart * std::min(1.0, part));
+  events.picture(frame.image, {track.corners.data(), track.corner_count});
+  if (!record.rest_known()) {
+    events.live("hands off: the rest is learned");
+    return;
+  }
+  const Vector6 range = record.range();
+  events.coverage({{"range", std::vector<double>(range.begin(), range.end())},
+                   {"keyframes", record.keyframes().size()},
+                   {"wanted", kLeastKeyframes}});
+  events.live(track.status == Status::ok ? "tilt and push the platform slowly, every way"
+                                         : "the tags are not held");
+}
+
 /// Until the source ends, enough was seen (true) or a signal came (false).
 bool watch(FrameSource& source, const CalibrateTargetOptions& options, const UniqueFd& stop,
-           TargetRecorder& record) {
+           TargetRecorder& record, Events& events) {
   const bool ends = split_spec(options.source).kind == "images";
   const double seconds = options.seconds.value_or(
       ends || options.frames ? std::numeric_limits<double>::infinity() : kSecondsFromCamera);
@@ -76,8 +98,11 @@ bool watch(FrameSource& source, const CalibrateTargetOptions& options, const Uni
     if (next == Next::end) break;
     if (next != Next::frame) continue;
     if (!first) first = frame.capture_time;
-    if (std::chrono::duration<double>(frame.capture_time - *first).count() >= seconds) break;
-    guide.say(record, record.add(frame));
+    const double elapsed = std::chrono::duration<double>(frame.capture_time - *first).count();
+    if (elapsed >= seconds) break;
+    const Track track = record.add(frame);
+    guide.say(record, track);
+    tell_events(events, record, track, frame, elapsed / seconds);
   }
   if (const std::string bad = source.unusable(); !bad.empty()) tell(bad);
   return true;
@@ -185,16 +210,18 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   check_size(input);
   const SensorConfig& sensor = input.sensor;
   const UniqueFd stop = signals_as_fd();
+  Events events(options.events);
   TargetRecorder record(sensor.camera, sensor.target, sensor.rest, kMostKeyframes);
   tell("source: " + input.source->format().description);
   tell(fmt::format("hands off until {} frames at rest are taken", sensor.rest.frames));
-  if (!watch(*input.source, options, stop, record)) return stopped();
+  if (!watch(*input.source, options, stop, record, events)) return stopped();
   check_record(record, sensor.target, sensor.rest);
 
   tell(fmt::format("adjusting to {} pictures", record.keyframes().size()));
   TimePoint said = Clock::now();
   const TargetEstimate estimate =
       TargetAdjuster(record.at_rest()).adjust(record.keyframes(), [&](double share) {
+        events.progress(kSeeingPart + (1 - kSeeingPart) * share);
         if (Clock::now() - said >= kAdviseEvery) {
           said = Clock::now();
           tell(fmt::format("{:.0f} %", 100 * share));

@@ -13,6 +13,7 @@ struct CalibrateTargetOptions {
   std::string out;                ///< path; empty: `sensor`
   std::optional<long> frames;     ///< use no more than this, the rest included
   std::optional<double> seconds;  ///< alike, by the frames' own time
+  int events = -1;                ///< descriptor, see Events
 };
 
 /// Returns the exit status. Throws ConfigError if it cannot start, or if the recording cannot show

@@ -29,8 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kRecordingFailed = 1;
-constexpr int kAttempts = 3;  // of the simulated person
+constexpr int kRecordingFailed = 1, kAttempts = 3;  // attempts of the simulated person
 constexpr double kUnknownRange = 1e8;
 
 int list_plans() {
@@ -300,8 +299,9 @@ int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles
                                            .lossless = at.input.source->poll_fd() < 0},
                      head);
   }
+  Events events(options.events);
   const GuideEnd end = run_guide({&at, reference.get(), recorder ? &*recorder : nullptr, &stop,
-                                  &plan, files.progress, of, options.seconds},
+                                  &plan, files.progress, of, options.seconds, &events},
                                  guide);
   const bool recorded = !recorder || end_recording(*recorder, options.record->file);
   if (end != GuideEnd::done) return say_stopped(end, guide, files.progress);

@@ -23,6 +23,7 @@ struct CalibrateWrenchOptions {
   bool list_plans = false;
   std::string show_plan;          ///< name; printed to standard output
   std::optional<double> seconds;  ///< of the frames' own time, then stop as if interrupted
+  int events = -1;                ///< descriptor, see Events; keys come from standard input then
 
   std::string board;      ///< port, `auto` for the only one; empty: none
   std::string cells;      ///< calibration file of its load cells; empty: by the board's id

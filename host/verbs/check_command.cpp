@@ -11,6 +11,7 @@
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
 #include "host/verbs/check_text.h"
+#include "host/verbs/events_option.h"
 
 namespace tagwrench {
 namespace {
@@ -92,6 +93,7 @@ CheckCommand::CheckCommand(CLI::App& app)
       ->add_option("--source", options_.source,
                    "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
       ->required();
+  add_events_option(*verb_, options_.events);
   add_load_options();
 }
 
@@ -156,22 +158,24 @@ int CheckCommand::run() const {
   if (board && !board->settle_light(input, stop)) return stopped();
   HandsOff hands_off(input.sensor, std::chrono::seconds(2),
                      options_.mass_g ? kPatienceForMass : kPatience);
+  Events events(options_.events);
   tell("source: " + input.source->format().description);
   tell("hands off for some seconds");
-  const Seen seen = watch(*input.source, stop, hands_off);
+  const Seen seen = watch(*input.source, stop, hands_off, events);
   if (seen == Seen::stopped) return stopped();
   if (const std::string why = why_nothing(seen, hands_off); !why.empty()) {
     tell(why);
     return kOff;
   }
   bool fine = print(judge(hands_off.result()));
-  if (options_.mass_g) fine = by_mass(at, stop, hands_off) && fine;
+  if (options_.mass_g) fine = by_mass(at, stop, hands_off, events) && fine;
   if (board) fine = by_cell(input, stop, *board) && fine;
   if (signalled(stop)) return stopped();
   return fine ? 0 : kOff;
 }
 
-bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off) const {
+bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off,
+                           Events& events) const {
   ProofLoad load;
   load.range = at.input.sensor.wrench.range;
   const Vector6 before = hands_off.result().wrench;
@@ -179,7 +183,7 @@ bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands
   tell(fmt::format("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest",
                    *options_.mass_g, options_.at_mm[0], options_.at_mm[1], options_.at_mm[2]));
   if (at.bench) at.bench->hang(*options_.mass_g * 1e-3, vector3(options_.at_mm) * 1e-3);
-  const Seen loaded = watch(*at.input.source, stop, hands_off);
+  const Seen loaded = watch(*at.input.source, stop, hands_off, events);
   InSituFinding scale{.subject = Subject::scale, .fault = Fault::not_known};
   if (loaded == Seen::enough && hands_off.result().held) {
     load.measured = hands_off.result().wrench - before;

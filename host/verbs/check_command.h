@@ -16,6 +16,7 @@ namespace tagwrench {
 struct CheckOptions {
   std::string sensor;            ///< path
   std::string source;            ///< SRC
+  int events = -1;               ///< descriptor, see Events
   std::optional<double> mass_g;  ///< to be hung
   double mass_sigma_percent = 0.5;
   std::vector<double> at_mm;  ///< where a load takes hold, platform frame
@@ -40,7 +41,7 @@ class CheckCommand {
 
  private:
   void add_load_options();
-  bool by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off) const;
+  bool by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off, Events& events) const;
   bool by_cell(Input& input, const UniqueFd& stop, RunBoard& board) const;
 
   CLI::App* verb_;

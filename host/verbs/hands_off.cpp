@@ -117,7 +117,7 @@ bool HandsOff::changed(const Sample& sample) const {
 
 HandsOff::Progress HandsOff::add(const Frame& frame) {
   if (!begin_) begin_ = frame.capture_time;
-  const Track track = all_.track(frame);
+  const Track& track = last_ = all_.track(frame);
   Sample sample{.capture_time = frame.capture_time};
   wrench_.estimate(track, sample);
   // Tag by tag: where they disagree, what they say together may jump. And where nothing is held,
@@ -188,7 +188,7 @@ Vector6 HandsOff::wrench_sigma() const { return (variance_sum_ / std::max(1, hel
 
 Vector6 HandsOff::displacement() const { return displacement_sum_ / std::max(1, held_); }
 
-Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off) {
+Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off, Events& events) {
   while (true) {
     Frame frame;
     const Next next = next_frame(source, stop, frame);
@@ -196,6 +196,10 @@ Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off) {
     if (next == Next::end) return Seen::too_little;
     if (next != Next::frame) continue;
     const HandsOff::Progress progress = hands_off.add(frame);
+    const Track& track = hands_off.last_track();
+    events.picture(frame.image, {track.corners.data(), track.corner_count});
+    events.progress(hands_off.part());
+    if (events.on()) events.live(fmt::format("{:.1f} s of standing still", hands_off.seconds()));
     if (progress == HandsOff::Progress::done) return Seen::enough;
     if (progress == HandsOff::Progress::gave_up) return Seen::too_little;
   }

@@ -1,6 +1,8 @@
 // The sensor standing still for some seconds: what all its tags say together, and each alone.
 #pragma once
 
+#include <algorithm>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +13,7 @@
 #include "host/os/unique_fd.h"
 #include "host/source/frame_source.h"
 #include "host/tracker/tracker.h"
+#include "host/verbs/events.h"
 #include "host/wrench/estimate.h"
 #include "host/wrench/zero.h"
 
@@ -47,6 +50,12 @@ class HandsOff {
   Vector6 wrench_sigma() const;
   /// Mean, of all tags together, m and rad.
   Vector6 displacement() const;
+  /// How much of the stillness that it wants is there, 0..1.
+  double part() const {
+    return std::min(1.0, seconds() / std::chrono::duration<double>(wanted_).count());
+  }
+  /// Where the tags are in the last frame.
+  const Track& last_track() const { return last_; }
   double seconds() const { return std::chrono::duration<double>(counted_).count(); }
 
  private:
@@ -75,6 +84,7 @@ class HandsOff {
   std::optional<TimePoint> since_;  ///< of the stillness
   Duration counted_{};
   bool moved_ = false;
+  Track last_{};
   double least_change_ = 0;
   Vector6 before_ = Vector6::Zero();
 
@@ -90,7 +100,7 @@ enum class Seen : std::uint8_t { enough, too_little, stopped };
 
 /// Until the sensor has stood still for long enough, patience is lost, the source ends or a signal
 /// comes.
-Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off);
+Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off, Events& events);
 
 /// Why watch() saw too little, in words; empty if there is something to judge.
 std::string why_nothing(Seen seen, const HandsOff& hands_off);

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "host/config/sensor_config.h"
+#include "host/config/zero_options.h"
 #include "host/config_error.h"
 #include "host/input.h"
 #include "host/output/service_watch.h"
@@ -23,6 +24,7 @@
 #include "host/verbs/count_text.h"
 #include "host/verbs/run_input.h"
 #include "host/verbs/run_outputs.h"
+#include "host/verbs/run_web.h"
 
 namespace tagwrench {
 namespace {
@@ -39,7 +41,8 @@ std::optional<ControlSocket> control_of(const RunOptions& options) {
   const bool device = (specs.empty() && !options.record) ||
                       std::any_of(specs.begin(), specs.end(), is_input_device);
   const bool on_hid = std::any_of(specs.begin(), specs.end(), is_hid_device);
-  if (!device && !on_hid && options.profiles.empty()) return {};
+  const bool pages = has_web(options);
+  if (!device && !on_hid && !pages && options.profiles.empty()) return {};
   try {
     const std::string path = control_path(options.name);
     if (!on_hid || !listens(path)) return ControlSocket(path);
@@ -61,17 +64,6 @@ void check_name(const std::string& name) {
   if (!usable)
     throw ConfigError(
         fmt::format("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name));
-}
-
-/// What reads as nothing, as samples have it, and whether it may follow.
-ZeroOptions zero_options(const SensorConfig& sensor, const Matrix6& tool, bool may_follow) {
-  ZeroOptions options;
-  options.follow = may_follow && sensor.zero.follow;
-  options.range = range_through(tool, sensor.wrench.range);
-  options.set = tool * sensor.zero.set;
-  options.band = sensor.zero.band;
-  options.rate = sensor.zero.rate;
-  return options;
 }
 
 /// Says how far the zero went, if it is far enough to be seen.
@@ -138,15 +130,76 @@ std::string summary(const RunReport& report, const SensorConfig& sensor) {
   return line;
 }
 
-}  // namespace
+/// What outlives a run that lends its camera.
+struct Session {
+  RunOptions options;
+  std::unique_ptr<ServiceWatch> watch = nullptr;  ///< until the first run takes it
+  WebBridge* web = nullptr;
+  KeptOutputs kept = {};
+  std::uint64_t frames = 0;  ///< of the runs before
+  TimePoint start = std::chrono::steady_clock::now();
+};
 
-int run(const RunOptions& given) {
-  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
-  output_specs(given);            // refused before anything is opened or lit
-  check_name(given.name);
-  const RunOptions options = with_own_sensor(given);
-  std::unique_ptr<ServiceWatch> watch = ServiceWatch::open();
-  if (options.record) check_recording(*options.record);
+/// Pages are told when a run is over, however it ends.
+class WebRun {
+ public:
+  WebRun(WebBridge* web, std::unique_ptr<WebOutput> output, Outputs& outputs)
+      : web_(web), output_(output.get()) {
+    if (output) outputs.all.push_back(std::move(output));
+  }
+  WebRun(const WebRun&) = delete;
+  WebRun& operator=(const WebRun&) = delete;
+  ~WebRun() {
+    if (web_ != nullptr) web_->end_run();
+  }
+  WebOutput* output() const { return output_; }
+
+ private:
+  WebBridge* web_;
+  WebOutput* output_;
+};
+
+/// Where the next run gets its pictures from, if there is one: from where this one does.
+void stay_with(const Input& input, RunOptions& options) {
+  if (options.source.empty() && split_spec(input.spec).kind == "sim") options.sensor.clear();
+  options.source = input.spec;
+}
+
+RunLimits limits_of(const Session& session) {
+  RunLimits limits;
+  const RunOptions& options = session.options;
+  if (options.frames) limits.frames = static_cast<std::uint64_t>(*options.frames) - session.frames;
+  if (options.seconds) {
+    limits.time =
+        std::chrono::duration_cast<Duration>(std::chrono::duration<double>(*options.seconds));
+    if (session.frames > 0)
+      *limits.time -= std::min(*limits.time, std::chrono::steady_clock::now() - session.start);
+  }
+  return limits;
+}
+
+/// A source whose part that is read can be chosen while it runs.
+RegionSource& choose_region(Input& input, bool narrow) {
+  auto region = std::make_unique<RegionSource>(std::move(input.source), narrow);
+  RegionSource& chosen = *region;
+  input.source = std::move(region);
+  return chosen;
+}
+
+std::unique_ptr<WebOutput> begin_web_run(const Session& session, const Input& input,
+                                         RegionSource* source, RunBoard* board, bool desk,
+                                         const Outputs& outputs) {
+  if (session.web == nullptr) return nullptr;
+  WebOutput::Parts parts;
+  parts.source = source;
+  parts.board = board;
+  parts.programs = outputs.programs;
+  return session.web->begin_run(run_facts(session.options, input, board != nullptr, desk), parts);
+}
+
+/// The exit status; nothing: the camera is wanted for something else, and the run goes on after it.
+std::optional<int> run_once(Session& session) {
+  RunOptions& options = session.options;
   std::unique_ptr<RunBoard> board;
   if (!options.board.empty()) {
     BoardOptions board_options;
@@ -156,51 +209,61 @@ int run(const RunOptions& given) {
     if (!board->connected()) return 0;
   }
   // Last of all what does not wait: a camera's frames, the simulated sensor's second at rest.
-  std::optional<Input> found = open_run_input(options, watch.get());
+  std::optional<Input> found = open_run_input(options, session.watch.get());
   if (!found) return 0;
   Input input = std::move(*found);
   const UniqueFd stop = signals_as_fd();
   check_size(input);
   check_appearance(input);
+  stay_with(input, options);
   record::Head head;
-  if (options.record) {
-    head = recording_head(input, options.record->keep);
-    if (head.keep == record::Keep::region)
-      input.source = std::make_unique<RegionSource>(std::move(input.source));
-  }
+  if (options.record) head = recording_head(input, options.record->keep);
+  const bool narrow = options.record && head.keep == record::Keep::region;
+  RegionSource* region = nullptr;
+  if (narrow || session.web != nullptr) region = &choose_region(input, narrow);
   if (board && !board->settle_light(input, stop)) return 0;
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
   WrenchEstimator wrench(input.sensor.wrench);
   const bool many_profiles = !options.profiles.empty();
-  Desk desk(ProfileFiles(options.profiles, input.sensor), control_of(options),
+  std::optional<ControlSocket> control = control_of(options);
+  const bool has_control = control.has_value();
+  Desk desk(ProfileFiles(options.profiles, input.sensor), std::move(control),
             many_profiles ? FocusWatch::open() : std::nullopt);
   const ZeroOptions zero_limits =
       zero_options(input.sensor, wrench.tool(), !options.no_zero_tracking);
   ZeroTracking zero(zero_limits);
-  Outputs outputs = open_outputs(options, input, board.get());
+  Outputs outputs = open_outputs(options, input, board.get(), session.kept);
   if (many_profiles && outputs.programs != nullptr)
     desk.follow_programs([&programs = *outputs.programs] { return last_program(programs); });
   tell("source: " + input.source->format().description);
-  if (watch != nullptr) {
-    watch->ready("source: " + input.source->format().description);
-    outputs.all.push_back(std::move(watch));
+  if (session.watch != nullptr) {
+    session.watch->ready("source: " + input.source->format().description);
+    outputs.all.push_back(std::move(session.watch));
   }
 
-  RunLimits limits;
-  if (options.frames) limits.frames = static_cast<std::uint64_t>(*options.frames);
-  if (options.seconds)
-    limits.time =
-        std::chrono::duration_cast<Duration>(std::chrono::duration<double>(*options.seconds));
+  const RunLimits limits = limits_of(session);
   RunReport report;
   {
+    const WebRun web(session.web,
+                     begin_web_run(session, input, region, board.get(), has_control, outputs),
+                     outputs);
     DeadMan dead_man(outputs.devices);
-    Recording* recording = nullptr;
-    if (options.record)
-      recording = &start_recording(options, head, input, limits, board.get(), outputs);
-    Pipeline pipeline(*input.source, tracker, wrench, desk, outputs.all, dead_man, stop.get(),
-                      recording);
+    FrameLog* log = web.output();
+    if (options.record) {
+      Recording& recording = start_recording(options, head, input, limits, board.get(), outputs);
+      if (web.output() != nullptr) web.output()->pass_on_to(&recording);
+      if (log == nullptr) log = &recording;
+    }
+    Pipeline pipeline(*input.source, tracker, wrench, desk, outputs.all, dead_man,
+                      session.web == nullptr ? stop.get() : session.web->end_fd(), log);
     pipeline.follow_zero(zero);
+    if (web.output() != nullptr) web.output()->follow(pipeline.so_far());
     report = pipeline.run(limits);
+  }
+  session.frames += report.frames;
+  if (report.end == RunReport::End::interrupted && !signalled(stop)) {
+    session.kept = keep_outputs(outputs);
+    return {};
   }
   std::unique_ptr<Output> recording;
   if (options.record) {
@@ -217,6 +280,38 @@ int run(const RunOptions& given) {
   say_zero(zero, zero_limits.range, zero_limits.band);
   if (const std::string unusable = input.source->unusable(); !unusable.empty()) tell(unusable);
   return recorded ? 0 : 1;
+}
+
+/// One run after the other, as pages want the camera and give it back.
+int run_with_pages(Session& session) {
+  const UniqueFd stop = signals_as_fd();
+  const std::unique_ptr<WebBridge> web = open_web(session.options, stop);
+  session.web = web.get();
+  for (bool first = true;; first = false) {
+    bool again = false;
+    try {
+      if (const std::optional<int> status = run_once(session)) return *status;
+      again = web->lend_camera(session.kept);
+    } catch (const ConfigError& e) {
+      if (first) throw;
+      tell(e.what());
+      again = web->wait_after(e.what(), session.kept);
+    }
+    if (!again) return 0;
+  }
+}
+
+}  // namespace
+
+int run(const RunOptions& given) {
+  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
+  output_specs(given);            // refused before anything is opened or lit
+  check_name(given.name);
+  const bool pages = has_web(given);
+  Session session{with_own_sensor(given)};
+  session.watch = ServiceWatch::open();
+  if (session.options.record) check_recording(*session.options.record);
+  return pages ? run_with_pages(session) : *run_once(session);
 }
 
 }  // namespace tagwrench

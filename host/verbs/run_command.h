@@ -10,6 +10,15 @@
 
 namespace tagwrench {
 
+/// Of the output `web`.
+struct WebRunOptions {
+  std::string token_file;  ///< made where it is not there; empty: no token
+  std::string recordings;  ///< folder; empty: the usual one
+  std::string pages;       ///< folder with the built pages; empty: those of this program
+  bool open = false;       ///< as `web` among the outputs would, beside the usual ones, and in the
+                           ///< browser at once
+};
+
 struct RunOptions {
   std::string sensor;  ///< path; empty: for cameras sensor.yaml of the configuration folder, if it
                        ///< is there, else what the source suggests
@@ -25,6 +34,7 @@ struct RunOptions {
   std::string board;                    ///< its port; empty: there is none
   bool no_zero_tracking = false;        ///< the zero stays what sensor.yaml says
   std::optional<RecordOptions> record;  ///< what is to be kept of the run
+  WebRunOptions web;
   std::string cells;  ///< calibration file of its load cells; empty: by the board's id
 };
 

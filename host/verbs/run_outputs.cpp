@@ -14,6 +14,7 @@
 #include "host/output/gadget_output.h"
 #include "host/output/joystick.h"
 #include "host/output/jsonl.h"
+#include "host/output/service_watch.h"
 #include "host/output/spacemouse.h"
 #include "host/output/terminal.h"
 #include "host/output/wrench_hid.h"
@@ -110,14 +111,15 @@ bool is_file(const std::string& kind) {
 void check_outputs(const std::vector<Spec>& specs, bool with_board) {
   for (std::size_t i = 0; i < specs.size(); ++i) {
     const Spec& spec = specs[i];
-    const bool known = spec.kind == "spnav" || is_gadget(spec) ||
+    const bool known = spec.kind == "spnav" || spec.kind == "web" || is_gadget(spec) ||
                        (spec.argument.empty() ? spec.kind == "terminal" || is_hid_device(spec)
                                               : is_file(spec.kind));
     const std::string text = spec.argument.empty() ? spec.kind : spec.kind + ":" + spec.argument;
     if (!known) {
       throw ConfigError(fmt::format(
           "--output {}: not an output; use terminal, jsonl:FILE, csv:FILE, reference:FILE, "
-          "spacemouse, wrench, joystick, spnav[:PATH] or gadget[:spacemouse|:wrench]",
+          "spacemouse, wrench, joystick, spnav[:PATH], web[:ADDRESS:PORT] or "
+          "gadget[:spacemouse|:wrench]",
           text));
     }
     if (spec.kind == "reference" && !with_board) {
@@ -125,6 +127,8 @@ void check_outputs(const std::vector<Spec>& specs, bool with_board) {
           "--output {}: the load cells are a board's; name its port with --board", text));
     }
     for (std::size_t j = 0; j < i; ++j) {
+      if (spec.kind == "web" && specs[j].kind == "web")
+        throw ConfigError("--output web: is there twice; pages have one place");
       if (spec.argument.empty() ? specs[j].kind == spec.kind : specs[j].argument == spec.argument) {
         throw ConfigError(
             spec.argument == "-"
@@ -133,7 +137,8 @@ void check_outputs(const std::vector<Spec>& specs, bool with_board) {
                               text));
       }
     }
-    if (spec.argument.empty() || spec.argument == "-" || is_gadget(spec)) continue;
+    if (spec.argument.empty() || spec.argument == "-" || is_gadget(spec) || spec.kind == "web")
+      continue;
     const std::filesystem::path path = spec.argument;
     const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
     const bool exists = ::access(path.c_str(), F_OK) == 0;
@@ -182,7 +187,20 @@ std::vector<Spec> output_specs(const RunOptions& options) {
   return specs;
 }
 
-Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* board) {
+KeptOutputs keep_outputs(Outputs& outputs) {
+  KeptOutputs kept;
+  for (std::unique_ptr<Output>& output : outputs.all) {
+    Output* one = output.get();
+    if (dynamic_cast<JsonlOutput*>(one) != nullptr || dynamic_cast<CsvOutput*>(one) != nullptr ||
+        dynamic_cast<ServiceWatch*>(one) != nullptr)
+      kept.push_back(std::move(output));
+  }
+  std::erase(outputs.all, nullptr);
+  return kept;
+}
+
+Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* board,
+                     KeptOutputs& kept) {
   Outputs outputs;
   if (options.outputs.empty()) {
     if (!options.record) add_default_outputs(outputs, input, options.name);
@@ -199,8 +217,12 @@ Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* bo
   const bool lossless = options.fast && input.source->poll_fd() < 0;
   const bool stdout_taken = std::any_of(specs.begin(), specs.end(),
                                         [](const Spec& spec) { return spec.argument == "-"; });
+  const bool again = !kept.empty();
+  for (std::unique_ptr<Output>& output : kept) outputs.all.push_back(std::move(output));
+  kept.clear();
   for (const Spec& spec : specs) {
     if (spec.kind == "terminal") outputs.all.push_back(terminal(input, stdout_taken));
+    if (again) continue;
     if (spec.kind == "jsonl")
       outputs.all.push_back(std::make_unique<JsonlOutput>(spec.argument, lossless));
     if (spec.kind == "csv")

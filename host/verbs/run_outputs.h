@@ -21,6 +21,10 @@ struct Outputs {
   const SpnavOutput* programs = nullptr;  ///< knows those that are connected
 };
 
+/// What goes on in the next run, if a job comes between: files that samples are written to, and
+/// what systemd is told.
+using KeptOutputs = std::vector<std::unique_ptr<Output>>;
+
 /// What is asked for. Throws ConfigError about what cannot be, before anything is made or
 /// overwritten.
 std::vector<Spec> output_specs(const RunOptions& options);
@@ -32,6 +36,11 @@ bool is_input_device(const Spec& spec);
 
 /// Devices first, because they are what may be refused; files are only then overwritten. `board`
 /// may be null. Throws ConfigError.
-Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* board);
+/// What is in `kept` is taken from there.
+Outputs open_outputs(const RunOptions& options, const Input& input, RunBoard* board,
+                     KeptOutputs& kept);
+
+/// Moves those back there.
+KeptOutputs keep_outputs(Outputs& outputs);
 
 }  // namespace tagwrench

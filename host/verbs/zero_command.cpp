@@ -9,6 +9,7 @@
 #include "host/tell.h"
 #include "host/verbs/bench_input.h"
 #include "host/verbs/check_text.h"
+#include "host/verbs/events_option.h"
 #include "host/verbs/hands_off.h"
 #include "host/verbs/today.h"
 
@@ -69,6 +70,7 @@ ZeroCommand::ZeroCommand(CLI::App& app)
       ->add_option("--source", options_.source,
                    "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
       ->required();
+  add_events_option(*verb_, options_.events);
 }
 
 int ZeroCommand::run() const {
@@ -81,9 +83,10 @@ int ZeroCommand::run() const {
   check_calibrated_rest(sensor, "zero");
   const UniqueFd stop = signals_as_fd();
   HandsOff hands_off(sensor);
+  Events events(options_.events);
   tell("source: " + at.input.source->format().description);
   tell("hands off for some seconds");
-  const Seen seen = watch(*at.input.source, stop, hands_off);
+  const Seen seen = watch(*at.input.source, stop, hands_off, events);
   if (seen == Seen::stopped) {
     tell("stopped; nothing was written");
     return kRefused;

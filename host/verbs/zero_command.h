@@ -13,6 +13,7 @@ namespace tagwrench {
 struct ZeroCommandOptions {
   std::string sensor;  ///< path
   std::string source;  ///< SRC
+  int events = -1;     ///< descriptor, see Events
 };
 
 /// Entries of `wrench:` that void a zero, for those who measure rest or wrench anew; empty where

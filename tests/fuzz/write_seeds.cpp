@@ -1,6 +1,6 @@
 // write_seeds DIR: one example of every message kind as first inputs of the fuzzers, in DIR/frames,
-// DIR/messages, DIR/streams and DIR/board; and recordings that are as they should be, in
-// DIR/recordings.
+// DIR/messages, DIR/streams and DIR/board; recordings that are as they should be, in
+// DIR/recordings; and what pages send, in DIR/web.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -74,6 +74,18 @@ RowWriter impossible() {
   return rows;
 }
 
+/// Headers and a wish, each on its line, as web_messages.cpp takes them.
+void write_web(const std::filesystem::path& dir) {
+  const auto text = [&](const char* name, std::string_view lines) {
+    write(dir / name, Bytes(lines.begin(), lines.end()));
+  };
+  text("wish", R"({"id":17,"ask":"try","name":"cad","text":"a: [1, {}]\n"})");
+  text("headers",
+       "/sensor/assets/%61.js?x\nlocalhost:8137\nhttp://localhost:8137\n"
+       "tagwrench.v1, tagwrench.token.MDEyMzQ1Njc4OWFiY2RlZg\nBearer 0123456789abcdef");
+  text("foreign", "/..%2f%2e%2e/x\n[::1]:80\nhttp://evil.example\nchat\nBasic x");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) try {
@@ -106,6 +118,7 @@ int main(int argc, char** argv) try {
   write(dir / "recordings" / "impossible", impossible().bytes());
   write(dir / "recordings" / "damaged",
         recording().change(6, 1).null().damage(100, 0).damage(3000, 0xff).bytes());
+  write_web(dir / "web");
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "write_seeds: " << error.what() << '\n';

@@ -5,7 +5,11 @@
 
 namespace tagwrench {
 
-Keys::Keys() noexcept {
+Keys::Keys(From from) noexcept {
+  if (from == From::program) {
+    there_ = true;
+    return;
+  }
   // A program in the background would be stopped for touching the terminal.
   if (::isatty(STDIN_FILENO) == 0 || ::tcgetpgrp(STDIN_FILENO) != ::getpgrp()) return;
   if (::tcgetattr(STDIN_FILENO, &before_) != 0) return;
@@ -13,11 +17,11 @@ Keys::Keys() noexcept {
   raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
   raw.c_cc[VMIN] = 0;
   raw.c_cc[VTIME] = 0;
-  there_ = ::tcsetattr(STDIN_FILENO, TCSANOW, &raw) == 0;
+  there_ = changed_ = ::tcsetattr(STDIN_FILENO, TCSANOW, &raw) == 0;
 }
 
 Keys::~Keys() {
-  if (there_) ::tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  if (changed_) ::tcsetattr(STDIN_FILENO, TCSANOW, &before_);
 }
 
 int Keys::poll_fd() const noexcept { return there_ ? STDIN_FILENO : -1; }
@@ -28,7 +32,7 @@ char Keys::next() noexcept {
   char key = 0;
   if (::poll(&entry, 1, 0) <= 0) return 0;
   if (::read(STDIN_FILENO, &key, 1) == 1) return key;
-  there_ = false;  // the terminal is gone
+  there_ = changed_ = false;  // the terminal, or the program, is gone
   return 0;
 }
 

@@ -1,7 +1,9 @@
-// Single keys from the terminal, while a calibration runs.
+// Single keys from the terminal, or from a program that presses them, while a calibration runs.
 #pragma once
 
 #include <termios.h>
+
+#include <cstdint>
 
 namespace tagwrench {
 
@@ -9,7 +11,12 @@ namespace tagwrench {
 /// put back at the end.
 class Keys {
  public:
-  Keys() noexcept;
+  enum class From : std::uint8_t {
+    terminal,
+    program,  ///< standard input is a pipe, a byte a key
+  };
+
+  explicit Keys(From from) noexcept;
   Keys(const Keys&) = delete;
   Keys& operator=(const Keys&) = delete;
   ~Keys();
@@ -22,6 +29,7 @@ class Keys {
 
  private:
   bool there_ = false;
+  bool changed_ = false;  ///< the terminal
   termios before_{};
 };
 

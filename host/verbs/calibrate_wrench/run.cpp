@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <nlohmann/json.hpp>
 
 #include "host/hint_text.h"
 #include "host/tell.h"
@@ -76,13 +77,15 @@ class Runner {
         guide_(guide),
         source_(*run.at->input.source),
         tracker_(run.at->input.sensor.camera, run.at->input.sensor.target,
-                 run.at->input.sensor.rest) {
+                 run.at->input.sensor.rest),
+        keys_(run.events->on() ? Keys::From::program : Keys::From::terminal) {
     if (run.at->bench)
       person_.emplace(*run.at->bench, *run.plan, run.at->input.sensor.wrench.range);
   }
 
   GuideEnd run() {
-    if (keys_.there()) tell("keys: s skips a step, r does the last one again, q stops");
+    if (keys_.there() && !run_.events->on())
+      tell("keys: s skips a step, r does the last one again, q stops");
     while (!end_ && !guide_.done()) {
       speak();
       wait();
@@ -166,11 +169,29 @@ class Runner {
     if (person_) person_->look_at(guide_);
     guide_.frame(time, track);
     if (!guide_.done()) tell_.live(guide_);
+    tell_events(frame, track);
+  }
+
+  void tell_events(const Frame& frame, const Track& track) {
+    if (!run_.events->on()) return;
+    const std::size_t done = guide_.records().size() + guide_.skipped().size();
+    const Vector6 covered = guide_.coverage().covered();
+    run_.events->progress(static_cast<double>(done) /
+                          static_cast<double>(std::max<std::size_t>(1, run_.plan->steps.size())));
+    run_.events->coverage({{"axes", std::vector<double>(covered.begin(), covered.end())}});
+    run_.events->picture(frame.image, {track.corners.data(), track.corner_count});
+    if (!guide_.done()) run_.events->live(guide_.live());
   }
 
   void speak() {
-    for (GuideLine line; guide_.next(line);)
-      say((line.kind == GuideLine::Kind::task ? "> " : "") + line.text);
+    for (GuideLine line; guide_.next(line);) {
+      const bool warning = line.kind == GuideLine::Kind::warning;
+      if (warning && run_.events->on()) {
+        run_.events->line("warning", line.text);
+      } else {
+        say((line.kind == GuideLine::Kind::task ? "> " : "") + line.text);
+      }
+    }
   }
 
   /// What people are told is in the recording too.

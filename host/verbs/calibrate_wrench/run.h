@@ -10,6 +10,7 @@
 #include "host/verbs/bench_input.h"
 #include "host/verbs/calibrate_wrench/progress.h"
 #include "host/verbs/calibrate_wrench/recorder.h"
+#include "host/verbs/events.h"
 
 namespace tagwrench {
 
@@ -22,6 +23,7 @@ struct GuideRun {
   std::filesystem::path progress;
   ProgressOf of;
   std::optional<double> seconds;
+  Events* events = nullptr;
 };
 
 enum class GuideEnd : std::uint8_t {

@@ -1,0 +1,23 @@
+// The pages of `tagwrench run --output web`: where they are served, and what they are told of a
+// run.
+#pragma once
+
+#include <memory>
+
+#include "host/board/run_board.h"
+#include "host/input.h"
+#include "host/verbs/run_command.h"
+#include "host/web/bridge/web_bridge.h"
+
+namespace tagwrench {
+
+/// Whether `web` is among the outputs. Throws ConfigError where it is, but cannot be.
+bool has_web(const RunOptions& options);
+
+/// Binds, and says where; nothing is served yet. `stop` is of signals_as_fd().
+std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& stop);
+
+/// `desk`: it listens to wishes.
+RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bool desk);
+
+}  // namespace tagwrench

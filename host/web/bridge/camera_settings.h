@@ -1,0 +1,47 @@
+// The settings of the camera that runs, over a descriptor of its own: what there is, and what it
+// stands at. What the run keeps fixed is changed by the run itself.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/os/unique_fd.h"
+
+namespace tagwrench {
+
+struct CameraSetting {
+  std::uint32_t id = 0;  ///< a V4L2_CID_ number
+  std::string name;
+  std::int32_t value = 0;
+  std::int32_t minimum = 0;
+  std::int32_t maximum = 0;
+  std::int32_t step = 1;
+  bool writable = true;
+};
+
+class CameraSettings {
+ public:
+  /// `device`: its node; a camera that is away has no settings until it is back.
+  explicit CameraSettings(std::string device) : device_(std::move(device)) {}
+
+  /// Whole numbers, switches and choices.
+  std::vector<CameraSetting> all();
+  /// Of a setting that nobody keeps fixed. False: the camera refuses.
+  bool set(std::uint32_t id, std::int32_t value);
+
+ private:
+  bool reach();
+
+  std::string device_;
+  UniqueFd fd_;
+};
+
+nlohmann::json settings_json(const std::vector<CameraSetting>& settings);
+
+/// The nearest value that the setting can have.
+std::int32_t nearest(const CameraSetting& setting, std::int64_t value);
+
+}  // namespace tagwrench

@@ -1,0 +1,86 @@
+#include "host/web/bridge/desk_link.h"
+
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/post.hpp>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "host/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+using Protocol = boost::asio::local::datagram_protocol;
+
+constexpr const char* kNobody = "the sensor does not run at the moment; try again when it does";
+
+}  // namespace
+
+DeskAnswer desk_answer(std::string_view bytes) {
+  constexpr std::string_view kDone = "ok: ";
+  constexpr std::string_view kError = "error: ";
+  while (!bytes.empty() && bytes.back() == '\n') bytes.remove_suffix(1);
+  if (bytes.starts_with(kDone)) return {true, std::string(bytes.substr(kDone.size()))};
+  if (bytes.starts_with(kError)) bytes.remove_prefix(kError.size());
+  return {false, std::string(bytes)};
+}
+
+DeskLink::DeskLink(boost::asio::io_context& context, std::string path)
+    : path_(std::move(path)), socket_(context), patience_(context) {
+  const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const sa_family_t family = AF_UNIX;  // alone, it asks for a name of the kernel's choice
+  sockaddr own{};
+  own.sa_family = family;
+  if (fd < 0 || ::bind(fd, &own, sizeof family) != 0)
+    throw ConfigError(std::string("web: no socket to be had: ") + std::strerror(errno) +
+                      "; end other programs");
+  socket_.assign(Protocol(), fd);
+  socket_.non_blocking(true);
+}
+
+void DeskLink::ask(std::string wish, Done done) {
+  wishes_.push_back({std::move(wish), std::move(done)});
+  if (!asking_) send();
+}
+
+void DeskLink::send() {
+  asking_ = true;
+  boost::system::error_code error;
+  for (std::size_t stale = 1; stale > 0 && !error;)  // answers that came too late
+    stale = socket_.receive(boost::asio::buffer(answer_), 0, error);
+  socket_.send_to(boost::asio::buffer(wishes_.front().text), Protocol::endpoint(path_), 0, error);
+  if (error) {
+    boost::asio::post(socket_.get_executor(), [this, number = number_] {
+      if (number == number_) finish({false, kNobody});
+    });
+    return;
+  }
+  socket_.async_receive(
+      boost::asio::buffer(answer_),
+      [this, number = number_](boost::system::error_code failed, std::size_t size) {
+        if (!failed && number == number_) finish(desk_answer({answer_.data(), size}));
+      });
+  patience_.expires_after(kPatience);
+  patience_.async_wait([this, number = number_](boost::system::error_code failed) {
+    if (failed || number != number_) return;
+    socket_.cancel();
+    finish({false, kNobody});
+  });
+}
+
+void DeskLink::finish(DeskAnswer answer) {
+  ++number_;
+  patience_.cancel();
+  const Wish wish = std::move(wishes_.front());
+  wishes_.pop_front();
+  asking_ = false;
+  if (!wishes_.empty()) send();
+  wish.done(std::move(answer));
+}
+
+}  // namespace tagwrench

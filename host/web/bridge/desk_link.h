@@ -1,0 +1,55 @@
+// The bridge's own desk, asked as any other program asks it: one datagram a wish, one back. In the
+// server's thread, which never waits for it.
+#pragma once
+
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/local/datagram_protocol.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <deque>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "host/desk/control_socket.h"
+
+namespace tagwrench {
+
+/// What the desk said.
+struct DeskAnswer {
+  bool ok = false;
+  std::string text;  ///< without "ok: " or "error: ", and without the line's end
+};
+
+DeskAnswer desk_answer(std::string_view bytes);
+
+class DeskLink {
+ public:
+  using Done = std::function<void(DeskAnswer)>;
+  static constexpr std::chrono::seconds kPatience{2};
+
+  /// `path` of the desk's socket, where somebody may or may not listen. Throws ConfigError if the
+  /// system has no more descriptors.
+  DeskLink(boost::asio::io_context& context, std::string path);
+
+  /// `done` is called exactly once, later; one wish after the other.
+  void ask(std::string wish, Done done);
+
+ private:
+  struct Wish {
+    std::string text;
+    Done done;
+  };
+  void send();
+  void finish(DeskAnswer answer);
+
+  std::string path_;
+  boost::asio::local::datagram_protocol::socket socket_;
+  boost::asio::steady_timer patience_;
+  std::deque<Wish> wishes_;
+  std::array<char, ControlSocket::kLongestAnswer> answer_{};
+  std::uint64_t number_ = 0;  ///< of the wish at the front
+  bool asking_ = false;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,223 @@
+#include "host/web/bridge/job_process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <boost/asio/buffer.hpp>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "host/config_error.h"
+#include "host/os/close_files.h"
+#include "host/os/unique_fd.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr int kAboveOthers = 10;  // no descriptor of the child's own
+constexpr int kRoom = 1 << 20;    // of the pipe for events: a picture is large
+constexpr std::size_t kLongestSaid = 8192;
+constexpr std::size_t kLongestEvent = std::size_t{8} << 20;
+
+struct Pipe {
+  UniqueFd read;
+  UniqueFd write;
+};
+
+Pipe make_pipe() {
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0)
+    throw ConfigError(
+        fmt::format("job: no pipe to be had: {}; end other programs", std::strerror(errno)));
+  const UniqueFd read(ends[0]);
+  const UniqueFd write(ends[1]);
+  return {UniqueFd(::fcntl(read.get(), F_DUPFD_CLOEXEC, kAboveOthers)),
+          UniqueFd(::fcntl(write.get(), F_DUPFD_CLOEXEC, kAboveOthers))};
+}
+
+/// Of the child, between fork and exec: nothing but system calls.
+struct Child {
+  std::array<int, 4> fds;  ///< that become 0 to 3
+  std::vector<int> kept;
+  std::string program;
+  std::vector<std::string> words;
+  std::vector<char*> argv;
+  pid_t parent = ::getpid();
+
+  [[noreturn]] void become() {
+    sigset_t none;
+    sigemptyset(&none);
+    ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
+    ::signal(SIGPIPE, SIG_DFL);
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(127);
+    for (std::size_t i = 0; i < fds.size(); ++i) {
+      if (::dup2(fds[i], static_cast<int>(i)) < 0) ::_exit(127);
+    }
+    close_all_but(kept);
+    ::execv(program.c_str(), argv.data());
+    ::_exit(127);
+  }
+};
+
+}  // namespace
+
+JobProcess::JobProcess(boost::asio::io_context& context, Listener listener)
+    : listener_(std::move(listener)),
+      out_(context),
+      err_(context),
+      events_(context),
+      keys_(context),
+      end_(context),
+      patience_(context) {
+  out_.by_lines = false;
+  out_.whole = listener_.printed;
+  err_.whole = listener_.said;
+  err_.longest = kLongestSaid;
+  events_.whole = listener_.event;
+  events_.longest = kLongestEvent;
+}
+
+JobProcess::~JobProcess() { abandon(); }
+
+std::shared_ptr<JobProcess> JobProcess::start(boost::asio::io_context& context,
+                                              const std::string& program, const JobCommand& command,
+                                              Listener listener) {
+  const std::shared_ptr<JobProcess> job(new JobProcess(context, std::move(listener)));
+  job->spawn(program, command);
+  job->listen();
+  return job;
+}
+
+void JobProcess::spawn(const std::string& program, const JobCommand& command) {
+  Pipe in = make_pipe(), out = make_pipe(), err = make_pipe(), events = make_pipe();
+  ::fcntl(events.write.get(), F_SETPIPE_SZ, kRoom);
+  Child child{{in.read.get(), out.write.get(), err.write.get(), events.write.get()},
+              {0, 1, 2, kEventsFd},
+              program,
+              {"tagwrench"},
+              {}};
+  child.words.insert(child.words.end(), command.arguments.begin(), command.arguments.end());
+  if (command.tells_events) child.words.push_back(fmt::format("--events={}", kEventsFd));
+  for (std::string& word : child.words) child.argv.push_back(word.data());
+  child.argv.push_back(nullptr);
+  pid_ = ::fork();
+  if (pid_ == 0) child.become();
+  if (pid_ < 0) {
+    throw ConfigError(fmt::format("job: {} cannot be started: {}; end other programs", program,
+                                  std::strerror(errno)));
+  }
+  UniqueFd end(static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)));
+  if (!end) {
+    throw ConfigError(fmt::format("job: its end cannot be watched: {}; end other programs",
+                                  std::strerror(errno)));
+  }
+  for (auto [stream, fd] : {std::pair{&out_.stream, &out.read},
+                            {&err_.stream, &err.read},
+                            {&events_.stream, &events.read},
+                            {&end_, &end}}) {
+    stream->assign(::fcntl(fd->get(), F_DUPFD_CLOEXEC, kAboveOthers));
+  }
+  if (command.takes_keys) {
+    ::fcntl(in.write.get(), F_SETFL, O_NONBLOCK);
+    keys_.assign(::fcntl(in.write.get(), F_DUPFD_CLOEXEC, kAboveOthers));
+  }
+}
+
+void JobProcess::listen() {
+  for (Channel* channel : {&out_, &err_, &events_}) {
+    channel->stream.non_blocking(true);
+    read(*channel);
+  }
+  wait_for_end();
+}
+
+void JobProcess::read(Channel& channel) {
+  channel.stream.async_read_some(
+      boost::asio::buffer(channel.buffer),
+      [self = shared_from_this(), &channel](boost::system::error_code error, std::size_t count) {
+        if (error || self->pid_ <= 0) return;
+        self->take(channel, count);
+        self->read(channel);
+      });
+}
+
+void JobProcess::take(Channel& channel, std::size_t count) {
+  std::string_view bytes(channel.buffer.data(), count);
+  if (!channel.by_lines) {
+    channel.whole(bytes);
+    return;
+  }
+  while (!bytes.empty()) {
+    const std::size_t end = bytes.find('\n');
+    const std::string_view part = bytes.substr(0, end);
+    channel.skipping = channel.skipping || channel.line.size() + part.size() > channel.longest;
+    if (!channel.skipping) channel.line += part;
+    if (end == std::string_view::npos) return;
+    if (!channel.skipping) channel.whole(channel.line);
+    channel.line.clear();
+    channel.skipping = false;
+    bytes.remove_prefix(end + 1);
+  }
+}
+
+/// What the child wrote before it ended.
+void JobProcess::drain(Channel& channel) {
+  for (ssize_t count; (count = ::read(channel.stream.native_handle(), channel.buffer.data(),
+                                      channel.buffer.size())) > 0;)
+    take(channel, static_cast<std::size_t>(count));
+  if (!channel.line.empty() && channel.by_lines) channel.whole(std::exchange(channel.line, {}));
+}
+
+void JobProcess::wait_for_end() {
+  end_.async_wait(Stream::wait_read, [self = shared_from_this()](boost::system::error_code error) {
+    if (!error) self->reap();
+  });
+}
+
+void JobProcess::reap() {
+  int status = 0;
+  if (::waitpid(pid_, &status, WNOHANG) != pid_) return wait_for_end();
+  for (Channel* channel : {&err_, &events_, &out_}) drain(*channel);
+  pid_ = 0;
+  close();
+  listener_.ended(status);
+}
+
+void JobProcess::press(char key) {
+  if (pid_ <= 0 || !keys_.is_open()) return;
+  // Who does not read his keys does not get more of them.
+  [[maybe_unused]] const ssize_t written = ::write(keys_.native_handle(), &key, 1);
+}
+
+void JobProcess::abandon() {
+  if (pid_ <= 0) return;
+  ::kill(pid_, SIGKILL);
+  ::waitpid(std::exchange(pid_, 0), nullptr, 0);
+  close();
+}
+
+void JobProcess::close() {
+  boost::system::error_code ignored;
+  for (Stream* stream : {&out_.stream, &err_.stream, &events_.stream, &keys_, &end_})
+    stream->close(ignored);
+  patience_.cancel();
+}
+
+void JobProcess::stop() {
+  if (pid_ <= 0 || std::exchange(stopping_, true)) return;
+  ::kill(pid_, SIGTERM);
+  patience_.expires_after(kPatience);
+  patience_.async_wait([self = shared_from_this()](boost::system::error_code error) {
+    if (!error && self->pid_ > 0) ::kill(self->pid_, SIGKILL);
+  });
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,83 @@
+// A verb of our own program as a child: its words, its keys and its end, all in the server's
+// thread, which never waits for it.
+#pragma once
+
+#include <sys/types.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/web/bridge/job_command.h"
+
+namespace tagwrench {
+
+class JobProcess : public std::enable_shared_from_this<JobProcess> {
+ public:
+  struct Listener {
+    std::function<void(std::string_view bytes)> printed;
+    std::function<void(std::string_view line)> said;
+    std::function<void(std::string_view line)> event;
+    /// The last that is heard of it; `status` as waitpid() has it.
+    std::function<void(int status)> ended;
+  };
+  /// From a wish to stop to the end by force.
+  static constexpr std::chrono::seconds kPatience{5};
+  /// Its own descriptor for events.
+  static constexpr int kEventsFd = 3;
+
+  /// The child dies with this process. Throws ConfigError if it cannot be started.
+  static std::shared_ptr<JobProcess> start(boost::asio::io_context& context,
+                                           const std::string& program, const JobCommand& command,
+                                           Listener listener);
+  JobProcess(const JobProcess&) = delete;
+  JobProcess& operator=(const JobProcess&) = delete;
+  /// Kills it if it is still there.
+  ~JobProcess();
+
+  void press(char key);
+  void stop();
+  /// Kills it; nothing more is heard of it.
+  void abandon();
+  bool stopping() const { return stopping_; }
+  pid_t pid() const { return pid_; }
+
+ private:
+  using Stream = boost::asio::posix::stream_descriptor;
+  /// What a pipe brings, cut into lines where it has them.
+  struct Channel {
+    explicit Channel(boost::asio::io_context& context) : stream(context) {}
+    Stream stream;
+    std::vector<char> buffer = std::vector<char>(65'536);
+    std::string line;
+    std::size_t longest = 0;  ///< line; longer ones are left out
+    bool skipping = false;
+    std::function<void(std::string_view)> whole;
+    bool by_lines = true;
+  };
+
+  JobProcess(boost::asio::io_context& context, Listener listener);
+  void spawn(const std::string& program, const JobCommand& command);
+  void listen();
+  void read(Channel& channel);
+  void take(Channel& channel, std::size_t count);
+  void drain(Channel& channel);
+  void wait_for_end();
+  void reap();
+  void close();
+
+  Listener listener_;
+  Channel out_, err_, events_;
+  Stream keys_;
+  Stream end_;  ///< a pidfd: readable once the child has ended
+  boost::asio::steady_timer patience_;
+  pid_t pid_ = 0;
+  bool stopping_ = false;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,149 @@
+#include "host/web/bridge/job_report.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace tagwrench {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kLargestPicture_px = 16'384;
+
+int digit_of(char c) {
+  if (c >= 'A' && c <= 'Z') return c - 'A';
+  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+  if (c >= '0' && c <= '9') return c - '0' + 52;
+  return c == '+' ? 62 : c == '/' ? 63 : -1;
+}
+
+const char* state_name(JobReport::State state) {
+  switch (state) {
+    case JobReport::State::running:
+      return "running";
+    case JobReport::State::done:
+      return "done";
+    case JobReport::State::failed:
+      return "failed";
+    case JobReport::State::stopped:
+      return "stopped";
+  }
+  return "?";
+}
+
+/// The member of this name, if it is of this type.
+const json* member(const json& object, const char* key, json::value_t type) {
+  const auto found = object.find(key);
+  return found == object.end() || found->type() != type ? nullptr : &*found;
+}
+
+int size_of(const json& picture, const char* key) {
+  const auto found = picture.find(key);
+  if (found == picture.end() || !found->is_number_integer()) return 0;
+  const auto size = found->get<std::int64_t>();
+  return size > 0 && size <= kLargestPicture_px ? static_cast<int>(size) : 0;
+}
+
+std::optional<JobPicture> picture_in(const json& event) {
+  const json* jpeg = member(event, "jpeg", json::value_t::string);
+  const json* tags = member(event, "tags", json::value_t::array);
+  if (jpeg == nullptr || tags == nullptr) return {};
+  std::optional<std::vector<std::uint8_t>> bytes = from_base64(jpeg->get_ref<const std::string&>());
+  JobPicture picture{size_of(event, "width"), size_of(event, "height"), *tags, {}};
+  if (!bytes || picture.width == 0 || picture.height == 0) return {};
+  picture.jpeg = std::move(*bytes);
+  return picture;
+}
+
+}  // namespace
+
+JobReport::JobReport(std::string verb, std::vector<std::string> keys)
+    : verb_(std::move(verb)), keys_(std::move(keys)) {}
+
+void JobReport::said(std::string_view line) {
+  constexpr std::string_view kProgram = "tagwrench: ";
+  constexpr std::string_view kTask = "> ";
+  if (line.starts_with(kProgram)) line.remove_prefix(kProgram.size());
+  const bool task = line.starts_with(kTask);
+  if (task) line.remove_prefix(kTask.size());
+  if (!line.empty()) add(task ? "task" : "note", std::string(line.substr(0, kLongestLine)));
+}
+
+void JobReport::printed(std::string_view text) {
+  printed_ += text.substr(0, kLongestText - std::min(kLongestText, printed_.size()));
+}
+
+std::optional<JobPicture> JobReport::event(std::string_view text) {
+  const json event = json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (!event.is_object()) return {};
+  if (const json* line = member(event, "line", json::value_t::object)) {
+    const json* kind = member(*line, "kind", json::value_t::string);
+    const json* words = member(*line, "text", json::value_t::string);
+    if (kind != nullptr && words != nullptr)
+      add(kind->get<std::string>(), words->get<std::string>().substr(0, kLongestLine));
+  }
+  if (const json* live = member(event, "live", json::value_t::string))
+    live_ = live->get<std::string>();
+  if (const json* coverage = member(event, "coverage", json::value_t::object))
+    coverage_ = *coverage;
+  const auto progress = event.find("progress");
+  if (progress != event.end() && progress->is_number()) progress_ = *progress;
+  const json* picture = member(event, "picture", json::value_t::object);
+  return picture == nullptr ? std::nullopt : picture_in(*picture);
+}
+
+void JobReport::ended(State state, std::string why, json result) {
+  state_ = state;
+  live_.clear();
+  keys_.clear();
+  if (state == State::done) progress_ = 1.0;
+  // Its last words say why it failed, what it printed is what it found.
+  if (state == State::failed && !lines_.empty() && lines_.back().kind == "note")
+    lines_.back().kind = "warning";
+  if (!why.empty()) add(state == State::failed ? "warning" : "result", std::move(why));
+  result_ = std::move(result);
+  if (!printed_.empty()) {
+    if (!result_.is_object()) result_ = json::object();
+    result_["text"] = printed_;
+  }
+}
+
+json JobReport::to_json() const {
+  nlohmann::json lines = nlohmann::json::array();
+  for (const Line& line : lines_) lines.push_back({{"kind", line.kind}, {"text", line.text}});
+  return {{"verb", verb_},
+          {"state", state_name(state_)},
+          {"lines", std::move(lines)},
+          {"live", live_},
+          {"coverage", coverage_},
+          {"progress", progress_},
+          {"keys", keys_},
+          {"result", result_}};
+}
+
+void JobReport::add(std::string kind, std::string text) {
+  lines_.push_back({std::move(kind), std::move(text)});
+  if (lines_.size() > kMostLines) lines_.pop_front();
+}
+
+std::optional<std::vector<std::uint8_t>> from_base64(std::string_view text) {
+  if (text.size() % 4 != 0) return {};
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(text.size() / 4 * 3);
+  for (std::size_t i = 0; i < text.size(); i += 4) {
+    const bool last = i + 4 == text.size();
+    const std::size_t padding =
+        !last ? 0 : (text[i + 3] == '=' ? (text[i + 2] == '=' ? 2U : 1U) : 0U);
+    std::uint32_t four = 0;
+    for (std::size_t j = 0; j < 4; ++j) {
+      const int digit = j >= 4 - padding ? 0 : digit_of(text[i + j]);
+      if (digit < 0) return {};
+      four = four << 6 | static_cast<std::uint32_t>(digit);
+    }
+    for (std::size_t j = 0; j < 3 - padding; ++j)
+      bytes.push_back(static_cast<std::uint8_t>(four >> (16 - 8 * j)));
+  }
+  return bytes;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,74 @@
+#include "host/web/bridge/run_facts.h"
+
+#include <Eigen/Core>
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "host/config/calibration_file.h"
+#include "host/wrench/zero.h"
+
+namespace tagwrench {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array<const char*, 6> kAxisNames = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
+constexpr double kNoRange = 1e8;
+
+/// Full scale per axis, as samples have it: what the calibration vouches for, else what the
+/// sensor's shaping takes for full.
+Vector6 shown_range(const SensorConfig& sensor) {
+  const WrenchEstimator wrench(sensor.wrench);
+  Vector6 range = range_through(wrench.tool(), sensor.wrench.range);
+  for (int i = 0; i < 6; ++i) {
+    if (!(range[i] > 0 && range[i] < kNoRange)) range[i] = 1.5 * sensor.shaping.full_scale[i];
+  }
+  return range;
+}
+
+}  // namespace
+
+json hello_of(const RunFacts& facts, const std::string& recordings) {
+  const SensorConfig& sensor = facts.sensor;
+  json calibrated = nullptr;
+  json from_springs = json::array();
+  if (!sensor.calibration.empty()) {
+    const CalibrationRecord record = read_calibration(sensor.calibration).record;
+    if (!record.date.empty()) calibrated = record.date.substr(0, 10);
+    for (std::size_t i = 0; record.axis && i < kAxisNames.size(); ++i) {
+      if ((*record.axis)[i].state != AxisState::calibrated) from_springs.push_back(kAxisNames[i]);
+    }
+  } else {
+    for (const char* axis : kAxisNames) from_springs.push_back(axis);
+  }
+  const Vector6 range = shown_range(sensor);
+  json mounting = json::array();  // row by row
+  for (int i = 0; i < 9; ++i) mounting.push_back(sensor.shaping.hid_R_camera(i / 3, i % 3));
+  json cells = json::array();
+  for (int i = 0; facts.board && i < 4; ++i) cells.push_back(i);
+  return {{"type", "hello"},
+          {"protocol", 1},
+          {"version", TAGWRENCH_VERSION},
+          {"name", facts.name},
+          {"source", facts.format.description},
+          {"sensor", facts.place.sensor.empty() ? "built in" : facts.place.sensor},
+          {"camera",
+           {{"width", facts.format.width},
+            {"height", facts.format.height},
+            {"mirrored", sensor.camera.mirrored}}},
+          {"range_n", {range[0], range[1], range[2]}},
+          {"range_nm", {range[3], range[4], range[5]}},
+          {"hid_R_camera", mounting},
+          {"calibrated", calibrated},
+          {"axes_from_springs", from_springs},
+          {"folder", recordings},
+          {"can",
+           {{"camera_settings", !facts.camera_device.empty()},
+            {"led", facts.board},
+            {"cells", cells},
+            {"profiles", facts.desk},
+            {"record", facts.head.has_value()},
+            {"jobs", possible_jobs(facts.place)}}}};
+}
+
+}  // namespace tagwrench

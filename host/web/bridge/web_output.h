@@ -1,0 +1,89 @@
+// The run's end of the pages: every sample to the live feed, a picture now and then, a recording
+// where a page has begun one; and what a page wishes of the loop itself. Waits for nobody.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "host/frame_log.h"
+#include "host/output/output.h"
+#include "host/output/spnav_output.h"
+#include "host/pipeline.h"
+#include "host/source/region_source.h"
+#include "host/web/bridge/board_control.h"
+#include "host/web/bridge/latest.h"
+#include "host/web/bridge/run_control.h"
+#include "host/web/bridge/run_recording.h"
+#include "host/web/server/live_feed.h"
+
+namespace tagwrench {
+
+/// What is seen now, besides the sample.
+struct SeenNow {
+  Status status = Status::acquiring;
+  Hint trouble = Hint::none;  ///< why the target is not held
+  HintDetails details;
+  std::array<TagCorners, 8> corners{};
+  std::uint8_t corner_count = 0;
+  double residual_part = 0;
+  ZeroState zero_state = ZeroState::off;
+  std::uint64_t skipped = 0;  ///< samples that slow readers lost
+};
+
+/// Shared by the loop's thread, which puts, and the server's, which gets.
+struct RunViews {
+  Latest<SeenNow> seen;
+  Latest<BoardReading> board;
+};
+
+class WebOutput final : public Output, public FrameLog {
+ public:
+  struct Parts {
+    LiveFeed* feed = nullptr;
+    RunControl* control = nullptr;
+    RunViews* views = nullptr;
+    RegionSource* source = nullptr;
+    BoardControl* board = nullptr;          ///< may be null
+    const SpnavOutput* programs = nullptr;  ///< likewise
+    /// A line for people, and the programs that read the spnav socket by then.
+    std::function<void(std::string line, std::vector<std::string> programs)> news;
+  };
+
+  /// Borrows all of them.
+  explicit WebOutput(Parts parts);
+
+  // Output
+  int poll_fd() const noexcept override { return parts_.control->wishes_fd(); }
+  std::string_view service() noexcept override;
+  bool notice(std::string_view line) noexcept override;
+
+  // FrameLog
+  void frame(const LoggedFrame& all) noexcept override;
+  void missing(const Sample& sample) noexcept override;
+  void disconnected(std::string_view detail) noexcept override;
+  void reconnected(std::string_view detail) noexcept override;
+
+  /// Who else is told of each frame; borrowed.
+  void pass_on_to(FrameLog* next) noexcept { next_ = next; }
+  /// Of the run; borrowed.
+  void follow(const RunReport& report) noexcept { report_ = &report; }
+
+  // The loop's thread.
+  /// Null: none any more. Borrowed.
+  void record(RunRecording* recording) noexcept { recording_ = recording; }
+  RegionSource& source() noexcept { return *parts_.source; }
+  BoardControl* board() noexcept { return parts_.board; }
+
+ private:
+  void look(const Track& track, const Sample& sample) noexcept;
+
+  Parts parts_;
+  RunRecording* recording_ = nullptr;
+  const RunReport* report_ = nullptr;
+  FrameLog* next_ = nullptr;
+  SeenNow seen_;
+};
+
+}  // namespace tagwrench

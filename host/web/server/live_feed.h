@@ -1,0 +1,91 @@
+// From the frame loop to the pages' thread: the last samples, and a picture now and then. The frame
+// loop's calls wait for nobody, use no heap and make no system call; a reader that is late loses
+// samples, and can count them.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "host/frame_log.h"
+#include "host/types.h"
+
+namespace tagwrench {
+
+/// A sample, and what the tracker said beside it. Copied word by word.
+struct LiveSample {
+  Sample sample;
+  double residual_px = 0;
+  std::uint64_t frames = 0;   ///< with this one, since the feed began
+  std::uint64_t dropped = 0;  ///< likewise
+  std::uint8_t tags_held = 0;
+};
+
+/// A picture as the source delivered it, and what was seen in it.
+struct LivePicture {
+  static constexpr std::size_t kMostBytes = std::size_t{4} << 20;
+
+  std::uint64_t sequence = 0;
+  TimePoint capture_time{};
+  Status status = Status::acquiring;
+  int width = 0;  ///< of the whole picture
+  int height = 0;
+  std::uint32_t fourcc = 0;  ///< of `bytes`; GREY of `part` alone where the source keeps no raw
+                             ///< picture
+  int stride = 0;            ///< of `bytes`
+  Region part;               ///< what `bytes` show; empty: all
+  std::uint8_t tag_count = 0;
+  std::array<TagCorners, 8> tags{};
+  std::size_t size = 0;
+  std::unique_ptr<std::uint8_t[]> bytes;
+};
+
+class LiveFeed {
+ public:
+  static constexpr std::size_t kKept = 256;
+
+  LiveFeed();
+  LiveFeed(const LiveFeed&) = delete;
+  LiveFeed& operator=(const LiveFeed&) = delete;
+  ~LiveFeed();
+
+  // The frame loop's side: one thread at a time.
+
+  /// Without a track: no frame came.
+  void sample(const Sample& sample, const Track* track) noexcept;
+  /// Somebody looks, and the last picture is long enough ago.
+  bool wants_picture(TimePoint now) const noexcept;
+  /// Copies it, unless the reader still has both buffers. Never more than kMostBytes.
+  void picture(const LoggedFrame& logged) noexcept;
+
+  // The reader's side: one thread.
+
+  /// How many samples were ever written: the next one's position.
+  std::uint64_t written() const noexcept { return written_.load(std::memory_order_acquire); }
+  /// Nothing: not written yet, or overwritten already.
+  std::optional<LiveSample> read(std::uint64_t position) const noexcept;
+
+  /// None while the interval is Duration::max(). The first wish makes the buffers.
+  void want_pictures(Duration interval);
+  /// The newest that has not been taken yet; null: none. Is given back with release().
+  const LivePicture* take_picture() noexcept;
+  void release(const LivePicture* picture) noexcept;
+
+ private:
+  struct Slot;
+  struct Buffer;
+
+  std::unique_ptr<Slot[]> slots_;
+  std::atomic<std::uint64_t> written_{0};
+  std::uint64_t frames_ = 0;
+  std::uint64_t dropped_ = 0;
+
+  std::unique_ptr<Buffer[]> buffers_;
+  std::atomic<Duration::rep> interval_;
+  TimePoint last_picture_{};  ///< the frame loop's
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,141 @@
+// The bridge's pages: a small HTTP and WebSocket server with a thread of its own. It hands out the
+// built pages, what the live feed reads, and the bridge's messages; and it takes the pages' wishes.
+//
+// Everything that comes in is untrusted and bounded: see host/web/README.md.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "host/web/server/live_figures.h"
+
+namespace boost::asio {
+class io_context;
+}
+
+namespace tagwrench {
+
+class LiveFeed;
+
+/// A page's wish, as far as any page's wish is checked: `what` is a word of lower-case letters and
+/// underscores, `arguments` an object without "id" and "ask", nested no deeper than eight.
+struct Ask {
+  std::uint64_t page = 0;
+  std::int64_t id = 0;
+  std::string what;
+  nlohmann::json arguments;
+};
+
+/// Called by the server's thread. Whoever is asked owes exactly one WebServer::answer(), now or
+/// later; an exception is answered with its text.
+class AskHandler {
+ public:
+  AskHandler() = default;
+  AskHandler(const AskHandler&) = delete;
+  AskHandler& operator=(const AskHandler&) = delete;
+  virtual ~AskHandler() = default;
+
+  virtual void ask(Ask ask) = 0;
+  /// Has got its hello and will hear send_all().
+  virtual void page_came(std::uint64_t /*page*/) {}
+  virtual void page_gone(std::uint64_t /*page*/) {}
+};
+
+/// How long is waited for what a page, or whoever connects, owes.
+struct WebPatience {
+  Duration request = std::chrono::seconds(10);  ///< for a request, and for a piece of an answer to
+                                                ///< be taken
+  Duration unread = std::chrono::seconds(10);   ///< for a page's message to be taken
+  Duration ping = std::chrono::seconds(5);      ///< from one ping to the next
+  Duration silence = std::chrono::seconds(15);  ///< for anything to be heard from a page
+};
+
+struct WebOptions {
+  std::string address = "127.0.0.1";  ///< a number, or "localhost"
+  std::uint16_t port = 8137;          ///< 0: any that is free
+  std::string token{};                ///< empty: none, which a loopback address alone allows
+  std::filesystem::path pages{};      ///< holds dashboard/, sensor/ and flip/, as far as built
+  WebPatience patience{};
+};
+
+class WebServer {
+ public:
+  static constexpr std::size_t kMostPages = 16;
+  static constexpr std::size_t kMostConnections = 64;
+  static constexpr std::size_t kLongestAsk = 20'000;
+  static constexpr std::size_t kMostAsksASecond = 40;
+
+  /// Binds and listens, in no thread yet. Throws ConfigError: the address cannot be used, or needs
+  /// a token.
+  explicit WebServer(const WebOptions& options);
+  /// As stop().
+  ~WebServer();
+  WebServer(const WebServer&) = delete;
+  WebServer& operator=(const WebServer&) = delete;
+
+  /// Starts the thread. No signal is ever delivered to it. Without this, nothing is served. The
+  /// handler is borrowed until stop().
+  void start(AskHandler& handler);
+  /// Says good-bye to all pages (1001), and waits for the thread: the handler is not called any
+  /// more.
+  void stop();
+
+  /// What the frame loop writes and this server reads; lives as long as the server.
+  LiveFeed& feed() noexcept;
+  std::uint16_t port() const noexcept;
+  /// Without the token: fit for logs.
+  std::string url() const;
+  /// To be opened in a browser: the token, if there is one, in the fragment, which no browser
+  /// sends.
+  std::string url_with_token() const;
+  /// For descriptors and timers of those who answer. Its handlers run in the server's thread.
+  boost::asio::io_context& context() noexcept;
+
+  /// Any thread. Runs in the server's.
+  void post(std::function<void()> work);
+  /// Any thread: a page shows pictures at the moment.
+  bool pictures_wanted() const noexcept;
+
+  // From here on: before start(), or in the server's thread.
+
+  /// To the page, if it is still there.
+  void answer(std::uint64_t page, std::int64_t id, bool ok, std::string text,
+              nlohmann::json data = nullptr);
+  /// An object with a "type". Where a page is slow, the latest of a type replaces the one before;
+  /// but "say" is kept, up to 64 of them and answers, beyond which the page is closed.
+  void send_all(const nlohmann::json& message);
+  /// To one page, as above.
+  void send(std::uint64_t page, const nlohmann::json& message);
+  /// A picture that the feed did not bring (picture_message.h), to those pages that asked for
+  /// pictures.
+  void send_picture(std::shared_ptr<const std::vector<std::uint8_t>> message);
+  /// What every page gets first. Sent to all at once, too. Before there is one, a page hears
+  /// nothing but answers.
+  void set_hello(nlohmann::json hello);
+  std::size_t pages() const noexcept;
+
+  /// Rate, latency and so on of the last second, as read from the feed; zeros while no page is
+  /// open.
+  LiveFigures figures() const;
+
+  /// Is shown each picture that is taken from the feed, whole, at least twice a second while a page
+  /// is open. Valid during the call only.
+  void watch_pictures(std::function<void(const ImageView& picture)> watcher);
+
+  /// GET `url_prefix` NAME gives that file of the folder. NAME has letters, digits, '.', '-' and
+  /// '_', does not begin with '.', and is no symbolic link.
+  void serve_folder(std::string url_prefix, std::filesystem::path folder);
+  /// GET `url` gives this file, or 404 while it is not there.
+  void serve_file(std::string url, std::filesystem::path file);
+
+ private:
+  class Site;
+  std::unique_ptr<Site> site_;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,44 @@
+// The bridge asks the desk without waiting for it.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "host/desk/control_socket.h"
+#include "host/web/bridge/desk_link.h"
+
+namespace tagwrench {
+namespace {
+
+TEST(DeskLinks, GetOneAnswerAWishInOrder) {
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("desk-" + std::to_string(::getpid()))).string();
+  boost::asio::io_context context;
+  DeskLink link(context, path);
+  std::vector<DeskAnswer> answers;
+  const auto take = [&](DeskAnswer answer) { answers.push_back(std::move(answer)); };
+  link.ask("zero", take);
+  context.run();
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_FALSE(answers[0].ok);
+  EXPECT_NE(answers[0].text.find("does not run"), std::string::npos);
+
+  ControlSocket desk(path);
+  link.ask("next", take);
+  link.ask("show cad", take);
+  context.restart();
+  while (answers.size() < 3) {
+    context.poll();
+    context.restart();
+    const ControlWish wish = desk.next();
+    if (wish.kind == ControlWish::Kind::next_profile) desk.answer("ok: game\n");
+    if (wish.kind == ControlWish::Kind::show) desk.answer("error: no profile 'cad'\n");
+  }
+  EXPECT_TRUE(answers[1].ok);
+  EXPECT_EQ(answers[1].text, "game");
+  EXPECT_FALSE(answers[2].ok);
+  EXPECT_EQ(answers[2].text, "no profile 'cad'");
+}
+
+}  // namespace
+}  // namespace tagwrench

@@ -1,0 +1,131 @@
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+
+#include "host/config_error.h"
+#include "host/web/server/token_file.h"
+#include "host/web/server/web_server.h"
+#include "tests/unit/web/web_folder.h"
+
+namespace tagwrench {
+namespace {
+
+using std::filesystem::perms;
+using test::WebFolder;
+
+std::string token_fault(const std::filesystem::path& file) {
+  try {
+    web_token(file);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "no fault";
+}
+
+TEST(WebToken, IsMadeOnceForItsOwnerAlone) {
+  WebFolder folder;
+  const WebToken made = web_token(folder / "token");
+  EXPECT_TRUE(made.made);
+  EXPECT_EQ(made.text.size(), 43U);
+  EXPECT_EQ(std::filesystem::status(folder / "token").permissions(),
+            perms::owner_read | perms::owner_write);
+  const WebToken again = web_token(folder / "token");
+  EXPECT_FALSE(again.made);
+  EXPECT_EQ(again.text, made.text);
+  EXPECT_NE(web_token(folder / "other").text, made.text);
+}
+
+TEST(WebToken, MayBeWrittenByHand) {
+  WebFolder folder;
+  folder.write("token", "a-token.of_mine~16\r\n");
+  std::filesystem::permissions(folder / "token", perms::owner_read);
+  EXPECT_EQ(web_token(folder / "token").text, "a-token.of_mine~16");
+}
+
+TEST(WebToken, ThatOthersMayReadIsRefused) {
+  WebFolder folder;
+  folder.write("token", "0123456789abcdef");
+  std::filesystem::permissions(folder / "token", perms::owner_all | perms::group_read);
+  EXPECT_NE(token_fault(folder / "token").find("chmod 600"), std::string::npos);
+}
+
+TEST(WebToken, ThatIsNoneIsRefused) {
+  WebFolder folder;
+  for (const std::string text : {"", "short", "0123456789abcde", "0123456789abcdef 1",
+                                 "0123456789abcdef/", "0123456789abcdef\nmore"}) {
+    folder.write("token", text);
+    std::filesystem::permissions(folder / "token", perms::owner_read | perms::owner_write);
+    EXPECT_NE(token_fault(folder / "token").find("16 to 128"), std::string::npos) << text;
+  }
+  EXPECT_NE(token_fault(folder / "missing/token").find("cannot be written"), std::string::npos);
+  EXPECT_NE(token_fault(folder.path()).find("is not a file"), std::string::npos);
+}
+
+std::string server_fault(const WebOptions& options) {
+  try {
+    const WebServer server(options);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "no fault";
+}
+
+TEST(WebServerSetup, AnAddressThatOthersReachNeedsAToken) {
+  for (const char* address : {"0.0.0.0", "::", "192.0.2.1"}) {
+    WebOptions options;
+    options.address = address;
+    options.port = 0;
+    EXPECT_NE(server_fault(options).find("--web-token"), std::string::npos) << address;
+  }
+  WebOptions options;
+  options.address = "0.0.0.0";
+  options.port = 0;
+  options.token = "0123456789abcdef";
+  EXPECT_EQ(server_fault(options), "no fault");
+}
+
+TEST(WebServerSetup, LoopbackNeedsNoToken) {
+  for (const char* address : {"localhost", "127.0.0.1", "127.0.0.2", "::1", "[::1]"}) {
+    WebOptions options;
+    options.address = address;
+    options.port = 0;
+    const std::string fault = server_fault(options);
+    EXPECT_EQ(fault.find("--web-token"), std::string::npos) << fault;
+    EXPECT_EQ(fault.find("not an address"), std::string::npos) << fault;
+  }
+}
+
+TEST(WebServerSetup, APortThatIsTakenIsSaid) {
+  WebOptions options;
+  options.port = 0;
+  const WebServer first(options);
+  options.port = first.port();
+  const std::string fault = server_fault(options);
+  EXPECT_NE(fault.find("127.0.0.1:" + std::to_string(first.port()) + " is taken"),
+            std::string::npos)
+      << fault;
+}
+
+TEST(WebServerSetup, WhatIsNoAddressOfThisComputerIsSaid) {
+  WebOptions options;
+  options.port = 0;
+  options.address = "lab.example";
+  EXPECT_NE(server_fault(options).find("not an address"), std::string::npos);
+  options.address = "192.0.2.1";
+  options.token = "0123456789abcdef";
+  EXPECT_NE(server_fault(options).find("cannot listen"), std::string::npos);
+}
+
+TEST(WebServerSetup, TheTokenIsInTheUrlsFragmentAlone) {
+  WebOptions options;
+  options.port = 0;
+  options.token = "0123456789abcdef";
+  const WebServer server(options);
+  const std::string url = "http://127.0.0.1:" + std::to_string(server.port()) + '/';
+  EXPECT_EQ(server.url(), url);
+  EXPECT_EQ(server.url_with_token(), url + "#token=0123456789abcdef");
+}
+
+}  // namespace
+}  // namespace tagwrench
