@@ -1,0 +1,21 @@
+// What every view of the dashboard is, and what it is given.
+import type { Link } from './link';
+import type { Answer } from './protocol';
+
+export interface View {
+  /** Its name in the address: #live. */
+  readonly name: string;
+  readonly title: string;
+  readonly element: HTMLElement;
+  /** Comes into sight, or leaves it. */
+  shown?(on: boolean): void;
+}
+
+export interface App {
+  readonly link: Link;
+  readonly token: string;
+  /** A line for people, at the bottom of the page and for screen readers. */
+  tell(text: string, kind?: 'news' | 'good' | 'error'): void;
+  /** Asks, and tells what came of it. */
+  wish(what: string, extra?: Readonly<Record<string, unknown>>): Promise<Answer>;
+}
