@@ -31,7 +31,7 @@ offers 'camera|target|wrench' calibrate ''
 offers '--source' run --sou
 offers 'sim|sim:' run --source s
 offers 'jsonl:' run --output js
-offers 'wrench' run --output w
+offers 'wrench' run --output wr
 offers 'push.twr' run --source recording : pu
 offers 'cad' run --profile ca
 offers 'my sensor.yaml' run --sensor my

@@ -22,7 +22,7 @@ becomes() { # EXPECTED TYPED
 becomes 'tagwrench calibrate ' 'tagwrench cali'
 becomes 'tagwrench run --source ' 'tagwrench run --sou'
 becomes 'tagwrench run --output jsonl:' 'tagwrench run --output js'
-becomes 'tagwrench run --output wrench ' 'tagwrench run --output w'
+becomes 'tagwrench run --output wrench ' 'tagwrench run --output wr'
 becomes 'tagwrench run --source recording:push.twr ' 'tagwrench run --source recording:pu'
 becomes 'tagwrench run --profile game ' 'tagwrench run --profile ga'
 becomes 'tagwrench run --sensor push.twr ' 'tagwrench run --sensor pu'
