@@ -15,8 +15,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kSecondsToHang = 25;   // a mass, and to let it come to rest
-constexpr double kSecondsToBegin = 10;  // any other step
+constexpr double kSecondsToHang = 25;     // a mass, and to let it come to rest
+constexpr double kSecondsToBegin = 10;    // any other step
+constexpr std::size_t kMostWaiting = 64;  // wishes to the desk
 constexpr const char* kNoRun = "the sensor does not run at the moment; try again when it does";
 
 /// One line of plain text; empty where it may be left out and is.
@@ -99,6 +100,8 @@ void WebBridge::answer(const Ask& ask, bool ok, std::string text, json data) {
 
 DeskLink& WebBridge::desk() {
   if (!running_) throw WishRefused(kNoRun);
+  if (desk_ && desk_->waiting() >= kMostWaiting)
+    throw WishRefused("too many wishes wait for the desk; send fewer");
   if (desk_) return *desk_;
   throw WishRefused(
       "another bridge of this name has the desk; stop it, or give this one another --name");
@@ -137,6 +140,10 @@ void WebBridge::try_profile(const Ask& ask) {
   if (trial_ && trial_->page != ask.page)
     throw WishRefused("another page tries profile " + trial_->name + "; keep or revert it there");
   desk().ask("try " + name + "\n" + text, [this, ask, name](const DeskAnswer& said) {
+    if (said.ok && !pages_.contains(ask.page)) {  // gone before it had its answer
+      trial_.reset();
+      return desk_->ask("revert", [this](const DeskAnswer&) { read_profile(); });
+    }
     if (said.ok) trial_ = Trial{ask.page, name};
     const std::size_t line_end = std::min(said.text.find('\n'), said.text.size());
     answer(ask, said.ok,
@@ -283,7 +290,7 @@ void WebBridge::tare(const Ask& ask) {
     const bool done = there && board->tare(channel);
     server_.post([this, ask, there, done] {
       answer(ask, done,
-             done    ? "reads nothing now, until this run ends"
+             done    ? "is tared while it rests; that holds until this run ends"
              : there ? "tare: that load cell is not calibrated, or has not spoken"
                      : "tare: this run has no board; start with --board");
     });
@@ -298,7 +305,7 @@ void WebBridge::start_job(const Ask& ask) {
       job_command(verb, options == ask.arguments.end() ? json::object() : *options, facts_->place);
   if (recording_ && command.needs_camera)
     throw WishRefused(fmt::format("{}: needs the camera; stop the recording first", verb));
-  jobs_->start(std::move(command), !running_);
+  jobs_->start(std::move(command), camera_free_);
   answer(ask, true, "begun");
 }
 
@@ -331,8 +338,9 @@ void WebBridge::list_plans(const Ask& ask) {
 
 void WebBridge::retry(const Ask& ask) {
   if (running_) throw WishRefused("retry: the sensor runs");
-  if (jobs_->running()) throw WishRefused("retry: a job has the camera; stop it first");
-  raise_event(resume_);
+  if (jobs_->holds_camera()) throw WishRefused("retry: a job has the camera; stop it first");
+  if (!camera_free_) throw WishRefused("retry: the sensor is being set up already");
+  give_back_camera();
   answer(ask, true, "trying again");
 }
 

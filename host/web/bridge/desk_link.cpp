@@ -50,24 +50,26 @@ void DeskLink::ask(std::string wish, Done done) {
 
 void DeskLink::send() {
   asking_ = true;
+  const auto still = [this, number = number_, here = std::weak_ptr(here_)] {
+    return !here.expired() && number == number_;
+  };
   boost::system::error_code error;
   for (std::size_t stale = 1; stale > 0 && !error;)  // answers that came too late
     stale = socket_.receive(boost::asio::buffer(answer_), 0, error);
   socket_.send_to(boost::asio::buffer(wishes_.front().text), Protocol::endpoint(path_), 0, error);
   if (error) {
-    boost::asio::post(socket_.get_executor(), [this, number = number_] {
-      if (number == number_) finish({false, kNobody});
+    boost::asio::post(socket_.get_executor(), [this, still] {
+      if (still()) finish({false, kNobody});
     });
     return;
   }
-  socket_.async_receive(
-      boost::asio::buffer(answer_),
-      [this, number = number_](boost::system::error_code failed, std::size_t size) {
-        if (!failed && number == number_) finish(desk_answer({answer_.data(), size}));
-      });
+  socket_.async_receive(boost::asio::buffer(answer_),
+                        [this, still](boost::system::error_code failed, std::size_t size) {
+                          if (!failed && still()) finish(desk_answer({answer_.data(), size}));
+                        });
   patience_.expires_after(kPatience);
-  patience_.async_wait([this, number = number_](boost::system::error_code failed) {
-    if (failed || number != number_) return;
+  patience_.async_wait([this, still](boost::system::error_code failed) {
+    if (failed || !still()) return;
     socket_.cancel();
     finish({false, kNobody});
   });

@@ -8,6 +8,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -34,6 +35,8 @@ class DeskLink {
 
   /// `done` is called exactly once, later; one wish after the other.
   void ask(std::string wish, Done done);
+  /// Wishes that are not answered yet.
+  std::size_t waiting() const { return wishes_.size(); }
 
  private:
   struct Wish {
@@ -50,6 +53,8 @@ class DeskLink {
   std::array<char, ControlSocket::kLongestAnswer> answer_{};
   std::uint64_t number_ = 0;  ///< of the wish at the front
   bool asking_ = false;
+  /// What is on its way to be called when this is destroyed finds it gone.
+  std::shared_ptr<const bool> here_ = std::make_shared<const bool>(true);
 };
 
 }  // namespace tagwrench

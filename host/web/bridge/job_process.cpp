@@ -21,8 +21,9 @@
 namespace tagwrench {
 namespace {
 
-constexpr int kAboveOthers = 10;  // no descriptor of the child's own
-constexpr int kRoom = 1 << 20;    // of the pipe for events: a picture is large
+constexpr int kAboveOthers = 10;       // no descriptor of the child's own
+constexpr int kRoom = 1 << 20;         // of the pipe for events: a picture is large
+constexpr int kUnknownEnd = 255 << 8;  // where the kernel does not keep it: SIGCHLD is ignored
 constexpr std::size_t kLongestSaid = 8192;
 constexpr std::size_t kLongestEvent = std::size_t{8} << 20;
 
@@ -183,8 +184,9 @@ void JobProcess::wait_for_end() {
 }
 
 void JobProcess::reap() {
-  int status = 0;
-  if (::waitpid(pid_, &status, WNOHANG) != pid_) return wait_for_end();
+  if (pid_ <= 0) return;  // abandoned meanwhile
+  int status = kUnknownEnd;
+  if (::waitpid(pid_, &status, WNOHANG) == 0) return wait_for_end();
   for (Channel* channel : {&err_, &events_, &out_}) drain(*channel);
   pid_ = 0;
   close();

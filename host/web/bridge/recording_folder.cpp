@@ -24,6 +24,13 @@ bool is_plain(unsigned char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
 }
 
+/// As new_file() makes them.
+bool is_recording_file(std::string_view file) {
+  constexpr std::string_view kEnd = RecordingFolder::kExtension;
+  return file.ends_with(kEnd) &&
+         (is_recording_name(file) || is_recording_name(file.substr(0, file.size() - kEnd.size())));
+}
+
 }  // namespace
 
 fs::path usual_recording_folder() {
@@ -77,7 +84,7 @@ nlohmann::json RecordingFolder::list() const {
   std::error_code error;
   for (fs::directory_iterator it(folder_, error), end; !error && it != end; it.increment(error)) {
     Found found{it->path().filename().string(), {}};
-    if (!it->path().native().ends_with(kExtension) || !is_recording_name(found.name)) continue;
+    if (!is_recording_file(found.name)) continue;
     if (::lstat(it->path().c_str(), &found.about) == 0 && S_ISREG(found.about.st_mode))
       all.push_back(std::move(found));
   }

@@ -63,8 +63,9 @@ void RunControl::wish(Wish wish) {
 
 void RunControl::want_camera() noexcept { raise_event(camera_wanted_); }
 
+void RunControl::camera_given() noexcept { clear_event(camera_wanted_); }
+
 void RunControl::open() {
-  clear_event(camera_wanted_);
   const std::lock_guard lock(mutex_);
   open_ = true;
 }

@@ -28,7 +28,10 @@ class RunControl {
 
   // Any thread.
   void wish(Wish wish);
+  /// Of the run that there is, or else of the next one.
   void want_camera() noexcept;
+  /// That wish is fulfilled.
+  void camera_given() noexcept;
 
   // The loop's thread, and that which builds runs.
   void open();

@@ -48,7 +48,7 @@ WebBridge::WebBridge(const WebBridgeOptions& options, int stop)
   if (!recordings_.path().empty()) server_.serve_folder("/files/recordings/", recordings_.path());
   Jobs::Hooks hooks;
   hooks.want_camera = [this] { control_.want_camera(); };
-  hooks.give_back_camera = [this] { raise_event(resume_); };
+  hooks.give_back_camera = [this] { give_back_camera(); };
   hooks.tell = [this](const json& job) { server_.send_all({{"type", "job"}, {"job", job}}); };
   hooks.show = [this](const JobPicture& picture) { show(picture); };
   hooks.changed = [this] { send_state(); };
@@ -96,6 +96,9 @@ void WebBridge::in_server(std::function<void()> work) {
 
 std::unique_ptr<WebOutput> WebBridge::begin_run(const RunFacts& facts, WebOutput::Parts parts) {
   const json hello = hello_of(facts, recordings_.path().string());
+  // Before anybody knows of the run: what is wished of it from then on waits for its loop.
+  clear_event(resume_);
+  control_.open();
   in_server([&] {
     facts_ = facts;
     failure_.clear();
@@ -130,8 +133,6 @@ std::unique_ptr<WebOutput> WebBridge::begin_run(const RunFacts& facts, WebOutput
       heard(std::move(line), std::move(programs));
     });
   };
-  clear_event(resume_);
-  control_.open();
   return std::make_unique<WebOutput>(std::move(parts));
 }
 
@@ -162,28 +163,44 @@ bool WebBridge::wait_to_resume(Beside beside) {
 }
 
 bool WebBridge::lend_camera(Beside beside) {
-  in_server([this] { jobs_->camera_free(); });
+  clear_event(resume_);
+  in_server([this] {
+    camera_free_ = true;
+    control_.camera_given();
+    jobs_->camera_free();
+  });
   return wait_to_resume(beside);
 }
 
 bool WebBridge::wait_after(const std::string& failure, Beside beside) {
+  control_.close();
   clear_event(resume_);
   in_server([&] {
     running_ = false;
+    camera_free_ = true;
     failure_ = failure;
+    control_.camera_given();
+    if (jobs_->holds_camera()) jobs_->camera_free();  // it waited for that run
     say(failure);
     send_state();
   });
   return wait_to_resume(beside);
 }
 
+void WebBridge::give_back_camera() {
+  camera_free_ = false;
+  raise_event(resume_);
+}
+
 void WebBridge::page_came(std::uint64_t page) {
+  pages_.insert(page);
   if (!jobs_) return;  // about to end
   server_.send(page, state());
   look_around();
 }
 
 void WebBridge::page_gone(std::uint64_t page) {
+  pages_.erase(page);
   if (!trial_ || trial_->page != page) return;
   trial_.reset();
   if (desk_) desk_->ask("revert", [this](const DeskAnswer&) { read_profile(); });
@@ -276,7 +293,10 @@ void WebBridge::tick() {
   ++ticks_;
   if (recording_ && recording_->failed() && !ending_recording_) {
     control_.wish([this](WebOutput* run) {
-      if (run != nullptr) run->record(nullptr);
+      if (run != nullptr) {
+        run->record(nullptr);
+        run->source().narrow(false);
+      }
       server_.post([this] {
         if (recording_) end_recording([](const RunRecording::Ending&) {});
       });
@@ -295,7 +315,7 @@ void WebBridge::look_around() {
 }
 
 void WebBridge::send_state() {
-  if (server_.pages() > 0) server_.send_all(state());
+  if (jobs_ && server_.pages() > 0) server_.send_all(state());
 }
 
 std::string WebBridge::words(const SeenNow& seen, bool fresh) const {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -106,6 +107,7 @@ class WebBridge final : private AskHandler {
   nlohmann::json image() const;
   std::string words(const SeenNow& seen, bool fresh) const;
   void look_around();
+  void give_back_camera();
 
   /// Runs it in the server's thread, and waits.
   void in_server(std::function<void()> work);
@@ -125,10 +127,12 @@ class WebBridge final : private AskHandler {
   std::optional<Jobs> jobs_;
   std::optional<RunFacts> facts_;  ///< of the last run
   bool running_ = false;
-  std::string failure_;  ///< why there is no run
+  bool camera_free_ = false;  ///< there is no run, and none is being built
+  std::string failure_;       ///< why there is no run
   std::optional<DeskLink> desk_;
   std::optional<CameraSettings> camera_;
   std::optional<PictureFigures> figures_;
+  std::set<std::uint64_t> pages_;  ///< that are there
   std::optional<Trial> trial_;
   nlohmann::json profile_ = nullptr;
   std::vector<std::string> programs_;  ///< that read the spnav socket

@@ -3,6 +3,7 @@ import json
 import signal
 import time
 
+import page
 import rig
 
 JSONL = "/run/cameras.jsonl"
@@ -138,6 +139,26 @@ def interruptions(setup):
     print(f"     exit statuses every {start_time / 8:.2f} s: {ends[1:]}")
 
 
+def settings_from_a_page(setup):
+    """What a page sets is set in the camera, told by it, and stays what the run keeps fixed."""
+    rig.run("v4l2-ctl", "-d", VIVID, "--set-ctrl", "gain_automatic=1,brightness=100")
+    bridge = setup.bridge(f"web:127.0.0.1:{page.PORT}", source=f"v4l2:{VIVID}", sensor="")
+    rig.check("the bridge serves pages", bridge.wait_error("source:"), bridge.state())
+    seen = page.Page()
+    state = seen.next(lambda message: message["type"] == "state" and message["camera_controls"])
+    found = {control["name"]: control for control in state["camera_controls"]}
+    rig.check("a page is told vivid's settings", found.get("Brightness", {}).get("value") == 100, sorted(found))
+    for name, key, value in (("Brightness", "brightness", 120), ("Gain", "gain", 77)):
+        answer = seen.ask("camera_set", control=found[name]["id"], value=value)
+        rig.check(f"{name} is set from a page", answer["ok"] and controls().get(key) == f"value={value}", f"{answer}; {controls()}")
+    rig.check("what is set is told", seen.next(lambda message: message["type"] == "state" and any(
+        control["name"] == "Gain" and control["value"] == 77 for control in message["camera_controls"])))
+    answer = seen.ask("camera_set", control=1, value=0)
+    rig.check("a setting that there is not is refused in words", not answer["ok"] and "no such setting" in answer["text"], answer)
+    rig.check("the bridge ends with status 0", bridge.stop() == 0, bridge.state())
+    rig.check("the gain is automatic again", controls().get("gain_automatic") == "value=1", controls())
+
+
 def body(setup):
     rig.load("v4l2loopback devices=2 video_nr=0,1 exclusive_caps=1,1",
              "vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0x00 vid_cap_nr=2")
@@ -146,6 +167,7 @@ def body(setup):
     broken_jpeg(setup)
     reconnection(setup)
     second_driver(setup)
+    settings_from_a_page(setup)
     interruptions(setup)
 
 

@@ -40,5 +40,16 @@ TEST(DeskLinks, GetOneAnswerAWishInOrder) {
   EXPECT_EQ(answers[2].text, "no profile 'cad'");
 }
 
+TEST(DeskLinks, ThatAreGoneAnswerNobody) {
+  boost::asio::io_context context;
+  bool answered = false;
+  {
+    DeskLink link(context, "/nonexistent/desk");
+    link.ask("zero", [&](const DeskAnswer&) { answered = true; });
+  }
+  context.run();
+  EXPECT_FALSE(answered);
+}
+
 }  // namespace
 }  // namespace tagwrench

@@ -70,5 +70,19 @@ TEST(JobProcesses, AreToldToStopAndTheirDeathIsNoticed) {
   EXPECT_EQ(WTERMSIG(*killed.status), SIGKILL);
 }
 
+/// As in a service whose parent ignored it.
+TEST(JobProcesses, EndAsFailedWhereTheKernelKeepsNoStatus) {
+  boost::asio::io_context context;
+  HeardOfChild heard;
+  const auto before = std::signal(SIGCHLD, SIG_IGN);
+  const auto job = start_shell(context, "echo found", heard);
+  context.run();
+  std::signal(SIGCHLD, before);
+  EXPECT_EQ(heard.printed, "found\n");
+  ASSERT_TRUE(heard.status);
+  EXPECT_TRUE(WIFEXITED(*heard.status));
+  EXPECT_EQ(WEXITSTATUS(*heard.status), 255);
+}
+
 }  // namespace
 }  // namespace tagwrench

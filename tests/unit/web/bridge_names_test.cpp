@@ -54,6 +54,16 @@ TEST_F(BridgeFolder, ANewRecordingReplacesNothing) {
   EXPECT_EQ(list[0]["bytes"], 5);
 }
 
+TEST_F(BridgeFolder, TheLongestNameIsListedToo) {
+  const RecordingFolder recordings(folder_);
+  const std::string longest(RecordingFolder::kLongestName, 'a');
+  std::ofstream(recordings.new_file(longest)) << "1";
+  std::ofstream(folder_ / (longest + "a.twr")) << "of somebody else";
+  const nlohmann::json list = recordings.list();
+  ASSERT_EQ(list.size(), 1U) << list;
+  EXPECT_EQ(list[0]["name"], longest + ".twr");
+}
+
 TEST_F(BridgeFolder, ReadersOfOurDevicesAreFoundByTheirOpenFiles) {
   const KernelFolders kernel{folder_ / "proc", folder_ / "hidraw", folder_ / "input"};
   write("hidraw/hidraw3/device/uevent", "DRIVER=x\nHID_UNIQ=tagwrench-left\n");

@@ -19,6 +19,13 @@ const KEY_WORDS: Readonly<Record<string, string>> = {
   stop: 'Stop',
 };
 
+/** The bars of the terminal, which the page draws itself. */
+const DRAWN_BARS = /(?:covered:\s*)?(?:[FM][xyz] [#.]+[\s;]*){6}/;
+
+function withoutBars(text: string): string {
+  return text.replace(DRAWN_BARS, '').trimEnd();
+}
+
 export class JobPanel {
   readonly element: HTMLElement;
 
@@ -66,7 +73,7 @@ export class JobPanel {
     this.element.className = `panel job ${job.state}`;
     say(this.heading, `${this.titles[job.verb] ?? job.verb}: ${STATE_WORDS[job.state]}`);
     say(this.task, JobPanel.headline(job));
-    say(this.live, job.live !== '' ? job.live : '\u00a0');
+    say(this.live, withoutBars(job.live) || '\u00a0');
     const running = job.state === 'running';
     present(this.live, running);
     present(this.progress, running && job.progress !== null);
@@ -77,9 +84,19 @@ export class JobPanel {
     this.coverage.show(job.coverage);
     this.showReport(job);
     this.showKeys(job);
-    this.lines.replaceChildren(
-      ...job.lines.map(({ kind, text: line }) => make('li', { class: kind }, line)).reverse(),
-    );
+    this.showLines(job);
+  }
+
+  /** The newest first while it runs; after that in order, as tables are to be read, from its end. */
+  private showLines(job: Job): void {
+    const told = job.lines
+      .map(({ kind, text }) => ({ kind, text: withoutBars(text) }))
+      .filter(({ text }) => text !== '')
+      .map(({ kind, text }) => make('li', { class: kind }, text));
+    const running = job.state === 'running';
+    this.lines.replaceChildren(...(running ? told.reverse() : told));
+    this.lines.scrollTop = running ? 0 : this.lines.scrollHeight;
+    present(this.lines, told.length > 0);
   }
 
   /** What it printed. The doctor's is shown by its own view, also after it is closed. */
@@ -95,9 +112,10 @@ export class JobPanel {
       job.lines.filter((line) => kinds.includes(line.kind)).at(-1)?.text ?? '';
     switch (job.state) {
       case 'running':
-        return last(['task']) || 'Starting\u2026';
+        return last(['task']) || withoutBars(job.live) || 'Starting\u2026';
       case 'done':
-        return last(['result']) || last(['note']) || 'Done.';
+        // Above a report, a note of the way there would only confuse.
+        return last(['result']) || (textIn(job.result?.text) === '' && last(['note'])) || 'Done.';
       case 'failed':
         return (
           last(['warning', 'note', 'result']) || 'It failed, and did not say why. Run `tagwrench doctor`.'

@@ -205,9 +205,10 @@ export class Shell implements App {
   private showState(state: BridgeState): void {
     const words = STATUS_WORDS[state.status as Status] ?? state.status;
     const why = state.words !== '' && state.words !== 'held' ? state.words : words;
-    this.status.className = `status ${state.status}`;
-    say(this.status, why);
-    this.showStopped(!state.running && state.job?.state !== 'running', state.words);
+    const lent = !state.running && state.job?.state === 'running';
+    this.status.className = `status ${lent ? 'acquiring' : state.status}`;
+    say(this.status, lent ? 'the camera is in use' : why);
+    this.showStopped(!state.running && !lent, state.words);
     present(this.recording, state.recording !== null);
     if (state.recording) say(this.recording, `recording ${duration(state.recording.seconds)}`);
     present(this.job, state.job?.state === 'running');

@@ -83,7 +83,7 @@ export class CameraPanel {
     const sizes = Camera.sizes(this.track, this.own);
     this.sizes.replaceChildren(...sizes.map(([width, height]) => {
       const own = width === this.own[0] && height === this.own[1];
-      return option(size(width, height), `${width}×${height}${own ? ' (the sensor\'s)' : ''}`);
+      return option(size(width, height), `${width}×${height}${own ? ' (sensor)' : ''}`);
     }));
     this.sizes.value = size(this.wish.width, this.wish.height);
     const rates = Camera.rates(this.track);

@@ -19,6 +19,10 @@ import { type News, TrackerClient } from './tracker_client';
 
 const EXAMPLE: SensorFiles = { name: 'published sensor', yaml: exampleYaml };
 const USUAL: CameraWish = { deviceId: '', width: 640, height: 480, rate_hz: 60 };
+/** Before anything was measured. */
+const WELCOME =
+  'The camera looks at the tags under the platform. Start, allow the camera, then hands off for a second. ' +
+  'Pictures stay in this computer.';
 const SETS_MIRRORED = /set\s+camera\.mirrored:\s*(true|false)/;
 
 export class Instrument {
@@ -41,6 +45,8 @@ export class Instrument {
   private size: readonly [number, number] = [640, 480];
   private sizeTrouble = '';
   private mirrored = false;
+  /** The hint is the one for people who have not started yet. */
+  private welcoming = false;
 
   constructor(root: HTMLElement) {
     this.takeOver = button('Measure in this tab', () => void this.lock.take(true).then(() => this.start()), { hidden: true, class: 'main' });
@@ -87,10 +93,16 @@ export class Instrument {
     this.cameraPanel.offerCameras(await this.camera.list());
     this.client.send({ kind: 'pictures', on: true });
     if (await Instrument.cameraAllowed()) await this.start();
-    else this.status.say('press Start');
+    else this.invite();
     const { PlatformView } = await import('../shared/platform_view');
     this.platform = new PlatformView(this.platformHolder);
     this.platform.setRange(...this.ranges);
+  }
+
+  private invite(): void {
+    this.status.say('press Start');
+    this.status.setHint(WELCOME, false);
+    this.welcoming = true;
   }
 
   private static async cameraAllowed(): Promise<boolean> {
@@ -137,17 +149,24 @@ export class Instrument {
     }
     this.takeOver.hidden = true;
     storeWish(wish);
+    if (this.welcoming) this.status.setHint('', false);
+    this.welcoming = false;
     await this.camera.open(wish);
   }
 
   private stop(): void {
+    this.halt('stopped');
+  }
+
+  /** Nothing is measured: what was the latest number is none of now. */
+  private halt(words: string): void {
     this.camera.close();
-    this.status.say('stopped');
+    this.status.say(words);
+    this.picture.clear();
   }
 
   private lockLost(): void {
-    this.camera.close();
-    this.status.say('another tab has taken over');
+    this.halt('another tab has taken over');
     this.takeOver.hidden = false;
   }
 
@@ -161,6 +180,8 @@ export class Instrument {
       return;
     }
     this.feed.stop();
+    this.readings.forget();
+    this.platform?.forget();
     if (state.name === 'opening') this.status.say('opening the camera');
     if (state.name === 'gone') {
       this.status.say('the camera is gone');
@@ -174,6 +195,8 @@ export class Instrument {
   }
 
   private hear(news: News): void {
+    const measured = news.kind === 'sample' || news.kind === 'picture';
+    if (measured && this.camera.state.name !== 'open') return; // was on its way when the camera closed
     switch (news.kind) {
       case 'sample':
         this.status.show(news.sample, news.feed);
@@ -191,8 +214,8 @@ export class Instrument {
         return this.status.setHint(news.text, says !== null);
       }
       case 'finder':
-        this.status.setLooking(news.state === 'loading' ? 'fetching what finds tags (once, about 4 MB)' : '');
-        if (news.state === 'failed') this.status.setTrouble(`What finds tags cannot be fetched (${news.text}): reload the page.`);
+        this.status.setLooking(news.state === 'loading' ? 'fetching the tag finder (11 MB, once)' : '');
+        if (news.state === 'failed') this.status.setTrouble(`The tag finder cannot be fetched (${news.text}): reload the page.`);
         return;
       case 'unreadable':
         return this.status.setTrouble(news.text);

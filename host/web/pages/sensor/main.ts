@@ -17,6 +17,7 @@ function header(): { bar: HTMLElement; kept: HTMLElement } {
 }
 
 const root = document.getElementById('sensor') ?? document.body;
+root.replaceChildren();
 const { bar, kept } = header();
 document.body.prepend(bar);
 const trouble = firstTrouble();

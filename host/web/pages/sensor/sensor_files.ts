@@ -34,7 +34,10 @@ function pointToCalibration(yaml: string, name: string): string {
 /** Throws an Error with one line for people. */
 export async function withFiles(inForce: SensorFiles, files: readonly File[]): Promise<SensorFiles> {
   const { sensor, calibration, appearance } = sort(files);
-  const result: SensorFiles = sensor ? { name: sensor.name, yaml: await sensor.text() } : { ...inForce };
+  const text = sensor ? await sensor.text() : inForce.yaml;
+  if (appearance && !text.includes(appearance.name))
+    throw new Error(`${appearance.name}: no picture that sensor.yaml names; choose that sensor.yaml with it`);
+  const result: SensorFiles = sensor ? { name: sensor.name, yaml: text } : { ...inForce };
   if (calibration) {
     result.calibration = await calibration.text();
     result.yaml = pointToCalibration(result.yaml, calibration.name);

@@ -121,6 +121,12 @@ export class PlatformView {
     this.invalidate();
   }
 
+  /** Nothing is measured now. */
+  forget(): void {
+    this.latest = null;
+    this.invalidate();
+  }
+
   private build(): void {
     const { base, plate } = this.materials;
     const foot = new Mesh(new BoxGeometry(0.036, 0.031, 0.004), base);

@@ -85,6 +85,13 @@ export class Readings {
     }
   }
 
+  /** Nothing is measured now; peaks stay. */
+  forget(): void {
+    this.latest = null;
+    for (const { bar } of this.rows) bar.style.transform = 'scaleX(0)';
+    this.write();
+  }
+
   resetPeaks(): void {
     for (const row of this.rows) row.most = 0;
     this.write();
@@ -152,7 +159,7 @@ export class Readings {
         row.sigma,
         numbers ? `±${figure((sample.w_sigma[index] ?? Number.NaN) * scale, decimals + 1)}` : '–',
       );
-      say(row.peak, figure(row.most * scale, decimals));
+      say(row.peak, numbers || row.most !== 0 ? figure(row.most * scale, decimals) : '–');
     }
     const [force, torque] = this.sums;
     if (force) say(force, numbers ? Math.hypot(...sample.f_n).toFixed(3) : '–');

@@ -49,9 +49,9 @@ export const STATUS_WORDS: Readonly<Record<Status, string>> = {
 
 export const ZERO_WORDS: Readonly<Record<ZeroState, string>> = {
   off: 'set, stays',
-  touched: 'kept: touched',
+  touched: 'kept while touched',
   far: 'kept: far off; press zero with hands off',
-  following: 'follows',
+  following: 'follows slow drift',
 };
 
 export interface Axis {

@@ -1,5 +1,5 @@
 // Light or dark: as the system has it, or as the switch says; and colours of theme.css for canvases.
-import { button } from './elements';
+import { button, make } from './elements';
 
 export type Theme = 'system' | 'light' | 'dark';
 
@@ -71,7 +71,7 @@ export function themeSwitch(): HTMLButtonElement {
     { class: 'quiet theme-switch' },
   );
   const show = (): void => {
-    element.textContent = WORDS[theme];
+    element.replaceChildren('\u25d0', make('span', {}, ` ${WORDS[theme]}`));
     element.setAttribute('aria-label', `Colours: ${WORDS[theme]}. Press to change`);
     element.title = 'Colours: automatic, light or dark';
     setTheme(theme);

@@ -189,12 +189,20 @@ export class CalibrateView implements View {
         ? `Calibrated ${hello.calibrated}.${springs} Sensor: ${hello.sensor}.`
         : `Not calibrated: newtons come from the springs' description. Sensor: ${hello.sensor}.`,
     );
+    const off = new Set<string>();
     for (const start of this.element.querySelectorAll<HTMLButtonElement>('button[data-verb]')) {
       start.disabled = !hello.can.jobs.includes(start.dataset.verb ?? '');
       start.title = start.disabled
         ? 'This bridge cannot: it needs a sensor file (--sensor sensor.yaml) and a camera or the simulation'
         : '';
+      if (start.disabled) off.add(TITLES[start.dataset.verb ?? '']?.toLowerCase() ?? '');
     }
+    if (off.size > 0)
+      this.known.append(
+        off.has('target calibration')
+          ? ' Nothing to calibrate here: start `tagwrench run` with --sensor sensor.yaml, and a camera or the simulation.'
+          : ` Not with this source: ${[...off].join(', ')}.`,
+      );
     if (this.visible) void this.fetchPlans();
   }
 
@@ -226,7 +234,8 @@ export class CalibrateView implements View {
 
   private showPlan(): void {
     const plan = this.plans.find((one) => one.name === this.plan.value);
-    const time = plan && plan.minutes > 0 ? `; about ${plan.minutes} minutes` : '';
+    const told = /minute/.test(plan?.needs ?? '');
+    const time = plan && plan.minutes > 0 && !told ? `; about ${plan.minutes} minutes` : '';
     say(this.planNeeds, plan ? `Needs ${plan.needs}. ${plan.steps} steps${time}.` : '');
   }
 }

@@ -46,6 +46,8 @@ export class DeviceView implements View {
   private visible = false;
   private tries = Promise.resolve();
   private nextTry: string | null = null;
+  /** A text that was not taken stays in its box, to be mended. */
+  private refused: string | null = null;
   private trying = 0;
   private shapes: readonly AxisShape[] = [];
 
@@ -133,7 +135,8 @@ export class DeviceView implements View {
   }
 
   private showText(profile: ProfileState, before: ProfileState | null = profile): void {
-    if (document.activeElement !== this.textArea) this.textArea.value = profile.text;
+    const mending = this.refused !== null && this.textArea.value === this.refused;
+    if (document.activeElement !== this.textArea && !mending) this.textArea.value = profile.text;
     if (profile.name !== before?.name) {
       this.saveName.value = '';
       this.saveName.placeholder = `${profile.name}-mine`;
@@ -167,6 +170,7 @@ export class DeviceView implements View {
     const answer =
       text !== null && name !== undefined ? await this.app.link.ask('try', { name, text }) : null;
     --this.trying;
+    this.refused = answer && !answer.ok ? text : null;
     if (answer && !answer.ok) this.app.tell(answer.text, 'error');
     if (this.trying === 0 && this.shown_)
       this.showText(answer?.ok && text !== null ? { ...this.shown_, text } : this.shown_);

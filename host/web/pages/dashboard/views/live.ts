@@ -97,6 +97,7 @@ export class LiveView implements View {
   }
 
   private showState(state: BridgeState): void {
+    if (!state.running) for (const part of [this.readings, this.platform]) part.forget();
     this.fact('rate', `${figure(state.rate_hz, 1)} Hz`);
     this.fact('latency', `${figure(state.latency_us.median / 1e3, 2)} ms`);
     this.fact('worst 1 %', `${figure(state.latency_us.p99 / 1e3, 2)} ms`);

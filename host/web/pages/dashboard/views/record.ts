@@ -18,6 +18,15 @@ interface Kept {
   date: string;
 }
 
+/** `name`, or with the first number behind it that is free: a recording replaces nothing. */
+function freeName(name: string, taken: ReadonlySet<string>): string {
+  if (!taken.has(`${name}.twr`)) return name;
+  const stem = name.replace(/-\d+$/, '');
+  let number = 2;
+  while (taken.has(`${stem}-${number}.twr`)) ++number;
+  return `${stem}-${number}`;
+}
+
 export class RecordView implements View {
   readonly name = 'record';
   readonly title = 'Record';
@@ -144,6 +153,8 @@ export class RecordView implements View {
       date: textIn(said(one).date),
     }));
     say(this.folder, answer.text);
+    if (document.activeElement !== this.file)
+      this.file.value = freeName(this.file.value.trim(), new Set(kept.map((one) => one.name)));
     present(this.empty, kept.length === 0);
     this.rows.replaceChildren(...kept.filter((one) => one.name !== '').map((one) => this.row(one)));
   }
