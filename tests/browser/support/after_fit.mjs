@@ -46,10 +46,12 @@ export function errorAfterFit(readings, truths) {
   return squares.map((sum) => Math.sqrt(sum / (readings.length - half)));
 }
 
-const distance = (a, b) => a.reduce((sum, value, i) => sum + ((value - b[i]) / (i < 3 ? 1e-3 : 0.05)) ** 2, 0);
+/** Several times the tracker's noise, m and rad. */
+const kNoise = [1e-6, 1e-6, 3e-6, 3e-4, 3e-4, 3e-4];
+const distance = (a, b) => a.reduce((sum, value, i) => sum + ((value - b[i]) / kNoise[i]) ** 2, 0);
 
 const kLate = 12; // pictures that a busy camera may come later than by its clock, from one to the next
-const kHaste = 1e-5; // of distance(), for each picture off the clock, squared: decides only where pictures are alike
+const kHaste = 0.05; // of distance(), for each picture off the clock, squared: decides only where pictures are alike
 
 /** The way through the clip, round and round, that agrees best with what was read (Viterbi). */
 function follow(readings, steps, truthAt, count) {
@@ -77,7 +79,7 @@ function follow(readings, steps, truthAt, count) {
 export function matchPictures(times_s, readings, truthAt, count, rate) {
   const steps = times_s.map((t) => Math.round((t - times_s[0]) * rate));
   let pictures = follow(readings, steps, truthAt, count);
-  for (let turn = 0; turn < 2; turn++)
+  for (let turn = 0; turn < 4; turn++)
     pictures = follow(readings.map(affine(readings, pictures.map(truthAt))), steps, truthAt, count);
   return { pictures, truths: pictures.map(truthAt) };
 }
