@@ -225,6 +225,20 @@ enum class ZeroState : std::uint8_t {
   following,  ///< it stands still, and nobody holds it
 };
 
+constexpr const char* name(ZeroState state) {
+  switch (state) {
+    case ZeroState::off:
+      return "off";
+    case ZeroState::touched:
+      return "touched";
+    case ZeroState::far:
+      return "far";
+    case ZeroState::following:
+      return "following";
+  }
+  return "?";
+}
+
 /// One line of output: all that the instrument knows about one frame.
 struct Sample {
   std::uint64_t sequence = 0;

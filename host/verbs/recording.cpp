@@ -80,8 +80,8 @@ record::Head recording_head(const Input& input, record::Keep keep) {
 
 Recording::Recording(const RecordOptions& options, const record::Head& head, bool lossless,
                      std::optional<std::uint64_t> frames, std::optional<Duration> time)
-    : file_(options.file),
-      writer_({.path = options.file, .lossless = lossless}, head),
+    : FrameRecorder({.path = options.file, .lossless = lossless}, head),
+      file_(options.file),
       timer_(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC)),
       frames_(frames),
       time_(time),
@@ -94,35 +94,13 @@ Recording::Recording(const RecordOptions& options, const record::Head& head, boo
 
 SendStatus Recording::send(const Sample& sample) noexcept {
   dropped_ += sample.dropped;
-  return writer_.state().failed ? SendStatus::failed : SendStatus::ok;
-}
-
-void Recording::frame(const LoggedFrame& all) noexcept {
-  clock_ = all.frame.capture_time - all.frame.latency_origin;
-  writer_.frame(all.frame, all.decoded, all.raw);
-  writer_.track(all.track);
-  writer_.sample(all.sample);
-}
-
-void Recording::missing(const Sample& sample) noexcept { writer_.missing(sample); }
-
-void Recording::disconnected(std::string_view detail) noexcept {
-  writer_.event(record::EventKind::disconnected, now_of_frames(), detail);
-}
-
-void Recording::reconnected(std::string_view detail) noexcept {
-  writer_.event(record::EventKind::reconnected, now_of_frames(), detail);
+  return writer().state().failed ? SendStatus::failed : SendStatus::ok;
 }
 
 /// What people are told is kept too, but for its own progress.
 bool Recording::notice(std::string_view line) noexcept {
-  if (!line.empty() && line.data() != line_.data())
-    writer_.event(record::EventKind::note, now_of_frames(), line);
+  if (line.data() != line_.data()) note(line);
   return false;
-}
-
-TimePoint Recording::now_of_frames() const noexcept {
-  return std::chrono::steady_clock::now() + clock_;
 }
 
 std::string_view Recording::service() noexcept {
@@ -138,7 +116,7 @@ std::string_view Recording::service() noexcept {
 
 std::string Recording::progress() {
   const TimePoint now = std::chrono::steady_clock::now();
-  const record::WriterState state = writer_.state();
+  const record::WriterState state = writer().state();
   const double elapsed = in_seconds(now - start_);
   const double rate = static_cast<double>(state.frames - last_frames_) /
                       std::max(1e-3, in_seconds(now - last_line_));
@@ -167,7 +145,7 @@ std::string Recording::progress() {
 }
 
 std::string Recording::summary() const {
-  const record::WriterState state = writer_.state();
+  const record::WriterState state = writer().state();
   std::string line = fmt::format("{}: {}, {}", file_, count_text(state.frames, "frame"),
                                  bytes_text(static_cast<double>(state.bytes)));
   if (state.lost_frames > 0 || state.lost_others > 0) {

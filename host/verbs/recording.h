@@ -5,11 +5,10 @@
 #include <optional>
 #include <string>
 
-#include "host/frame_log.h"
 #include "host/input.h"
 #include "host/os/unique_fd.h"
 #include "host/output/output.h"
-#include "host/record/writer.h"
+#include "host/record/frame_recorder.h"
 
 namespace tagwrench {
 
@@ -24,7 +23,7 @@ void check_recording(const RecordOptions& options, std::string_view option = "--
 /// What a recording says of itself, for this input.
 record::Head recording_head(const Input& input, record::Keep keep);
 
-class Recording final : public Output, public FrameLog {
+class Recording final : public Output, public record::FrameRecorder {
  public:
   /// `lossless`: see record::WriterOptions. `frames` and `time` are when the run will end, for the
   /// progress that it tells. Throws ConfigError.
@@ -33,30 +32,20 @@ class Recording final : public Output, public FrameLog {
 
   // Output: fails when nothing more can be written.
   SendStatus send(const Sample& sample) noexcept override;
-  std::string failure() const override { return writer_.failure(); }
+  std::string failure() const override { return writer().failure(); }
   int poll_fd() const noexcept override { return timer_.get(); }
   std::string_view service() noexcept override;
   bool notice(std::string_view line) noexcept override;
 
-  // FrameLog
-  void frame(const LoggedFrame& all) noexcept override;
-  void missing(const Sample& sample) noexcept override;
-  void disconnected(std::string_view detail) noexcept override;
-  void reconnected(std::string_view detail) noexcept override;
-
-  record::RecordingWriter& writer() noexcept { return writer_; }
-
   /// Ends it. One line about what went wrong; empty if nothing did.
-  std::string finish() noexcept { return writer_.finish(); }
+  std::string finish() noexcept { return writer().finish(); }
   /// One line about what there is now.
   std::string summary() const;
 
  private:
-  TimePoint now_of_frames() const noexcept;
   std::string progress();
 
   std::string file_;
-  record::RecordingWriter writer_;
   UniqueFd timer_;
   std::optional<std::uint64_t> frames_;
   std::optional<Duration> time_;
@@ -64,7 +53,6 @@ class Recording final : public Output, public FrameLog {
   TimePoint last_line_;
   std::uint64_t last_frames_ = 0;
   std::uint64_t dropped_ = 0;
-  Duration clock_{};  ///< of the frames less CLOCK_MONOTONIC
   std::string line_;
 };
 

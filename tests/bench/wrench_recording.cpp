@@ -1,7 +1,6 @@
 #include "tests/bench/wrench_recording.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -16,6 +15,7 @@
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 #include "tests/bench/tracker_run.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::bench {
 namespace {
@@ -127,31 +127,11 @@ Cost record_clip(const Clip& clip, const Kind& kind, const std::filesystem::path
   return cost;
 }
 
-/// A folder of its own that goes away with it.
-class TemporaryFolder {
- public:
-  TemporaryFolder()
-      : path_(std::filesystem::temp_directory_path() /
-              fmt::format("tagwrench-bench-{}", ::getpid())) {
-    std::filesystem::create_directory(path_);
-  }
-  ~TemporaryFolder() {
-    std::error_code none;
-    std::filesystem::remove_all(path_, none);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 }  // namespace
 
 void bench_recording(Table& table) {
   const Clip clip = make_clip();
-  const TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   table.open("recording",
              {fmt::format("{} frames with track and sample, 640x480; what the loop's thread spends "
                           "to hand a frame over,",
@@ -167,7 +147,7 @@ void bench_recording(Table& table) {
                              {"no pixels", record::Keep::none, false}};
   for (const Kind& kind : kKinds) {
     const Cost cost =
-        record_clip(clip, kind, folder.path() / fmt::format("{}.tagwrench", &kind - kKinds));
+        record_clip(clip, kind, folder / fmt::format("{}.tagwrench", &kind - kKinds));
     table.line(fmt::format("{:<30}{:>11.1f}{:>9.1f}{:>15.1f}{:>12.1f}{:>12.0f}{:>7}", kind.name,
                            cost.median_us, cost.p99_us, 100 * cost.median_us / clip.track_us,
                            1e-3 * cost.bytes, cost.per_second, cost.lost));

@@ -29,7 +29,7 @@ const kBlindness = {
 };
 
 function themes() {
-  const css = readFileSync(join(pages, 'shared/theme.css'), 'utf8');
+  const css = readFileSync(join(pages, 'common/theme.css'), 'utf8');
   const found = [...css.matchAll(/(--[a-z-]+): light-dark\((#[0-9a-f]{6}), (#[0-9a-f]{6})\)/g)];
   return [2, 3].map((side) => new Map(found.map((match) => [match[1], match[side]])));
 }

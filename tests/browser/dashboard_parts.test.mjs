@@ -30,7 +30,7 @@ test(
   'CSV has the columns of the program, and no numbers where the status carries none',
   { skip },
   async () => {
-    const { CSV_HEADER, csvText } = await loadModule('shared/csv.ts');
+    const { CSV_HEADER, csvText } = await loadModule('common/csv.ts');
     const source = readFileSync(join(root, 'host/output/sample_text.h'), 'utf8');
     const columns = [
       ...source
@@ -49,7 +49,7 @@ test(
 );
 
 test('a sample that lacks a part, or has one of another kind, is none', { skip }, async () => {
-  const { sampleFrom } = await loadModule('shared/sample.ts');
+  const { sampleFrom } = await loadModule('common/sample.ts');
   assert.deepEqual(sampleFrom({ ...kSample, newer: 1 }), kSample);
   for (const key of ['seq', 't_ns', 'status', 'd_m', 'f_n', 'm_nm', 'w_sigma']) {
     for (const wrong of [undefined, null, 'x', {}, [1], [1, 2, 'x'], Number.NaN]) {

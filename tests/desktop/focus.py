@@ -112,7 +112,7 @@ class Kwin:
         child = desk.run + "/child"
         with open(child, "w", encoding="ascii") as file:
             file.write(f'#!/bin/sh\necho "$DISPLAY" > {desk.run}/told && mv {desk.run}/told {desk.run}/display\n'
-                       "exec sleep 1000\n")
+                       "exec tail -f /dev/null\n")
         os.chmod(child, 0o755)
         desk.start(desk.run + "/kwin_wayland", "--virtual", "--no-lockscreen", "--no-global-shortcuts", "--xwayland", "--socket",
                    "kwin", child, log="kwin")

@@ -58,9 +58,8 @@ plug_camera_in() {
 }
 camera_taken() {
   said "source: " && return
-  udevadm trigger --subsystem-match=video4linux
-  sleep 3
-  return 1
+  udevadm trigger --settle --subsystem-match=video4linux
+  said "source: "
 }
 said() { journalctl -o cat _UID="$(id -u alice)" | grep -q "$1"; }
 

@@ -22,20 +22,6 @@ constexpr unsigned kTicksBetweenLooks = 4;  // at cameras and programs
 constexpr unsigned kTicksBetweenTrials = 2;
 constexpr std::string_view kProfileNews = "profile";
 
-std::string_view zero_state_name(ZeroState state) {
-  switch (state) {
-    case ZeroState::off:
-      return "off";
-    case ZeroState::touched:
-      return "touched";
-    case ZeroState::far:
-      return "far";
-    case ZeroState::following:
-      return "following";
-  }
-  return "?";
-}
-
 }  // namespace
 
 WebBridge::WebBridge(const WebBridgeOptions& options, int stop)
@@ -380,7 +366,7 @@ json WebBridge::state() const {
           {"words", words(seen, fresh_)},
           {"image", running_ ? image() : json()},
           {"profile", running_ ? profile : json()},
-          {"zero_state", zero_state_name(seen.zero_state)},
+          {"zero_state", name(seen.zero_state)},
           {"clients", clients},
           {"recording", recording_ ? recording_->progress() : json()},
           {"board", board},

@@ -12,20 +12,6 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::string_view zero_state_name(ZeroState state) {
-  switch (state) {
-    case ZeroState::off:
-      return "off";
-    case ZeroState::touched:
-      return "touched";
-    case ZeroState::far:
-      return "far";
-    case ZeroState::following:
-      return "following";
-  }
-  return "off";
-}
-
 /// JSON has no other numbers.
 double finite(double value) { return std::isfinite(value) ? value : 0; }
 
@@ -45,7 +31,7 @@ std::string sample_text(const LiveSample& live) {
   append_six(text, "motion", numbers ? live.sample.motion : Vector6::Zero());
   fmt::format_to(std::back_inserter(text),
                  R"(,"zero_state":"{}","buttons":{},"residual_px":{:.4g},"tags_held":{}}})",
-                 zero_state_name(live.sample.zero_state), live.sample.buttons,
+                 name(live.sample.zero_state), live.sample.buttons,
                  finite(live.residual_px), live.tags_held);
   return text;
 }

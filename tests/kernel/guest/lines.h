@@ -46,6 +46,12 @@ class Commands {
     return line;
   }
 
+  /// Blocks until a line, or the end, may have come.
+  void wait() const {
+    pollfd input{fd(), POLLIN, 0};
+    ::poll(&input, 1, -1);
+  }
+
   /// To poll for; -1, which poll() ignores, once the input has ended.
   int fd() const { return ended_ ? -1 : STDIN_FILENO; }
 

@@ -13,7 +13,6 @@
 
 #include <array>
 #include <span>
-#include <thread>
 
 #include "tests/kernel/guest/lines.h"
 
@@ -25,11 +24,26 @@ constexpr std::uint8_t kToInterface = 0x21;  // USB 2.0, table 9-2: class, inter
 constexpr std::uint8_t kSetReport = 0x09;
 constexpr std::uint16_t kOutput = 0x0200;
 
+/// Until such a device is there.
+void wait_for_device(libusb_context* context, std::uint16_t vendor, std::uint16_t product) {
+  bool there = false;
+  const libusb_hotplug_callback_fn came = [](libusb_context*, libusb_device*, libusb_hotplug_event,
+                                             void* flag) {
+    *static_cast<bool*>(flag) = true;
+    return 1;  // once is enough
+  };
+  if (libusb_hotplug_register_callback(context, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
+                                       LIBUSB_HOTPLUG_ENUMERATE, vendor, product,
+                                       LIBUSB_HOTPLUG_MATCH_ANY, came, &there, nullptr) != 0)
+    fail("libusb does not tell of devices that come");
+  while (!there) libusb_handle_events(context);
+}
+
 class Device {
  public:
   Device(libusb_context* context, std::uint16_t vendor, std::uint16_t product) {
     while ((handle_ = libusb_open_device_with_vid_pid(context, vendor, product)) == nullptr)
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      wait_for_device(context, vendor, product);
     libusb_set_auto_detach_kernel_driver(handle_, 1);
     taken_ = find_pipe() && libusb_claim_interface(handle_, 0) == 0;
   }
@@ -124,7 +138,7 @@ void serve(Device& device, Commands& commands, bool& asking) {
       std::printf("did %s\n", command->c_str());
     }
     if (!asking) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      commands.wait();
     } else if (!device.read()) {
       return;
     }

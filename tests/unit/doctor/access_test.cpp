@@ -4,13 +4,13 @@
 
 #include "host/desk/control_socket.h"
 #include "host/doctor/bridges.h"
-#include "tests/unit/doctor/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
 
 namespace fs = std::filesystem;
-using test::DoctorFolder;
+using test::TemporaryFolder;
 
 TEST(DoctorAccess, NamesTheFirstThingThatIsInTheWay) {
   NodeAccess access;
@@ -25,7 +25,7 @@ TEST(DoctorAccess, NamesTheFirstThingThatIsInTheWay) {
 }
 
 TEST(DoctorAccess, ANodeOfRootAloneHasNoRuleApplied) {
-  const DoctorFolder folder;
+  const TemporaryFolder folder;
   folder.write("uhid", "");
   fs::permissions(folder / "uhid", fs::perms::owner_all);
   EXPECT_FALSE(look_at_access(folder / "uhid").rule_applied);
@@ -33,7 +33,7 @@ TEST(DoctorAccess, ANodeOfRootAloneHasNoRuleApplied) {
 }
 
 TEST(DoctorAccess, OurDevicesAreKnownByTheNameOfTheirHidDevice) {
-  const DoctorFolder folder;
+  const TemporaryFolder folder;
   // The layout of /sys/class/hidraw/hidrawN/device/uevent.
   folder.write("hidraw0/device/uevent",
                "DRIVER=hid-generic\nHID_ID=0003:0000256F:0000C62E\n"
@@ -48,7 +48,7 @@ TEST(DoctorAccess, OurDevicesAreKnownByTheNameOfTheirHidDevice) {
 }
 
 TEST(DoctorBridges, ASensorRunsWhereItsSocketIsListenedTo) {
-  const DoctorFolder folder;
+  const TemporaryFolder folder;
   const ControlSocket left((folder / "left.control").string());
   folder.write("right.control", "a left-over");
   folder.write("spnav.sock", "");
@@ -57,7 +57,7 @@ TEST(DoctorBridges, ASensorRunsWhereItsSocketIsListenedTo) {
 }
 
 TEST(DoctorBridges, AServiceStartsAtLoginWhereATargetWantsIt) {
-  const DoctorFolder folder;
+  const TemporaryFolder folder;
   EXPECT_FALSE(starts_at_login(folder / ""));
   folder.write("systemd/user/default.target.wants/other.service", "");
   EXPECT_FALSE(starts_at_login(folder / ""));

@@ -9,12 +9,12 @@
 
 #include "host/os/unique_fd.h"
 #include "host/output/spnav_link.h"
-#include "tests/unit/doctor/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
 
-using test::DoctorFolder;
+using test::TemporaryFolder;
 
 UniqueFd listener(const std::string& path) {
   UniqueFd made(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
@@ -35,7 +35,7 @@ std::string said(const SpnavFacts& facts) {
 }
 
 TEST(DoctorSpnav, TellsWhoServesASocketFromALeftOver) {
-  const DoctorFolder folder;
+  const TemporaryFolder folder;
   EXPECT_EQ(server_at(folder / "spnav.sock"), SpnavServer::none);
   folder.write("touched.sock", "");
   EXPECT_EQ(server_at(folder / "touched.sock"), SpnavServer::silent);
@@ -92,7 +92,7 @@ TEST(DoctorSpnav, OwnSocketIsNamedAndAWrongVariableIsAProblem) {
 }
 
 TEST(DoctorSandboxes, EveryProgramThatCannotSeeTheSocketHasAdvice) {
-  const DoctorFolder folder;
+  const TemporaryFolder folder;
   EXPECT_TRUE(sandboxed_programs({folder / "flatpak"}, folder / "snap").empty());
   folder.write("flatpak/org.freecad.FreeCAD/current", "");
   folder.write("mine/org.blender.Blender/current", "");

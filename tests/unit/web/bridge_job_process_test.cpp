@@ -57,7 +57,7 @@ TEST(JobProcesses, GetTheirKeysAndHaveNoOtherFilesOpen) {
 TEST(JobProcesses, AreToldToStopAndTheirDeathIsNoticed) {
   boost::asio::io_context context;
   HeardOfChild stopped;
-  const auto job = start_shell(context, "exec sleep 600", stopped);
+  const auto job = start_shell(context, "exec tail -f /dev/null", stopped);
   job->stop();
   context.run();
   ASSERT_TRUE(stopped.status);

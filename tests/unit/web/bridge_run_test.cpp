@@ -2,16 +2,19 @@
 // and pages that go in the middle of something. A shell script stands for our own program.
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/stat.h>
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
+#include <fstream>
 #include <future>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "host/desk/control_socket.h"
 #include "host/web/bridge/web_bridge.h"
-#include "tests/unit/web/web_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
@@ -78,8 +81,9 @@ class BridgeRuns : public testing::Test {
   BridgeRuns() : stop_(make_event()) {
     ::setenv("XDG_RUNTIME_DIR", folder_.path().c_str(), 1);
     folder_.write("job", "#!/bin/sh\necho begun >>" + (folder_ / "log").string() +
-                             "; echo begun >&2\nwhile [ ! -e " + (folder_ / "end").string() +
-                             " ]; do sleep .02; done\n");
+                             "; echo begun >&2\nread -r end < " + (folder_ / "end").string() +
+                             "\n");
+    if (::mkfifo((folder_ / "end").c_str(), 0600) != 0) throw std::runtime_error("mkfifo");
     std::filesystem::permissions(folder_ / "job", std::filesystem::perms::owner_all);
     WebBridgeOptions options;
     options.server.port = 0;
@@ -102,9 +106,11 @@ class BridgeRuns : public testing::Test {
   std::future<bool> lend() {
     return std::async(std::launch::async, [this] { return bridge_->lend_camera({}); });
   }
+  /// The job waits for this line.
+  void end_job() const { std::ofstream(folder_ / "end") << "end\n"; }
   bool begun() const { return std::filesystem::exists(folder_ / "log"); }
 
-  test::WebFolder folder_;
+  test::TemporaryFolder folder_;
   UniqueFd stop_;
   std::optional<WebBridge> bridge_;
   RunFacts facts_;
@@ -122,7 +128,7 @@ TEST_F(BridgeRuns, AJobThatIsStartedWhileTheSensorIsBeingSetUpWaitsForThat) {
   end_as_wished();
   std::future<bool> back = lend();
   page.hear_job();
-  folder_.write("end", "");
+  end_job();
   EXPECT_TRUE(back.get());
 }
 
@@ -135,7 +141,7 @@ TEST_F(BridgeRuns, TheCameraComesBackWhenTheJobIsOverAndNotBefore) {
   std::future<bool> back = lend();
   page.hear_job();
   EXPECT_EQ(back.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
-  folder_.write("end", "");
+  end_job();
   EXPECT_TRUE(back.get());
 }
 
@@ -147,7 +153,7 @@ TEST_F(BridgeRuns, AJobIsDoneAllTheSameWhenTheRunThatItWaitedForFails) {
   std::future<bool> back = std::async(
       std::launch::async, [this] { return bridge_->wait_after("the disk is full", {}); });
   page.hear_job();
-  folder_.write("end", "");
+  end_job();
   EXPECT_TRUE(back.get());
 }
 

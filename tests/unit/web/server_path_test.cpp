@@ -4,12 +4,12 @@
 #include <array>
 
 #include "host/web/server/site_path.h"
-#include "tests/unit/web/web_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
 
-using test::WebFolder;
+using test::TemporaryFolder;
 
 std::string read_all(const OpenedFile& file) {
   std::array<char, 64> bytes;
@@ -74,7 +74,7 @@ TEST(WebPath, WhatCouldLeaveAFolderIsRefused) {
 }
 
 TEST(WebPath, AFileBelowTheFolderIsOpened) {
-  WebFolder folder;
+  TemporaryFolder folder;
   folder.write("a/b.txt", "hello");
   const auto file = open_confined(folder.path(), {"a", "b.txt"});
   ASSERT_TRUE(file);
@@ -83,9 +83,9 @@ TEST(WebPath, AFileBelowTheFolderIsOpened) {
 }
 
 TEST(WebPath, NoSymbolicLinkIsFollowed) {
-  WebFolder outside;
+  TemporaryFolder outside;
   outside.write("secret.txt", "secret");
-  WebFolder folder;
+  TemporaryFolder folder;
   folder.write("a.txt", "a");
   std::filesystem::create_symlink(outside / "secret.txt", folder / "link.txt");
   std::filesystem::create_directory_symlink(outside.path(), folder / "links");
@@ -95,7 +95,7 @@ TEST(WebPath, NoSymbolicLinkIsFollowed) {
 }
 
 TEST(WebPath, OnlyRegularFilesAreOpened) {
-  WebFolder folder;
+  TemporaryFolder folder;
   folder.write("a/b.txt", "b");
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   EXPECT_FALSE(open_confined(folder.path(), {"pipe"}));  // and does not wait for a writer

@@ -6,13 +6,13 @@
 #include "host/config_error.h"
 #include "host/web/server/token_file.h"
 #include "host/web/server/web_server.h"
-#include "tests/unit/web/web_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
 
 using std::filesystem::perms;
-using test::WebFolder;
+using test::TemporaryFolder;
 
 std::string token_fault(const std::filesystem::path& file) {
   try {
@@ -24,7 +24,7 @@ std::string token_fault(const std::filesystem::path& file) {
 }
 
 TEST(WebToken, IsMadeOnceForItsOwnerAlone) {
-  WebFolder folder;
+  TemporaryFolder folder;
   const WebToken made = web_token(folder / "token");
   EXPECT_TRUE(made.made);
   EXPECT_EQ(made.text.size(), 43U);
@@ -37,21 +37,21 @@ TEST(WebToken, IsMadeOnceForItsOwnerAlone) {
 }
 
 TEST(WebToken, MayBeWrittenByHand) {
-  WebFolder folder;
+  TemporaryFolder folder;
   folder.write("token", "a-token.of_mine~16\r\n");
   std::filesystem::permissions(folder / "token", perms::owner_read);
   EXPECT_EQ(web_token(folder / "token").text, "a-token.of_mine~16");
 }
 
 TEST(WebToken, ThatOthersMayReadIsRefused) {
-  WebFolder folder;
+  TemporaryFolder folder;
   folder.write("token", "0123456789abcdef");
   std::filesystem::permissions(folder / "token", perms::owner_all | perms::group_read);
   EXPECT_NE(token_fault(folder / "token").find("chmod 600"), std::string::npos);
 }
 
 TEST(WebToken, ThatIsNoneIsRefused) {
-  WebFolder folder;
+  TemporaryFolder folder;
   for (const std::string text : {"", "short", "0123456789abcde", "0123456789abcdef 1",
                                  "0123456789abcdef/", "0123456789abcdef\nmore"}) {
     folder.write("token", text);

@@ -1,6 +1,6 @@
 // What the camera sees, with the tags outlined. Pictures come only while one is looked at.
-import { make, present, say } from '../shared/elements';
-import { colour } from '../shared/theme';
+import { make, present, say } from '../common/elements';
+import { colour } from '../common/theme';
 import type { Link } from './link';
 import type { Picture, PictureHeader } from './protocol';
 

@@ -1,7 +1,7 @@
 // How much of what a calibration needs has been seen: a map of the picture, bars for the axes, or ranges of
 // motion.
-import { make, present, say } from '../shared/elements';
-import { AXES, figure } from '../shared/sample';
+import { make, present, say } from '../common/elements';
+import { AXES, figure } from '../common/sample';
 import type { Coverage } from './protocol';
 
 const REGIONS = [

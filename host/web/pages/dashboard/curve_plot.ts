@@ -1,6 +1,6 @@
 // Deflection against push of one axis of the device: the curve, the dead zone, and where the hand is now.
-import { drawing, make, say } from '../shared/elements';
-import { AXES, figure } from '../shared/sample';
+import { drawing, make, say } from '../common/elements';
+import { AXES, figure } from '../common/sample';
 import type { AxisShape } from './profile_text';
 import { deflection } from './response';
 

@@ -1,7 +1,7 @@
 // A job of the bridge as it goes on: what to do now, big; what has been covered; what was said; keys. All of
 // it is the bridge's own state, so that a page that is loaded anew shows the same.
 import './job_panel.css';
-import { button, make, present, say } from '../shared/elements';
+import { button, make, present, say } from '../common/elements';
 import { CoverageView } from './coverage_view';
 import { type Job, type JobState, textIn } from './protocol';
 import { reportLines } from './report_text';

@@ -1,6 +1,6 @@
 // The sliders of a profile. A move is told at once; what the bridge makes of it comes back as another text.
 import './knobs.css';
-import { make, say } from '../shared/elements';
+import { make, say } from '../common/elements';
 import { type Choice, type Knob, type KnobGroup, type Slider, knobsOf, placeOf, valueAt } from './knobs';
 import type { Path, ProfileText } from './profile_text';
 

@@ -1,5 +1,5 @@
 // The connection to the bridge: comes back by itself, tells what arrives, asks and awaits answers.
-import { sampleFrom, type Sample } from '../shared/sample';
+import { sampleFrom, type Sample } from '../common/sample';
 import {
   type Answer,
   type BridgeState,

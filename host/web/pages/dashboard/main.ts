@@ -1,5 +1,5 @@
 // The bridge's page: live numbers and pictures, and what the terminal can do, by pressing and typing.
-import '../shared/theme.css';
+import '../common/theme.css';
 import './shell.css';
 import { Link } from './link';
 import { Shell } from './shell';

@@ -1,6 +1,6 @@
 // Bars for what the picture is worth: sharpness, light, residual; each with a word on what to do.
-import { make, say } from '../shared/elements';
-import { figure } from '../shared/sample';
+import { make, say } from '../common/elements';
+import { figure } from '../common/sample';
 import type { BridgeState } from './protocol';
 
 type Judgement = readonly ['good' | 'warn' | 'bad', string];

@@ -1,5 +1,5 @@
 // The lines that `doctor` and `check` print, with their marks as colours and words.
-import { make } from '../shared/elements';
+import { make } from '../common/elements';
 
 interface Mark {
   pattern: RegExp;

@@ -1,7 +1,7 @@
 // The frame round the views: name, connection and status above, the way between views, the latest news below.
-import { button, make, present, say } from '../shared/elements';
-import { STATUS_WORDS, type Status } from '../shared/sample';
-import { themeSwitch } from '../shared/theme';
+import { button, make, present, say } from '../common/elements';
+import { STATUS_WORDS, type Status } from '../common/sample';
+import { themeSwitch } from '../common/theme';
 import type { Link, LinkState } from './link';
 import type { Answer, BridgeState, Hello } from './protocol';
 import { duration } from './words';

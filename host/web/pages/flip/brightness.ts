@@ -1,5 +1,5 @@
 // Mean brightness of a camera's pictures, each with the time at which the browser handed it over.
-import { make } from '../shared/elements';
+import { make } from '../common/elements';
 
 export interface Brightness {
   /** 0..255 */

@@ -1,8 +1,8 @@
 // A screen that flips between black and white: for this browser's camera, which measures how late it sees it, or for any other.
-import '../shared/theme.css';
+import '../common/theme.css';
 import './flip.css';
-import { button, field, make, panel, present, say } from '../shared/elements';
-import { themeSwitch } from '../shared/theme';
+import { button, field, make, panel, present, say } from '../common/elements';
+import { themeSwitch } from '../common/theme';
 import { Camera } from '../sensor/camera';
 import { firstCameraTrouble } from '../sensor/checks';
 import { download } from '../sensor/download';

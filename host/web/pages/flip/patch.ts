@@ -1,5 +1,5 @@
 // The black or white patch that fills the page. It changes with the screen's refresh and never more often than it is allowed to.
-import { make } from '../shared/elements';
+import { make } from '../common/elements';
 
 export class Patch {
   readonly element = make('div', { class: 'patch', hidden: true });

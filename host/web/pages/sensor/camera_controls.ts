@@ -1,6 +1,6 @@
 // Exposure, white balance, focus and what else a browser lets a page set of a camera: sliders, and one switch that holds all of it
 // still. A tracker wants one and the same picture of one and the same thing; automatics spoil that.
-import { button, field, make, say } from '../shared/elements';
+import { button, field, make, say } from '../common/elements';
 
 interface Range {
   min: number;

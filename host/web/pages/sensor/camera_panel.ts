@@ -1,5 +1,5 @@
 // Choice of camera and mode, start and stop, and what the camera lets a page set.
-import { button, field, make, panel, say } from '../shared/elements';
+import { button, field, make, panel, say } from '../common/elements';
 import { Camera, type CameraState, type CameraWish } from './camera';
 import { CameraControls } from './camera_controls';
 import { storeWish } from './storage';

@@ -3,7 +3,7 @@ import { sha256 } from '@noble/hashes/sha2';
 import { decode } from 'fast-png';
 import createModule from '@core/core.mjs';
 import wasmUrl from '@core/core.wasm?url';
-import type { Status, ZeroState } from '../shared/sample';
+import type { Status, ZeroState } from '../common/sample';
 import { AT, TAG_NUMBERS, type CoreModule, type CorePage, type TagFinder } from './core_memory';
 import { withLearned, type Learned } from './learned_rest';
 import { checkWebAssembly } from './wasm_support';

@@ -1,8 +1,8 @@
 // The instrument: camera, tracker and everything that shows what they say, wired together.
-import { button, make, panel } from '../shared/elements';
-import type { PlatformView } from '../shared/platform_view';
-import { Readings } from '../shared/readings';
-import { Traces } from '../shared/traces';
+import { button, make, panel } from '../common/elements';
+import type { PlatformView } from '../common/platform_view';
+import { Readings } from '../common/readings';
+import { Traces } from '../common/traces';
 import { Camera, type CameraState, type CameraWish } from './camera';
 import { CameraPanel } from './camera_panel';
 import exampleYaml from './example.yaml?raw';
@@ -94,7 +94,7 @@ export class Instrument {
     this.client.send({ kind: 'pictures', on: true });
     if (await Instrument.cameraAllowed()) await this.start();
     else this.invite();
-    const { PlatformView } = await import('../shared/platform_view');
+    const { PlatformView } = await import('../common/platform_view');
     this.platform = new PlatformView(this.platformHolder);
     this.platform.setRange(...this.ranges);
   }

@@ -1,8 +1,8 @@
 // The whole sensor in a tab: either it can run here, or the page says what to do.
-import '../shared/theme.css';
+import '../common/theme.css';
 import './sensor.css';
-import { make } from '../shared/elements';
-import { themeSwitch } from '../shared/theme';
+import { make } from '../common/elements';
+import { themeSwitch } from '../common/theme';
 import { firstTrouble } from './checks';
 import { Instrument } from './instrument';
 import { keepOffline } from './offline';

@@ -1,5 +1,5 @@
 // What page and worker say to each other. The worker has the camera's pictures and the tracker; the page shows.
-import type { Sample } from '../shared/sample';
+import type { Sample } from '../common/sample';
 import type { CoreSample, SensorInfo } from './core';
 
 /** What describes a sensor; `name` is what people call it, mostly a file's name. */

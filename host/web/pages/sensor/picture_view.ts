@@ -1,6 +1,6 @@
 // What the tracker sees: its grey picture, with outlines of the tags that belong to this very picture.
-import { make } from '../shared/elements';
-import { carriesNumbers } from '../shared/sample';
+import { make } from '../common/elements';
+import { carriesNumbers } from '../common/sample';
 import type { FromWorker } from './messages';
 
 type Picture = Extract<FromWorker, { kind: 'picture' }>;

@@ -1,6 +1,6 @@
 // Start and stop of a recording, and its download as CSV.
-import { button, make, panel, say } from '../shared/elements';
-import type { Sample } from '../shared/sample';
+import { button, make, panel, say } from '../common/elements';
+import type { Sample } from '../common/sample';
 import { download } from './download';
 import { Recorder } from './recorder';
 

@@ -1,7 +1,7 @@
 // Samples into a CSV file with the columns of the bridge's, in memory that is bounded: text goes into blobs, which the browser may
 // keep on disk, and a recording that has grown too long ends by itself.
-import { CSV_HEADER, csvRow } from '../shared/csv';
-import type { Sample } from '../shared/sample';
+import { CSV_HEADER, csvRow } from '../common/csv';
+import type { Sample } from '../common/sample';
 
 const ROWS_A_BLOB = 2000;
 /** About 350 bytes a row: 9 hours at 60 Hz. */

@@ -1,5 +1,5 @@
 // Which sensor is in force: its files loaded, dropped, changed a little, saved.
-import { button, field, make, panel, present, say } from '../shared/elements';
+import { button, field, make, panel, present, say } from '../common/elements';
 import type { SensorInfo } from './core';
 import { download } from './download';
 import type { SensorFiles } from './messages';

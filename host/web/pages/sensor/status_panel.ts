@@ -1,6 +1,6 @@
 // How it stands, in words and in four figures.
-import { button, make, present, say } from '../shared/elements';
-import { STATUS_WORDS, type Sample } from '../shared/sample';
+import { button, make, present, say } from '../common/elements';
+import { STATUS_WORDS, type Sample } from '../common/sample';
 import type { Feed } from './messages';
 
 const FIGURES: readonly [string, string][] = [

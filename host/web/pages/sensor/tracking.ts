@@ -1,5 +1,5 @@
 // One picture in, one sample out: luminance, tracker, figures, and what the page is told of it.
-import type { Sample } from '../shared/sample';
+import type { Sample } from '../common/sample';
 import type { Core, CoreSample, SensorInfo } from './core';
 import { FeedFigures } from './feed_figures';
 import { LuminanceReader, type Luma } from './luminance';

@@ -1,6 +1,6 @@
 // The calibrations, step by step, in the order in which they are done; and what keeps them true.
 import './calibrate.css';
-import { button, field, make, panel, present, say } from '../../shared/elements';
+import { button, field, make, panel, present, say } from '../../common/elements';
 import { CameraPicture } from '../camera_picture';
 import { JobPanel } from '../job_panel';
 import { type Hello, type Job, listIn, numberIn, said, textIn } from '../protocol';

@@ -1,8 +1,8 @@
 // The camera's own settings, the board's light, and the load cells.
 import '../knobs.css';
 import './record.css';
-import { button, make, panel, present, say } from '../../shared/elements';
-import { figure } from '../../shared/sample';
+import { button, make, panel, present, say } from '../../common/elements';
+import { figure } from '../../common/sample';
 import { CameraPicture } from '../camera_picture';
 import type { BridgeState, CameraControl, Hello } from '../protocol';
 import { Quality } from '../quality';

@@ -1,5 +1,5 @@
 // The sensor's certificate: how well it measures, by its own calibration.
-import { button, make, panel, present } from '../../shared/elements';
+import { button, make, panel, present } from '../../common/elements';
 import { JobPanel } from '../job_panel';
 import { type Job, textIn } from '../protocol';
 import { fetchFile } from '../token';

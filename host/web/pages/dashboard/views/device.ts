@@ -1,8 +1,8 @@
 // How a push becomes motion: which profile, its curves with the hand on them, and sliders that are in force
 // as they move.
 import './device.css';
-import { button, field, make, panel, present, say } from '../../shared/elements';
-import { type Sample, carriesNumbers } from '../../shared/sample';
+import { button, field, make, panel, present, say } from '../../common/elements';
+import { type Sample, carriesNumbers } from '../../common/sample';
 import { CurvePlot } from '../curve_plot';
 import { KnobPanel } from '../knob_panel';
 import { type AxisShape, PROFILE_AXES, ProfileText } from '../profile_text';

@@ -1,5 +1,5 @@
 // What `tagwrench doctor` says about this computer, readable.
-import { button, make, panel, present } from '../../shared/elements';
+import { button, make, panel, present } from '../../common/elements';
 import { JobPanel } from '../job_panel';
 import { type Job, textIn } from '../protocol';
 import { reportLines } from '../report_text';

@@ -1,10 +1,10 @@
 // What the sensor feels now: traces, numbers, the platform, the picture, and how well all of it runs.
 import './live.css';
-import { button, make, panel, say } from '../../shared/elements';
-import { PlatformView } from '../../shared/platform_view';
-import { Readings } from '../../shared/readings';
-import { type Sample, figure } from '../../shared/sample';
-import { Traces } from '../../shared/traces';
+import { button, make, panel, say } from '../../common/elements';
+import { PlatformView } from '../../common/platform_view';
+import { Readings } from '../../common/readings';
+import { type Sample, figure } from '../../common/sample';
+import { Traces } from '../../common/traces';
 import { CameraPicture } from '../camera_picture';
 import type { BridgeState, Hello } from '../protocol';
 import { Quality } from '../quality';

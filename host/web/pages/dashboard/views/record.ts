@@ -1,6 +1,6 @@
 // Recordings: begin and end one while the sensor runs, see how it goes, fetch what there is.
 import './record.css';
-import { button, field, make, panel, present, say } from '../../shared/elements';
+import { button, field, make, panel, present, say } from '../../common/elements';
 import { listIn, numberIn, said, textIn, type BridgeState } from '../protocol';
 import { fetchFile } from '../token';
 import type { App, View } from '../view';

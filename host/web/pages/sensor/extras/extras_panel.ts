@@ -1,6 +1,6 @@
 // What not everybody has: the bridge's HID device, and the board with its light and load cells. Only there where the browser can.
-import { button, field, make, panel, present, say } from '../../shared/elements';
-import { figure } from '../../shared/sample';
+import { button, field, make, panel, present, say } from '../../common/elements';
+import { figure } from '../../common/sample';
 import { BoardLink } from './board_link';
 import { type BoardNews, PROTOCOL_MAJOR } from './board_messages';
 import { HidReadout } from './hid_readout';

@@ -1,6 +1,6 @@
 // Newtons of the bridge's wrench sensor, beside those of this tab.
-import { button, make, say } from '../../shared/elements';
-import { AXES, type Sample, carriesNumbers, figure, wrenchOf } from '../../shared/sample';
+import { button, make, say } from '../../common/elements';
+import { AXES, type Sample, carriesNumbers, figure, wrenchOf } from '../../common/sample';
 import { WrenchHid } from './wrench_hid';
 
 export class HidReadout {

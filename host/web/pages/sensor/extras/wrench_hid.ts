@@ -1,5 +1,5 @@
 // The bridge's wrench sensor on HID, read by WebHID: its report in newtons (host/client/README.md).
-import { STATUS_WORDS, type Sample, type Status, carriesNumbers } from '../../shared/sample';
+import { STATUS_WORDS, type Sample, type Status, carriesNumbers } from '../../common/sample';
 
 const VENDOR = 0x1209;
 const PRODUCT = 0x7a6e;

@@ -9,18 +9,20 @@
 
 namespace tagwrench::test {
 
-class DoctorFolder {
+class TemporaryFolder {
  public:
-  DoctorFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "tw-doctor-XXXXXX").string();
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "tagwrench-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
     path_ = name;
   }
-  DoctorFolder(const DoctorFolder&) = delete;
-  DoctorFolder& operator=(const DoctorFolder&) = delete;
-  ~DoctorFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
 
+  std::string path() const { return path_.string(); }
   std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  /// A file in it, with the folders that it needs.
   void write(const std::string& name, const std::string& text) const {
     std::filesystem::create_directories((path_ / name).parent_path());
     std::ofstream(path_ / name) << text;
