@@ -146,8 +146,7 @@ void bench_recording(Table& table) {
                              {"the region of the tags", record::Keep::region, false},
                              {"no pixels", record::Keep::none, false}};
   for (const Kind& kind : kKinds) {
-    const Cost cost =
-        record_clip(clip, kind, folder / fmt::format("{}.tagwrench", &kind - kKinds));
+    const Cost cost = record_clip(clip, kind, folder / fmt::format("{}.tagwrench", &kind - kKinds));
     table.line(fmt::format("{:<30}{:>11.1f}{:>9.1f}{:>15.1f}{:>12.1f}{:>12.0f}{:>7}", kind.name,
                            cost.median_us, cost.p99_us, 100 * cost.median_us / clip.track_us,
                            1e-3 * cost.bytes, cost.per_second, cost.lost));

@@ -31,8 +31,8 @@ std::string sample_text(const LiveSample& live) {
   append_six(text, "motion", numbers ? live.sample.motion : Vector6::Zero());
   fmt::format_to(std::back_inserter(text),
                  R"(,"zero_state":"{}","buttons":{},"residual_px":{:.4g},"tags_held":{}}})",
-                 name(live.sample.zero_state), live.sample.buttons,
-                 finite(live.residual_px), live.tags_held);
+                 name(live.sample.zero_state), live.sample.buttons, finite(live.residual_px),
+                 live.tags_held);
   return text;
 }
 
