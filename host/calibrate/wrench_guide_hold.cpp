@@ -64,7 +64,13 @@ void WrenchGuide::watch_hold() {
     if (now_ - *asked_time_ > 2 * kLongestSilence) complain_of_silence();
     return;
   }
+  const bool had_moved = moved_;
   const bool moved = has_moved(hold);
+  if (moved_ && !had_moved) {  // what was steady until now is what was asked for before
+    hold_.clear();
+    steady_since_.reset();
+    return;
+  }
   if (!hold.steady) {
     steady_since_.reset();
     return;

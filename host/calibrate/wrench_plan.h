@@ -52,6 +52,7 @@ enum class ReferenceKind : std::uint8_t { masses, load_cell, six_axis };
 struct WrenchPlan {
   std::string name;
   std::string about;  ///< one line: what is needed
+  int minutes = 0;    ///< that a person takes, about; 0: nobody says
   ReferenceKind reference = ReferenceKind::masses;
   int cell_channel = 0;                                        ///< of a load cell
   double mass_sigma = 0.005;                                   ///< relative, of each mass

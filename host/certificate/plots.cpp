@@ -15,7 +15,8 @@ using study::Analysis;
 constexpr std::chrono::seconds kPatience{60};
 constexpr Eigen::Index kMostDots = 500;     // of a panel
 constexpr Eigen::Index kMostColumns = 420;  // of a trace: about one a pixel of paper
-constexpr double kPause = 16;               // typical steps of time, drawn between trials
+constexpr double kPause = 16;               // typical steps of time, drawn between trials ...
+constexpr double kMostPauses = 0.5;  // ... but all together no more of the time that is shown
 
 /// Forces in N, torques in mN m.
 double shown(double value, int axis) { return axis < 3 ? value : 1e3 * value; }
@@ -122,13 +123,17 @@ bool goes_on(const Analysis& a, Eigen::Index i) {
 /// From 0 on, with short pauses between stretches, however long they were: a trial may begin
 /// earlier than the one before has ended, and loads hang for seconds, minutes apart.
 Eigen::VectorXd running_time(const Analysis& a) {
-  const double pause = kPause * typical_step(a.time);
-  Eigen::VectorXd running = Eigen::VectorXd::Zero(a.time.size());
+  Eigen::VectorXd passed = Eigen::VectorXd::Zero(a.time.size());  // 0: a pause
   for (Eigen::Index i = 1; i < a.time.size(); ++i) {
-    const double passed = a.time[i] - a.time[i - 1];
-    const bool on = goes_on(a, i) && passed > 0;
-    running[i] = running[i - 1] + (on ? passed : pause);
+    if (goes_on(a, i)) passed[i] = std::max(0.0, a.time[i] - a.time[i - 1]);
   }
+  const auto pauses = static_cast<double>(std::max<Eigen::Index>(1, (passed.array() == 0).count()));
+  const double most = kMostPauses * passed.sum() / pauses;
+  const double step = kPause * typical_step(a.time);
+  const double pause = most > 0 ? std::min(step, most) : step;
+  Eigen::VectorXd running = Eigen::VectorXd::Zero(a.time.size());
+  for (Eigen::Index i = 1; i < a.time.size(); ++i)
+    running[i] = running[i - 1] + (passed[i] > 0 ? passed[i] : pause);
   return running;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -17,7 +18,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::uintmax_t kLargestFile = 16 << 20;  // a quadratic model has 0.4 MB
-constexpr double kLargest = 1e12;                  // of any number, SI
+constexpr double kLargest = 1e12;                  // of any number, SI ...
+constexpr double kLargestCovariance = 1e24;        // ... but its square: of N/m^2, 1 N at 1 um
 
 /// Every access checks; every complaint names the file.
 class CalibrationReader {
@@ -57,16 +59,17 @@ class CalibrationReader {
     return object.is_object() && object.contains(key);
   }
 
-  double number(const json& value, const std::string& key) const {
+  double number(const json& value, const std::string& key, double largest = kLargest) const {
     if (!value.is_number()) fail(fmt::format("\"{}\" must be a number", key));
     const double out = value.get<double>();
     if (!std::isfinite(out)) fail(fmt::format("\"{}\" holds a number that is not finite", key));
-    if (std::abs(out) > kLargest)
+    if (std::abs(out) > largest)
       fail(fmt::format("\"{}\" holds {:g}, which no sensor has; calibrate anew", key, out));
     return out;
   }
 
-  std::vector<double> numbers(const json& list, const std::string& key, std::size_t count) const {
+  std::vector<double> numbers(const json& list, const std::string& key, std::size_t count,
+                              double largest = kLargest) const {
     const auto refuse = [&] {
       fail(fmt::format("\"{}\" must have {} number{}", key, count, count == 1 ? "" : "s"));
     };
@@ -74,7 +77,7 @@ class CalibrationReader {
     std::vector<double> out;
     for (const json& value : list) {
       if (!value.is_number()) refuse();
-      out.push_back(number(value, key));
+      out.push_back(number(value, key, largest));
     }
     return out;
   }
@@ -204,7 +207,8 @@ Eigen::MatrixXd read_lower_triangle(const CalibrationReader& file, const std::st
   Eigen::MatrixXd out(size, size);
   for (int i = 0; i < size; ++i) {
     const auto count = static_cast<std::size_t>(i) + 1;
-    const std::vector<double> row = file.numbers(rows[static_cast<std::size_t>(i)], key, count);
+    const std::vector<double> row =
+        file.numbers(rows[static_cast<std::size_t>(i)], key, count, kLargestCovariance);
     for (int j = 0; j <= i; ++j) out(i, j) = out(j, i) = row[static_cast<std::size_t>(j)];
   }
   check_covariance(file, key, out);
@@ -309,6 +313,18 @@ Calibration read_calibration(const std::filesystem::path& path) {
   out.sensor = read_sensor(file);
   read_model(file, out.model);
   out.record = read_record(file);
+  return out;
+}
+
+std::string completed_axes(const std::filesystem::path& path) {
+  const CalibrationReader file(path);
+  std::string out;
+  if (!file.has("axes")) return out;
+  const json& axes = file.at("axes");
+  for (std::size_t i = 0; axes.is_array() && i < std::min<std::size_t>(6, axes.size()); ++i) {
+    if (file.has(axes[i], "state") && axes[i]["state"] != name(AxisState::calibrated))
+      out += (out.empty() ? "" : " ") + std::string(kWrenchAxes[i]);
+  }
   return out;
 }
 

@@ -68,6 +68,10 @@ struct Calibration {
 /// Throws ConfigError if it cannot be read or is not such a file.
 Calibration read_calibration(const std::filesystem::path& path);
 
+/// Axes that it leaves to the spring model, "Fx Mz"; empty: none, or it does not tell. Throws
+/// ConfigError if it cannot be read.
+std::string completed_axes(const std::filesystem::path& path);
+
 /// Replaces the file as a whole or not at all. Throws std::runtime_error.
 void save_calibration(const std::filesystem::path& path, const Calibration& calibration);
 

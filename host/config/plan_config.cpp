@@ -123,6 +123,7 @@ WrenchPlan read_plan(YamlReader root, const std::string& name) {
   WrenchPlan plan;
   plan.name = name;
   plan.about = root.text_or("about", "");
+  plan.minutes = root.integer_or("minutes", 0, 1000, 0);
   plan.reference =
       static_cast<ReferenceKind>(root.one_of("reference", {"masses", "load_cell", "six_axis"}));
   if (root.has("gravity_m_s2")) plan.gravity = root.within("gravity_m_s2", 9.7, 9.9);

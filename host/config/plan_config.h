@@ -12,6 +12,7 @@ namespace tagwrench {
 /// brackets:
 ///
 ///   about: one line for people
+///   minutes [0]: that a person takes, about; 0: nobody says
 ///   reference: masses | load_cell | six_axis
 ///   gravity_m_s2 [9.80665], mass_sigma_percent [0.5]
 ///   cell_channel [0], line_sigma_deg [1.5]                 of pushes with a load cell

@@ -293,6 +293,7 @@ WrenchModel read_wrench(YamlReader node, SensorConfig& sensor, WrenchCalibration
     sensor.calibration = beside(node, node.text("calibration"));
     if (use == WrenchCalibration::use) {
       load_calibration(sensor.calibration, sensor.camera, sensor.target, sensor.rest, model);
+      sensor.completed_axes = completed_axes(sensor.calibration);
     }
   }
   model.range = force_and_torque(node, "range_n", "range_nm", model.range);

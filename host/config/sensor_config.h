@@ -45,6 +45,7 @@ struct SensorConfig {
   WrenchModel wrench;
   std::optional<Matrix6> spring_stiffness;  ///< of wrench.springs, also where a calibration is used
   std::string calibration;                  ///< path of wrench.calibration; empty: none
+  std::string completed_axes;               ///< that it left to the spring model: "Fx Mz"
   ZeroConfig zero;
   std::optional<ReferenceLine> reference;  ///< a load cell that is there for good
   ShapingOptions shaping;

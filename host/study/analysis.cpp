@@ -110,9 +110,10 @@ Analysis analyze(const std::vector<Trial>& trials, const AnalysisOptions& option
       rows_of(clean, all, analysis.lag.value, options.smooth ? Smoothing::apart : Smoothing::none);
   analysis.readings = static_cast<std::size_t>(rows.time.size());
   if (rows.time.size() <= rows.features.cols() + 1) {
-    throw ConfigError(
-        fmt::format("{}: {} readings with a reference for {} unknown numbers per axis; record more",
-                    trials[0].name, rows.time.size(), rows.features.cols() + 1));
+    throw ConfigError(fmt::format(
+        "{}: {} readings with a reference for {} unknown numbers per axis; record more, or "
+        "check the units of time",
+        trials[0].name, rows.time.size(), rows.features.cols() + 1));
   }
   judge_excitation(rows.felt, largest_noise(clean), analysis);
   for (const CleanTrial& trial : clean) {

@@ -18,6 +18,7 @@ std::string figure(const std::optional<double>& value, const char* unit = "") {
 }
 
 std::string percent(double value) {
+  if (value > 1000) return ">1000";
   return std::isfinite(value) ? fmt::format("{:.2f}", value) : "-";
 }
 
@@ -44,7 +45,10 @@ int range_decimals(const Analysis& a) {
   return std::clamp(decimals, 0, std::clamp(most, 0, 7));
 }
 
-std::string times(double value) { return value > 1000 ? ">1000" : fmt::format("{:.3g}", value); }
+std::string times(double value) {
+  if (value > 1000) return ">1000";
+  return value < 0.1 ? "<0.1" : fmt::format("{:.3g}", value);
+}
 
 void add_head(Out out, const Analysis& a) {
   fmt::format_to(out, "{}\n", fmt::join(a.names, ", "));
@@ -78,8 +82,8 @@ void add_scores(Out out, const Analysis& a) {
       fmt::format_to(out, "  not calibrated\n");
       continue;
     }
-    fmt::format_to(out, "{:>8}{:>8}{:>11.3g}{:>7.2f}{:>8}{:>7}{:>9}{:>8}{}\n",
-                   score(x.r2_in_sample, 4), score(x.r2, 4), x.rmse, x.rmse_percent,
+    fmt::format_to(out, "{:>8}{:>8} {:>10.3g} {:>6} {:>7} {:>6} {:>8} {:>7}{}\n",
+                   score(x.r2_in_sample, 4), score(x.r2, 4), x.rmse, percent(x.rmse_percent),
                    percent(x.nonlinearity_percent), percent(x.hysteresis_percent),
                    times(x.excitation), times(x.independent), x.calibrated ? "" : not_calibrated);
   }

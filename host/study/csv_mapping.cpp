@@ -26,6 +26,9 @@ constexpr std::array kLoadUnits{Unit{"N", 1},      Unit{"mN", 1e-3},  Unit{"Nm",
                                 Unit{"mNm", 1e-3}, Unit{"Nmm", 1e-3}, Unit{"gf", 9.80665e-3}};
 constexpr std::array kTimeUnits{Unit{"s", 1}, Unit{"ms", 1e-3}, Unit{"us", 1e-6}, Unit{"ns", 1e-9}};
 
+// A platform on springs goes no further; numbers that do were written in another unit.
+constexpr double kMostWay = 0.1;       // m
+constexpr double kMostTurn = 2.0;      // rad
 constexpr double kLeastWeight = 1e-6;  // of a smoothing that can be undone
 
 template <std::size_t N>
@@ -143,7 +146,8 @@ Eigen::MatrixXd rotation_vectors(const std::string& order, const Eigen::MatrixXd
 }
 
 void add_features(const CsvMapping& mapping, const FeatureColumns& group, const DelimitedText& text,
-                  const Rows& rows, Trial& trial) {
+                  const Rows& rows, MappedTrial& mapped) {
+  Trial& trial = mapped.trial;
   const std::vector<std::size_t> columns = text.find(group.columns);
   Eigen::MatrixXd values = all_rows(text, columns);
   if (group.unsmooth > 0) {
@@ -167,6 +171,15 @@ void add_features(const CsvMapping& mapping, const FeatureColumns& group, const 
                                                    : text.header()[columns[i]];
     trial.feature_names.push_back(
         group.euler.empty() ? name : fmt::format("{}_r{}", name, "xyz"[static_cast<int>(i)]));
+    const auto column = values.col(static_cast<Eigen::Index>(i));
+    const double way = column.maxCoeff() - column.minCoeff();
+    const bool turns = group.quantity == 'r';
+    if (group.quantity == 0 || way <= (turns ? kMostTurn : kMostWay)) continue;
+    mapped.notes.push_back(fmt::format(
+        "{}: column {} ({}) goes over {:.3g} {}, further than a platform on springs: give its unit "
+        "({}), or leave out the row that is wrong",
+        text.name(), columns[i] + 1, trial.feature_names.back(), way, turns ? "rad" : "m",
+        turns ? "deg or mrad" : "mm or um"));
   }
 }
 
@@ -227,6 +240,7 @@ FeatureColumns parse_feature_columns(const std::string& text, const std::string&
     const std::string& part = parts[i];
     if (const Unit* unit = find_unit(kFeatureUnits, part)) {
       columns.unit = unit->si;
+      columns.quantity = part.ends_with('m') ? 'm' : 'r';
     } else if (part == "euler") {
       columns.euler = "xyz";
     } else if (part.starts_with("euler=") && part.size() == 9 &&
@@ -296,7 +310,7 @@ MappedTrial read_mapped(const CsvMapping& mapping) {
                                   mapping.skip_readings, mapped.notes);
   trial.time = rows.time;
   for (const FeatureColumns& group : mapping.features)
-    add_features(mapping, group, readings, rows, trial);
+    add_features(mapping, group, readings, rows, mapped);
 
   if (mapping.reference.empty()) {
     trial.reference_time = rows.time;

@@ -14,6 +14,7 @@ namespace tagwrench::study {
 struct FeatureColumns {
   std::string columns;
   double unit = 1;      ///< SI per number in the file
+  char quantity = 0;    ///< 'm' or 'r', rad; 0: not said
   std::string euler;    ///< order of intrinsic rotations, "xyz": three angles become a rotation
                         ///< vector from the first readings; empty: taken as they are
   double unsmooth = 0;  ///< weight w of an exponential smoothing to be undone,

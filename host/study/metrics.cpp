@@ -13,10 +13,6 @@
 namespace tagwrench::study {
 namespace {
 
-// With a load whose standard deviation is less than ten times what the reference itself wavers,
-// more than a tenth of what is compared is the reference's own error: nothing better could be
-// shown.
-constexpr double kLeastExcitation = 10;
 // Below this the part of an axis' load that others do not tell is the reference's noise.
 constexpr double kLeastIndependent = 3;
 constexpr std::size_t kLeastRests = 3;  // windows that tell the noise

@@ -8,6 +8,11 @@
 
 namespace tagwrench::study {
 
+/// With a load whose standard deviation is less than ten times what the reference itself wavers,
+/// more than a tenth of what is compared is the reference's own error: nothing better could be
+/// shown.
+inline constexpr double kLeastExcitation = 10;
+
 /// Range, excitation and independence of each axis: fills AxisReport's range_*, full_scale,
 /// reference_noise, excitation, independent, calibrated and reason, and Analysis' weakest*.
 /// `felt`: k x 6, of all readings.

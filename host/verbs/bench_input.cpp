@@ -1,5 +1,7 @@
 #include "host/verbs/bench_input.h"
 
+#include <utility>
+
 #include "host/config/scenario_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
@@ -24,8 +26,9 @@ BenchInput open_at_bench(const InputOptions& options) {
     at.input.sensor_name = options.sensor;
     at.input.sensor = load_sensor(options.sensor, options.calibration);
   }
-  at.input.source =
-      std::make_unique<SimulatorSource>(scenario, /*live=*/false, nullptr, at.bench.get());
+  auto source = std::make_unique<SimulatorSource>(scenario, !options.fast, nullptr, at.bench.get());
+  at.time_zero = source->time_zero();
+  at.input.source = std::move(source);
   return at;
 }
 

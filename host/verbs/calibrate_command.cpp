@@ -87,9 +87,15 @@ void CalibrateCommand::declare_wrench() {
                       "its own");
   wrench_->add_option("--out", o.out, "file to write; without it calibration.json beside --sensor");
   wrench_->add_option("--notes", o.notes, "temperature, place, who: goes into the record");
-  wrench_->add_option("--board", o.board, "serial port of the board with the load cell, or auto");
+  auto* board = wrench_->add_option("--board", o.board,
+                                    "serial port of the board with the load cell, or auto");
   wrench_->add_option("--cells", o.cells,
                       "its load cells' calibration; without it the one kept for this board");
+  wrench_
+      ->add_option("--emulated-cell", o.emulated_cell,
+                   "with --source sim and an emulated board: the pipe that the board reads its "
+                   "orders from, so that its cell feels the simulated hand; in real time")
+      ->needs(board);
   wrench_->add_option("--optoforce", o.optoforce, "serial port of an OptoForce sensor");
   wrench_
       ->add_option("--counts-per-unit", o.counts_per_unit,

@@ -35,9 +35,10 @@ constexpr double kUnknownRange = 1e8;
 int list_plans() {
   for (const ReadyPlan& ready : ready_plans()) {
     const WrenchPlan plan = parse_plan(ready.text, ready.name);
-    std::fputs(
-        fmt::format("{:18} {} steps: {}\n", ready.name, plan.steps.size(), plan.about).c_str(),
-        stdout);
+    std::fputs(fmt::format("{:18} {} steps: {}; about {} minutes\n", ready.name, plan.steps.size(),
+                           plan.about, plan.minutes)
+                   .c_str(),
+               stdout);
   }
   return 0;
 }
@@ -99,8 +100,13 @@ void check_files(const CalibrationFiles& files, const CalibrateWrenchOptions& op
   }
 }
 
-/// Pictures cannot be asked to hang a weight.
+/// Pictures cannot be asked to hang a weight, and a person before a camera needs no pipe.
 void check_source(const CalibrateWrenchOptions& options) {
+  if (!options.emulated_cell.empty() && split_spec(options.source).kind != "sim") {
+    throw ConfigError(
+        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
+                    options.source));
+  }
   if (split_spec(options.source).kind == "images") {
     throw ConfigError(fmt::format(
         "--source {}: nobody is there who could do what the plan asks; give a camera, sim, or the "
@@ -119,11 +125,13 @@ void check_source(const CalibrateWrenchOptions& options) {
 /// What a recording has already, or cannot do any more.
 void check_replay_options(const CalibrateWrenchOptions& options) {
   if (!options.record && !options.resume && !options.seconds && options.board.empty() &&
-      options.cells.empty() && options.optoforce.empty() && options.counts_per_unit.empty())
+      options.cells.empty() && options.optoforce.empty() && options.counts_per_unit.empty() &&
+      options.emulated_cell.empty())
     return;
   throw ConfigError(
-      "--record, --resume, --seconds, --board, --cells, --optoforce, --counts-per-unit: are for "
-      "loads that are still to come, the recording has its own; leave them out");
+      "--record, --resume, --seconds, --board, --cells, --optoforce, --counts-per-unit, "
+      "--emulated-cell: are for loads that are still to come, the recording has its own; leave "
+      "them out");
 }
 
 std::string now_utc() {
@@ -182,6 +190,7 @@ void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject
                                    {.prior = subject.stiffness,
                                     .require_all = options.require_all,
                                     .zero_in_use = data.zero_in_use});
+  check_some_axis(fit);
   add_predictions(plan, fit, data);
   data.trial.sensor = sensor_sha256(subject.sensor);
   write_calibration(subject.files, subject.sensor_text, options.sensor, subject.sensor, data,
@@ -257,7 +266,8 @@ int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles
   check_files(files, options);
   check_source(options);
   BenchInput at =
-      open_at_bench({options.sensor, options.source, /*fast=*/true, WrenchCalibration::ignore});
+      open_at_bench({options.sensor, options.source, /*fast=*/options.emulated_cell.empty(),
+                     WrenchCalibration::ignore});
   const SensorConfig& sensor = at.input.sensor;
   check_sensor(at.input, sensor_text, options.sensor);
 
@@ -274,9 +284,11 @@ int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles
     guide.resume(progress.records, progress.skipped);
     tell(fmt::format("going on: {} steps are done", progress.records.size()));
   }
-  const std::unique_ptr<Reference> reference = open_reference(
-      plan, {options.board, options.cells, options.optoforce, options.counts_per_unit},
-      at.bench.get(), TimePoint{});
+  const std::unique_ptr<Reference> reference =
+      open_reference(plan,
+                     {options.board, options.cells, options.optoforce, options.counts_per_unit,
+                      options.emulated_cell},
+                     at.bench.get(), at.time_zero);
   tell("source: " + at.input.source->format().description);
   if (reference) tell("reference: " + reference->description());
   if (!rest_is_calibrated(sensor)) {

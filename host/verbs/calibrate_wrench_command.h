@@ -29,6 +29,7 @@ struct CalibrateWrenchOptions {
   std::string cells;      ///< calibration file of its load cells; empty: by the board's id
   std::string optoforce;  ///< port; empty: none
   std::vector<double> counts_per_unit;  ///< of that
+  std::string emulated_cell;            ///< pipe to the emulated board, for its cell; empty: none
 };
 
 /// Returns the exit status: 0 written; 1 stopped or failed on the way, what was measured is kept

@@ -8,6 +8,7 @@
 
 #include "host/certificate/quantity.h"
 #include "host/study/analysis_warnings.h"
+#include "host/study/metrics.h"
 
 namespace tagwrench {
 namespace {
@@ -95,11 +96,18 @@ void add_calibration(const CalibrationRecord& record, study::Analysis& analysis)
                                           : fmt::format("{}: {}", name(axis.state), axis.reason);
     } else if (!report.calibrated && analysis.own_predictions && report.full_scale > 0) {
       report.calibrated = true;
+      report.reason.clear();
       // The fit has all readings together and judges the axis; one reading's score cannot.
-      remarks.push_back(fmt::format(
-          "{}: calibrated, its answer known to {:.1f} %; the scores on held-out readings hold the "
-          "reference's own noise, which the load exceeds {:.0f} times only",
-          study::kAxisNames[i], std::max(0.1, 100 * axis.gain_sigma), report.excitation));
+      const std::string why =
+          report.excitation < study::kLeastExcitation
+              ? fmt::format(
+                    "the scores on held-out readings hold the reference's own noise, which "
+                    "the load exceeds {:.0f} times only",
+                    report.excitation)
+              : "but it was never loaded without the others, so that its scores are theirs too";
+      remarks.push_back(fmt::format("{}: calibrated, its answer known to {:.1f} %; {}",
+                                    study::kAxisNames[i], std::max(0.1, 100 * axis.gain_sigma),
+                                    why));
     }
   }
   for (const std::string& line : axis_warnings(analysis)) remarks.push_back(line);

@@ -11,6 +11,7 @@
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
 #include "host/verbs/check_text.h"
+#include "host/verbs/emulated_cell.h"
 #include "host/verbs/events_option.h"
 
 namespace tagwrench {
@@ -76,6 +77,17 @@ void set_known(const CheckOptions& options, const Vector6& displacement, ProofLo
   load.known_covariance = covariance;
 }
 
+/// The simulated hand on the cell, for as long as anyone has patience with it.
+void simulated_push(sim::Bench& bench, const Vector6& range, const ReferenceLine& line) {
+  constexpr double kShare = 0.6;  // of what the weakest axis bears
+  constexpr int kStrokes = 8;
+  Vector6 of_newton;
+  of_newton << line.direction, line.point.cross(line.direction);
+  const double most = 1 / of_newton.cwiseAbs().cwiseQuotient(range).maxCoeff();
+  bench.push(line.point, line.direction, kShare * most,
+             std::chrono::duration<double>(kPatience).count(), kStrokes);
+}
+
 /// How far the wrench must go before the load is taken to be there, of the range.
 double least_change(const CheckOptions& options, const Vector6& range) {
   ProofLoad load;
@@ -125,6 +137,11 @@ void CheckCommand::add_load_options() {
   verb_->add_option("--channel", options_.channel, "of the load cell")
       ->check(CLI::Range(0, 3))
       ->needs(board);
+  verb_
+      ->add_option("--emulated-cell", options_.emulated_cell,
+                   "with --source sim and an emulated board: the pipe that the board reads its "
+                   "orders from, so that its cell feels the simulated hand")
+      ->needs(board);
   mass->needs(at);
   board->needs(at);
   board->needs(direction);
@@ -146,10 +163,16 @@ int CheckCommand::run() const {
     if (!board->connected()) return stopped();
   }
   BenchInput at;
-  if (board) {
-    at.input = open_input({options_.sensor, options_.source, false});  // a board has its own time
+  const InputOptions from{options_.sensor, options_.source, /*fast=*/!board};
+  if (board && options_.emulated_cell.empty()) {
+    at.input = open_input(from);  // a board has its own time
   } else {
-    at = open_at_bench({options_.sensor, options_.source, true});
+    at = open_at_bench(from);
+  }
+  if (!options_.emulated_cell.empty() && !at.bench) {
+    throw ConfigError(
+        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
+                    options_.source));
   }
   Input& input = at.input;
   check_size(input);
@@ -161,7 +184,13 @@ int CheckCommand::run() const {
   Events events(options_.events);
   tell("source: " + input.source->format().description);
   tell("hands off for some seconds");
-  const Seen seen = watch(*input.source, stop, hands_off, events);
+  std::unique_ptr<Output> cell;
+  if (board) {
+    input.sensor.reference = ReferenceLine{options_.channel, vector3(options_.at_mm) * 1e-3,
+                                           vector3(options_.direction).normalized()};
+    cell = board->output(input.sensor, "");
+  }
+  const Seen seen = watch(*input.source, stop, hands_off, events, cell.get());
   if (seen == Seen::stopped) return stopped();
   if (const std::string why = why_nothing(seen, hands_off); !why.empty()) {
     tell(why);
@@ -169,7 +198,7 @@ int CheckCommand::run() const {
   }
   bool fine = print(judge(hands_off.result()));
   if (options_.mass_g) fine = by_mass(at, stop, hands_off, events) && fine;
-  if (board) fine = by_cell(input, stop, *board) && fine;
+  if (board) fine = by_cell(at, stop, *board, *cell) && fine;
   if (signalled(stop)) return stopped();
   return fine ? 0 : kOff;
 }
@@ -195,27 +224,30 @@ bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands
 }
 
 /// Until the scale is known well, or patience is lost.
-bool CheckCommand::by_cell(Input& input, const UniqueFd& stop, RunBoard& board) const {
-  SensorConfig& sensor = input.sensor;
-  sensor.reference = ReferenceLine{options_.channel, vector3(options_.at_mm) * 1e-3,
-                                   vector3(options_.direction).normalized()};
-  const std::unique_ptr<Output> cell = board.output(sensor, "");
+bool CheckCommand::by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard& board,
+                           Output& cell) const {
+  const SensorConfig& sensor = at.input.sensor;
   Tracker tracker(sensor.camera, sensor.target, sensor.rest);
   WrenchEstimator wrench(sensor.wrench);
+  std::optional<EmulatedCell> hand;
+  if (!options_.emulated_cell.empty())
+    hand.emplace(options_.emulated_cell, options_.channel, *at.bench, at.time_zero);
   tell("now push with the load cell, slowly, on and off, for some seconds");
+  if (hand) simulated_push(*at.bench, sensor.wrench.range, *sensor.reference);
   std::optional<TimePoint> begin;
   while (true) {
     Frame frame;
-    const Next next = next_frame(*input.source, stop, frame);
+    const Next next = next_frame(*at.input.source, stop, frame);
     if (next == Next::stopped) return false;
     if (next == Next::end) break;
-    if (const std::string_view news = cell->service(); !news.empty()) tell(news);
+    if (hand) hand->follow();
+    if (const std::string_view news = cell.service(); !news.empty()) tell(news);
     if (next != Next::frame) continue;
     if (!begin) begin = frame.capture_time;
     Sample sample{.capture_time = frame.capture_time, .latency_origin = frame.latency_origin};
     const Track track = tracker.track(frame);
     wrench.estimate(track, sample);
-    cell->send(sample);
+    cell.send(sample);
     const Duration pushed = frame.capture_time - *begin;
     const bool known = board.monitor().scale_sigma() < kKnownScale;
     if (pushed >= kPatience || (known && pushed >= kLeastPush)) break;

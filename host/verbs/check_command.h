@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,6 +28,7 @@ struct CheckOptions {
   std::string cells;                      ///< calibration of its load cells
   int channel = 0;
   std::vector<double> direction;  ///< of the force on the platform, camera axes
+  std::string emulated_cell;      ///< pipe to the emulated board, for its cell; empty: none
 };
 
 /// Declares itself on the command line; must outlive the parsing.
@@ -42,7 +44,7 @@ class CheckCommand {
  private:
   void add_load_options();
   bool by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off, Events& events) const;
-  bool by_cell(Input& input, const UniqueFd& stop, RunBoard& board) const;
+  bool by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard& board, Output& cell) const;
 
   CLI::App* verb_;
   CheckOptions options_;

@@ -8,6 +8,7 @@
 #include "host/config_error.h"
 #include "host/input.h"
 #include "host/light/reading.h"
+#include "host/tell.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/picture_quality.h"
 
@@ -188,10 +189,14 @@ Vector6 HandsOff::wrench_sigma() const { return (variance_sum_ / std::max(1, hel
 
 Vector6 HandsOff::displacement() const { return displacement_sum_ / std::max(1, held_); }
 
-Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off, Events& events) {
+Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off, Events& events,
+           Output* board) {
   while (true) {
     Frame frame;
     const Next next = next_frame(source, stop, frame);
+    if (board != nullptr) {
+      if (const std::string_view news = board->service(); !news.empty()) tell(news);
+    }
     if (next == Next::stopped) return Seen::stopped;
     if (next == Next::end) return Seen::too_little;
     if (next != Next::frame) continue;

@@ -11,6 +11,7 @@
 #include "host/check/in_situ.h"
 #include "host/config/sensor_config.h"
 #include "host/os/unique_fd.h"
+#include "host/output/output.h"
 #include "host/source/frame_source.h"
 #include "host/tracker/tracker.h"
 #include "host/verbs/events.h"
@@ -99,8 +100,9 @@ class HandsOff {
 enum class Seen : std::uint8_t { enough, too_little, stopped };
 
 /// Until the sensor has stood still for long enough, patience is lost, the source ends or a signal
-/// comes.
-Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off, Events& events);
+/// comes. `board`, borrowed, is served meanwhile: its light goes out otherwise.
+Seen watch(FrameSource& source, const UniqueFd& stop, HandsOff& hands_off, Events& events,
+           Output* board = nullptr);
 
 /// Why watch() saw too little, in words; empty if there is something to judge.
 std::string why_nothing(Seen seen, const HandsOff& hands_off);

@@ -236,6 +236,12 @@ std::optional<int> run_once(Session& session) {
   if (many_profiles && outputs.programs != nullptr)
     desk.follow_programs([&programs = *outputs.programs] { return last_program(programs); });
   tell("source: " + input.source->format().description);
+  if (!input.sensor.completed_axes.empty()) {
+    tell(
+        fmt::format("not calibrated, but as the springs are described: {}; their standard "
+                    "deviations say how little is known",
+                    input.sensor.completed_axes));
+  }
   if (session.watch != nullptr) {
     session.watch->ready("source: " + input.source->format().description);
     outputs.all.push_back(std::move(session.watch));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host/wrench/fit_axes.h"
+
 namespace tagwrench::fit {
 namespace {
 
@@ -13,8 +15,12 @@ constexpr double kSure = 2;
 constexpr double kWorthwhile = 0.05;  // of the held-out squared residual
 constexpr double kFelt = 0.001;       // of full load, held-out RMS of the axis that wins most
 
-std::vector<FeatureSpec> candidates(const Problem& problem, std::span<const PathPoint> path) {
-  std::vector<FeatureSpec> out{{.kind = FeatureKind::quadratic}};
+std::vector<FeatureSpec> candidates(const Problem& problem, const Judged& linear,
+                                    std::span<const PathPoint> path) {
+  std::vector<FeatureSpec> out;
+  // How a load bends what no load has moved cannot be told.
+  if (missing_loads(problem, linear.weighting.block).empty())
+    out.push_back({.kind = FeatureKind::quadratic});
   if (path.size() < 2) return out;
   const double length = path.back().time - path.front().time;
   for (double tau = 1; tau <= 512 && tau <= length / 2; tau *= 2)
@@ -69,7 +75,7 @@ std::vector<ModelTrial> try_richer(const Problem& problem, const Judged& linear,
   std::size_t best = 0;
   bool felt = false;
   double best_score = std::numeric_limits<double>::infinity();
-  for (const FeatureSpec& features : candidates(problem, path)) {
+  for (const FeatureSpec& features : candidates(problem, linear, path)) {
     const Problem other = with_features(problem, observations, path, features);
     const Solution solution = solve(other, linear.weighting, {});
     const std::vector<Vector6> errors = hold_out_errors(other, solution);
@@ -91,6 +97,7 @@ std::vector<ModelTrial> try_richer(const Problem& problem, const Judged& linear,
     }
     out.push_back(trial);
   }
+  if (out.empty()) return out;
   ModelTrial& winner = out[best];
   winner.adopted = felt && 1 - winner.score > std::max(kSure * winner.score_sigma, kWorthwhile);
   return out;

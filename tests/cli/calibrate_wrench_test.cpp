@@ -56,6 +56,39 @@ mountings:
       - {do: rest}
 )";
 
+// Five axes: what hangs on the sides hangs in the middle.
+const char* const kUntwistedPlan = R"(about: no twist
+reference: masses
+points:
+  - {name: middle, position_mm: [0, 0, 6]}
+  - {name: right, position_mm: [15, 0, 6]}
+  - {name: lower, position_mm: [0, 15, 6]}
+mountings:
+  - name: standing
+    gravity: [0, 0, -1]
+    say: stand it up
+    steps:
+      - {do: rest}
+      - {do: mass, mass_g: 50, at: right}
+      - {do: mass, mass_g: 50, at: lower}
+      - {do: mass, mass_g: 50, at: middle}
+      - {do: rest}
+  - name: on its right side
+    gravity: [1, 0, 0]
+    say: lay it down
+    steps:
+      - {do: rest}
+      - {do: mass, mass_g: 50, at: middle}
+      - {do: rest}
+  - name: on its lower side
+    gravity: [0, 1, 0]
+    say: lay it down
+    steps:
+      - {do: rest}
+      - {do: mass, mass_g: 50, at: middle}
+      - {do: rest}
+)";
+
 class CalibrateWrench : public testing::Test {
  protected:
   void SetUp() override {
@@ -159,6 +192,40 @@ TEST_F(CalibrateWrench, AxesThatNoStepReachesAreCompletedAndMarkedOrRefusedByNam
   EXPECT_NE(axes[0].at("state"), "calibrated");
   EXPECT_NE(axes[5].at("state"), "calibrated");
   EXPECT_NE(axes[5].at("reason"), "");
+}
+
+TEST_F(CalibrateWrench, StepsThatTellNoAxisReplaceNothing) {
+  ASSERT_EQ(calibrate(plan_).status, 0);
+  const std::string old = read_file(out_);
+  std::string one = kShortPlan;
+  replace(one, "      - {do: mass, mass_g: 50, at: left}\n", "");
+  replace(one, "      - {do: mass, mass_g: 50, at: lower}\n", "");
+  write_file(plan_, one);
+  expect_refused_again(calibrate(plan_), "calibration: no axis is known from these steps: Fx (");
+  EXPECT_EQ(read_file(out_), old);
+  EXPECT_FALSE(std::filesystem::exists(out_.string() + ".new"));
+}
+
+TEST_F(CalibrateWrench, RunAndTheCertificateSayWhichAxesAreCompleted) {
+  write_file(plan_, kUntwistedPlan);
+  const Outcome outcome = calibrate(plan_);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Outcome run =
+      run_bridge({"run", "--sensor", sensor_, "--source", "sim:" + scenario_.string(), "--fast",
+                  "--frames", "3", "--output", "jsonl:-"});
+  EXPECT_NE(run.err.find("not calibrated, but as the springs are described: Mz;"),
+            std::string::npos)
+      << run.err;
+
+  const std::string certificate = (temporary_ / "certificate").string();
+  const Outcome written = run_bridge({"certificate", "--calibration", out_, "--out", certificate});
+  if (written.err.find("apt install") != std::string::npos) GTEST_SKIP() << written.err;
+  ASSERT_EQ(written.status, 0) << written.err;
+  EXPECT_NE(written.err.find("Mz is not calibrated"), std::string::npos) << written.err;
+  // Fx came with a little of Mz each time: the fit knows it, a score alone could not.
+  const std::string said = read_file(certificate + ".json");
+  EXPECT_NE(said.find("but it was never loaded without the others"), std::string::npos);
+  EXPECT_EQ(said.find("times only"), std::string::npos) << "its load is far above the noise";
 }
 
 TEST_F(CalibrateWrench, WhatWasStoppedGoesOnAndBelongsToItsPlan) {
@@ -284,6 +351,11 @@ TEST_F(CalibrateWrench, BadInputIsNamedAndNothingIsWritten) {
   expect_refused(run_bridge({"calibrate", "wrench", "--sensor", sensor_, "--plan", "paper"}),
                  "--source");
   expect_refused(calibrate("load_cell", {"--board", "/dev/null"}), "simulated instruments");
+  expect_refused(calibrate("load_cell", {"--emulated-cell", "pipe"}), "--board");
+  expect_refused(
+      run_bridge({"calibrate", "wrench", "--sensor", sensor_, "--source", "v4l2:/dev/video0",
+                  "--plan", "load_cell", "--board", "/dev/null", "--emulated-cell", "pipe"}),
+      "is for the simulated sensor");
   write_file(out_, "a shopping list");
   const Outcome foreign = calibrate("paper");
   EXPECT_EQ(foreign.status, 2);

@@ -1,7 +1,11 @@
 #include "tests/firmware/board_orders.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
+#include <iterator>
+#include <memory>
 #include <numbers>
 #include <sstream>
 
@@ -10,15 +14,18 @@ namespace tagwrench::emulator {
 namespace {
 
 using Words = std::istringstream;
+using SteadyTime = std::chrono::steady_clock::time_point;
 
 struct Order {
   const char* form;
   const char* effect;
 };
 
-constexpr std::array<Order, 15> kOrders{{
+constexpr std::array<Order, 17> kOrders{{
     {"cell N FORCE_N", "load cell N (0 to 3), where it is wired, feels this force"},
+    {"cell N at T_NS FORCE_N", "it feels it at this time of CLOCK_MONOTONIC; between, a line"},
     {"cell N sine AMPLITUDE_N HZ", "it feels a force that goes up and down"},
+    {"cell N gain FACTOR", "its amplifier shows so many times what it showed before"},
     {"cell N disconnect", "its wires come off"},
     {"cell N connect", "they are put on again"},
     {"cell N stuck", "its data line stays low"},
@@ -48,7 +55,50 @@ void apply_sine(Hx711& cell, double amplitude_n, double hz) {
   };
 }
 
-bool order_cell(Words& words, EmulatedBoard& board) {
+/// A force that is told point by point, ahead of time.
+class ForceCourse {
+ public:
+  explicit ForceCourse(const SteadyTime& start) : start_(start) {}
+  void add(std::int64_t time_ns, double force_n) {
+    constexpr std::size_t kMost = 4096;  // points; those of some seconds
+    if (!points_.empty() && time_ns <= points_.back().time_ns) return;
+    points_.push_back({time_ns, force_n});
+    if (points_.size() > kMost) points_.pop_front();
+  }
+  double operator()(VirtualTime time) const {
+    const std::int64_t t = (start_ + time).time_since_epoch().count();
+    const auto after =
+        std::upper_bound(points_.begin(), points_.end(), t,
+                         [](std::int64_t at, const Point& p) { return at < p.time_ns; });
+    if (after == points_.begin()) return points_.front().force_n;
+    if (after == points_.end()) return points_.back().force_n;
+    const Point& before = *std::prev(after);
+    const double share = static_cast<double>(t - before.time_ns) /
+                         static_cast<double>(after->time_ns - before.time_ns);
+    return before.force_n + share * (after->force_n - before.force_n);
+  }
+
+ private:
+  struct Point {
+    std::int64_t time_ns;
+    double force_n;
+  };
+  const SteadyTime& start_;
+  std::deque<Point> points_;
+};
+
+void order_course(Hx711& cell, std::int64_t time_ns, double force_n, const SteadyTime& start) {
+  struct Follow {
+    std::shared_ptr<ForceCourse> course;
+    double operator()(VirtualTime time) const { return (*course)(time); }
+  };
+  const Follow* now = cell.bridge().force.target<Follow>();
+  const Follow follow = now != nullptr ? *now : Follow{std::make_shared<ForceCourse>(start)};
+  follow.course->add(time_ns, force_n);
+  if (now == nullptr) cell.bridge().force = follow;
+}
+
+bool order_cell(Words& words, EmulatedBoard& board, const SteadyTime& start) {
   unsigned channel = 0;
   std::string what;
   if (!(words >> channel >> what) || channel >= kCells) return false;
@@ -58,6 +108,19 @@ bool order_cell(Words& words, EmulatedBoard& board) {
     double hz = 0;
     if (!(words >> amplitude >> hz) || !done(words)) return false;
     apply_sine(cell, amplitude, hz);
+    return true;
+  }
+  if (what == "at") {
+    std::int64_t time_ns = 0;
+    double force = 0;
+    if (!(words >> time_ns >> force) || !done(words)) return false;
+    order_course(cell, time_ns, force, start);
+    return true;
+  }
+  if (what == "gain") {
+    double factor = 0;
+    if (!(words >> factor) || !done(words)) return false;
+    cell.bridge().counts_per_newton *= factor;
     return true;
   }
   if (!done(words)) return false;
@@ -155,13 +218,14 @@ void wire(EmulatedBoard& board, const board::CellOption& option) {
   }
 }
 
-std::optional<std::string> carry_out(const std::string& line, EmulatedBoard& board, PtyLine& port) {
+std::optional<std::string> carry_out(const std::string& line, EmulatedBoard& board, PtyLine& port,
+                                     const SteadyTime& start) {
   Words words(line);
   std::string order;
   if (!(words >> order)) return std::nullopt;
   bool good = true;
   if (order == "cell") {
-    good = order_cell(words, board);
+    good = order_cell(words, board, start);
   } else if (order == "adc") {
     good = order_adc(words, board);
   } else if (order == "supply") {

@@ -1,6 +1,7 @@
 // What a person or a test may do to an emulated board while it runs, one line of text each.
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <string>
 
@@ -13,8 +14,10 @@ namespace tagwrench::emulator {
 /// All orders, one line each.
 std::string help_on_orders();
 
-/// Carries out one line. Returns what is wrong with it; nothing if it was done.
-std::optional<std::string> carry_out(const std::string& line, EmulatedBoard& board, PtyLine& port);
+/// Carries out one line. `start`, borrowed for as long as the board runs: CLOCK_MONOTONIC at its
+/// virtual time 0. Returns what is wrong with the line; nothing if it was done.
+std::optional<std::string> carry_out(const std::string& line, EmulatedBoard& board, PtyLine& port,
+                                     const std::chrono::steady_clock::time_point& start);
 
 void wire(EmulatedBoard& board, const board::CellOption& option);
 

@@ -112,7 +112,7 @@ class RealTimeBoard {
       const std::string line = typed_.substr(0, end);
       typed_.erase(0, end + 1);
       if (line == "quit") return true;
-      if (const auto wrong = carry_out(line, board_, port_)) say(*wrong);
+      if (const auto wrong = carry_out(line, board_, port_, start_)) say(*wrong);
     }
     return false;
   }

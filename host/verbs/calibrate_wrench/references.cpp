@@ -9,6 +9,7 @@
 #include "host/config_error.h"
 #include "host/link/optoforce_sensor.h"
 #include "host/source/simulator/bench_references.h"
+#include "host/verbs/emulated_cell.h"
 
 namespace tagwrench {
 namespace {
@@ -78,6 +79,30 @@ class BoardCell final : public Reference {
   BoardLoop loop_;
   std::size_t channel_;
   link::CellCalibration cell_;
+};
+
+/// The same, in the simulated hand.
+class PressedCell final : public Reference {
+ public:
+  PressedCell(const ReferenceOptions& options, int channel, const sim::Bench& bench,
+              TimePoint start)
+      : cell_(options, channel), hand_(options.emulated_cell, channel, bench, start) {}
+
+  int poll_fd() const noexcept override { return cell_.poll_fd(); }
+  void service() noexcept override {
+    hand_.follow();
+    cell_.service();
+  }
+  bool next(ReferenceReading& reading) noexcept override { return cell_.next(reading); }
+  double gain_sigma() const noexcept override { return cell_.gain_sigma(); }
+  std::string description() const override {
+    return cell_.description() + ", emulated, in the simulated hand";
+  }
+  std::string trouble() override { return cell_.trouble(); }
+
+ private:
+  BoardCell cell_;
+  EmulatedCell hand_;
 };
 
 class Optoforce final : public Reference {
@@ -154,13 +179,16 @@ class Simulated final : public Reference {
 
 std::unique_ptr<Reference> simulated(const WrenchPlan& plan, const ReferenceOptions& options,
                                      const sim::Bench& bench, TimePoint start) {
+  const bool cell = plan.reference == ReferenceKind::load_cell;
+  if (cell && !options.board.empty() && !options.emulated_cell.empty())
+    return std::make_unique<PressedCell>(options, plan.cell_channel, bench, start);
   if (!options.board.empty() || !options.optoforce.empty()) {
     throw ConfigError(
         "--board, --optoforce: the simulated sensor has simulated instruments; leave these out, or "
-        "give a camera as --source");
+        "give a camera as --source, or for an emulated board --emulated-cell");
   }
   const sim::BenchSettings& settings = bench.settings();
-  if (plan.reference == ReferenceKind::load_cell) {
+  if (cell) {
     const bool ideal = settings.perfect || settings.load_cell.ideal;
     return std::make_unique<Simulated<sim::SimulatedLoadCell>>(
         bench, start, ideal ? 0 : settings.load_cell.scale_error, "simulated load cell");

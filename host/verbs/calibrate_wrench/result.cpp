@@ -7,6 +7,7 @@
 
 #include "host/config/sensor_edit.h"
 #include "host/config/sha256.h"
+#include "host/config_error.h"
 #include "host/study/trial_csv.h"
 #include "host/verbs/zero_command.h"
 #include "host/wrench/zero.h"
@@ -94,21 +95,44 @@ CalibrationFiles files_of(const fs::path& calibration) {
           fs::path(calibration) += ".before"};
 }
 
+void check_some_axis(const WrenchFit& fit) {
+  std::string reasons;
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (fit.axis[i].state == AxisState::calibrated) return;
+    reasons += fmt::format("{}{} ({})", i == 0 ? "" : ", ", kWrenchAxes[i], fit.axis[i].reason);
+  }
+  throw ConfigError(fmt::format(
+      "calibration: no axis is known from these steps: {}; the calibration in force stays; take "
+      "the steps again, with --force",
+      reasons));
+}
+
 void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
                        const fs::path& sensor_file, const SensorConfig& sensor,
                        const WrenchData& data, Calibration calibration) {
   const std::string csv = study::trial_to_csv(data.trial);
   calibration.record.data_file = files.data.filename().string();
   calibration.record.data_sha256 = sha256_hex(csv);
+  const fs::path fresh = fs::path(files.calibration) += ".new";
+  save_calibration(fresh, calibration);
+  std::error_code none;
+  try {
+    read_calibration(fresh);
+  } catch (const ConfigError& unusable) {
+    fs::remove(fresh, none);
+    throw ConfigError(fmt::format(
+        "calibration: what came of these steps cannot be used ({}); the calibration in force "
+        "stays; take the steps again, with --force",
+        unusable.what()));
+  }
   std::vector<YamlEntry> entries = {{"calibration", name_from(sensor_file, files.calibration)}};
   for (const YamlEntry& entry : without_zero(sensor)) entries.push_back(entry);
-  std::error_code none;
   if (fs::exists(files.calibration, none))
     write_atomically(files.before, read_text(files.calibration));
   if (fs::exists(files.data, none))
     write_atomically(fs::path(files.data) += ".before", read_text(files.data));
   write_atomically(files.data, csv);
-  save_calibration(files.calibration, calibration);
+  fs::rename(fresh, files.calibration);
   write_sensor(sensor_text, {{"wrench", entries}}, sensor_file);
 }
 

@@ -22,6 +22,10 @@ struct CalibrationFiles {
 /// calibration.json -> calibration.data.csv, calibration.json.partial, calibration.json.before.
 CalibrationFiles files_of(const std::filesystem::path& calibration);
 
+/// Refuses a fit that knows no axis: springs as they were described are no calibration. Throws
+/// ConfigError with every axis' reason.
+void check_some_axis(const WrenchFit& fit);
+
 /// Writes data and calibration, and names it in sensor.yaml, whose text is `sensor_text`. An
 /// earlier calibration is kept as `before`, and its data likewise. Throws ConfigError or
 /// std::runtime_error; then the old calibration is in force.

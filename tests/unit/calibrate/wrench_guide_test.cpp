@@ -105,6 +105,36 @@ TEST(WrenchGuide, AWeightThatPullsTheOtherWayIsRefused) {
   EXPECT_TRUE(hands.told("gravity or the point of the plan is other than how it hangs"));
 }
 
+TEST(WrenchGuide, ATouchOfTheWeightThatStillHangsIsNotTheNextLoad) {
+  const WrenchPlan plan = plan_named("six_orientations");  // a rest, the right bolt, the lower one
+  WrenchGuide guide(plan, paper_options(/*attempts=*/0));
+  // A small picture, whose noise hides a touch: a quarter of a percent of the range.
+  const Matrix6 compliance = paper_stiffness().inverse();
+  const Vector6 noise = 0.0025 * paper_range();
+  double time = 0;
+  const auto stand = [&](const Vector6& load, int frames) {
+    for (int i = 0; i < frames; ++i) {
+      Track track;
+      track.status = Status::ok;
+      track.displacement = compliance * load;
+      track.covariance = compliance * noise.cwiseAbs2().asDiagonal() * compliance.transpose();
+      guide.frame(time += 0.04, track);
+    }
+  };
+  stand(Vector6::Zero(), 100);
+  Observation right, lower;
+  set_hanging(plan, 1, Vector6::Zero(), right);
+  set_hanging(plan, 2, Vector6::Zero(), lower);
+  stand(right.wrench, 100);
+  ASSERT_EQ(recorded(guide), (std::set<int>{0, 1}));
+  stand(right.wrench + 0.022 * paper_range()[0] * Vector6::Unit(0), 1);
+  EXPECT_EQ(recorded(guide), (std::set<int>{0, 1}));
+  for (GuideLine line; guide.next(line);)
+    EXPECT_NE(line.kind, GuideLine::Kind::warning) << line.text;
+  stand(lower.wrench, 100);
+  EXPECT_EQ(recorded(guide).count(2), 1u);
+}
+
 TEST(WrenchGuide, ASensorThatLiesOtherwiseIsToldByThePlatformsOwnWeight) {
   const WrenchPlan plan = plan_named("six_orientations");
   WrenchPlan turned = plan;  // what the person does: the other side below

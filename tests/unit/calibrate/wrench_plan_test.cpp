@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
 #include <set>
 
 #include "host/calibrate/wrench_coverage.h"
@@ -73,8 +75,22 @@ TEST(WrenchPlan, EveryReadyPlanReachesAllSixDimensions) {
     EXPECT_TRUE(coverage_of(plan, paper_range()).complete()) << ready.name;
     EXPECT_LT(coverage_of(plan, paper_range()).sigma().maxCoeff(), 0.05) << ready.name;
     EXPECT_FALSE(plan.about.empty());
+    EXPECT_GT(plan.minutes, 0) << ready.name;
   }
   EXPECT_EQ(names, (std::set<std::string>{"paper", "six_orientations", "load_cell", "six_axis"}));
+}
+
+TEST(WrenchPlan, MinutesInTheReadmeAreThoseOfThePlans) {
+  std::ifstream file(TAGWRENCH_SOURCE_DIR "/README.md");
+  const std::string readme(std::istreambuf_iterator<char>(file), {});
+  for (const ReadyPlan& ready : ready_plans()) {
+    const std::size_t row = readme.find("| `" + ready.name + "` |");
+    ASSERT_NE(row, std::string::npos) << ready.name;
+    const std::string line = readme.substr(row, readme.find('\n', row) - row);
+    const std::string minutes =
+        "| " + std::to_string(parse_plan(ready.text, ready.name).minutes) + " |";
+    EXPECT_NE(line.find(minutes), std::string::npos) << line << ": not " << minutes;
+  }
 }
 
 TEST(WrenchPlan, AMissingDimensionIsNamed) {

@@ -113,6 +113,16 @@ TEST_F(CalibrationRecordFile, EveryNumberComesBackToTheBit) {
   }
 }
 
+TEST_F(CalibrationRecordFile, ACurvatureThatIsHardlyKnownIsRead) {
+  Calibration c = example(FeatureKind::quadratic);
+  c.model.parameter_covariance(50, 50) = 1e13;  // (N/m^2)^2: 3 N at 1 mm
+  save_calibration(path_, c);
+  EXPECT_EQ(complaint(), "(accepted)");
+  c.model.parameter_covariance(50, 50) = 1e25;
+  save_calibration(path_, c);
+  EXPECT_NE(complaint().find("which no sensor has"), std::string::npos);
+}
+
 TEST_F(CalibrationRecordFile, ATargetThatWasCalibratedAnewIsAnother) {
   save_calibration(path_, example(FeatureKind::linear));
   ASSERT_EQ(complaint(), "(accepted)");

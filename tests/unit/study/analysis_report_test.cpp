@@ -54,10 +54,19 @@ TEST(AnalysisReport, ColumnsStayApartWhateverTheScore) {
   a.axis[0].full_scale = a.axis[0].range_high = 123456;
   a.axis[0].r2_in_sample = 0.9;
   a.axis[0].r2 = -2451.7;
+  a.axis[0].rmse = 1.17e-13;
+  a.axis[0].rmse_percent = 116439.11;
+  a.axis[0].nonlinearity_percent = 111429.33;
+  a.axis[0].hysteresis_percent = 3.5;
+  a.axis[0].excitation = 1e5;
+  a.axis[0].independent = 3.04e-9;
   a.folds.resize(1);
   a.folds[0].r2.fill(-6389.54);
   const std::string text = study::analysis_text(a);
   EXPECT_NE(line_of(a, "Fx").find("0.9000    <-10 "), std::string::npos) << text;
+  EXPECT_NE(line_of(a, "Fx").find("  1.17e-13  >1000   >1000   3.50    >1000    <0.1"),
+            std::string::npos)
+      << text;
   EXPECT_NE(text.find("    <-10     <-10"), std::string::npos) << text;
 }
 

@@ -136,6 +136,23 @@ TEST_F(TrialFiles, UnitsSeparatorsAndNamesOfOthersAreUnderstood) {
   EXPECT_EQ(trial.reference(1, 0), 0);
 }
 
+TEST_F(TrialFiles, MillimetresThatAreCalledMetresAreSaid) {
+  study::CsvMapping mapping;
+  mapping.readings = write("r.csv", "t,x,y\n0,-1,0.5\n1,1,3.5\n2,0,1\n");
+  mapping.loads = {study::parse_load_columns("3:N", "--load")};
+  const auto notes = [&](const std::string& x, const std::string& y) {
+    mapping.features = {study::parse_feature_columns(x, "--features"),
+                        study::parse_feature_columns(y, "--features")};
+    return study::read_mapped(mapping).notes;
+  };
+  EXPECT_TRUE(notes("x:mm", "y:deg").empty());
+  EXPECT_TRUE(notes("x", "y").empty()) << "nobody knows what these are";
+  const std::vector<std::string> said = notes("x:m", "y:rad");
+  ASSERT_EQ(said.size(), 2u);
+  EXPECT_SAYS(said[0], "column 2 (x) goes over 2 m, further than a platform on springs");
+  EXPECT_SAYS(said[1], "column 3 (y) goes over 3 rad");
+}
+
 TEST_F(TrialFiles, AnExponentialSmoothingIsUndone) {
   const std::vector<double> raw{1, 4, -2, 0.5, 3};
   std::string text;

@@ -121,6 +121,17 @@ TEST(RicherModels, WithoutThePathOnlyThoseWithoutMemoryAreTried) {
   EXPECT_FALSE(found.trials[0].adopted);
 }
 
+TEST(RicherModels, CurvatureIsNotLookedForWhereALoadIsMissing) {
+  KnownLoads bench(24);
+  std::vector<Observation> untwisted = bench.six_orientations();
+  std::erase_if(untwisted,
+                [](const Observation& o) { return std::abs(o.wrench[5]) > 1e-2 * 0.009; });
+  ASSERT_GT(untwisted.size(), 5u);
+  const WrenchFit found = fit_wrench(untwisted, {}, {.prior = test::nominal_stiffness()});
+  EXPECT_FALSE(found.missing.empty());
+  EXPECT_TRUE(found.trials.empty());
+}
+
 TEST(Features, CreepFollowsWithItsTimeConstant) {
   Features creep({.kind = FeatureKind::creep, .time_constant = 10});
   const Vector6 d = Vector6::Constant(1e-3);
