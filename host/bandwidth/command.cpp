@@ -9,6 +9,7 @@
 
 #include "host/bandwidth/board_pattern_lamp.h"
 #include "host/bandwidth/measurement.h"
+#include "host/bandwidth/page_patch.h"
 #include "host/bandwidth/report.h"
 #include "host/bandwidth/screen_measurement.h"
 #include "host/bandwidth/screen_window.h"
@@ -24,6 +25,8 @@
 #include "host/source/simulator/simulator_source.h"
 #include "host/tell.h"
 #include "host/tracker/tracker.h"
+#include "host/verbs/web_place.h"
+#include "host/web/server/token_file.h"
 #include "host/wrench/estimate.h"
 #include "host/wrench/shaping.h"
 
@@ -151,14 +154,26 @@ BandwidthCommand::BandwidthCommand(CLI::App& app)
       "pattern. Hands off, and little light from elsewhere. Without a board, --screen shows a "
       "window\n"
       "that flips between black and white, for the camera to look at; that tells frame rate and\n"
-      "latency alone, the screen's own latency included. Without either:\n"
+      "latency alone, the screen's own latency included. --screen web is the same as a page, for "
+      "a\n"
+      "phone or a tablet before the camera. Without any of them:\n"
       "  tagwrench bandwidth --source sim:tests/sim/scenarios/bandwidth.yaml --port sim --fast");
   verb_->add_option("--source", source_, "the camera: v4l2:/dev/videoN, sim or sim:SCENARIO.yaml")
       ->required();
   auto* port = verb_->add_option(
       "--port", port_,
       "the board: its serial port, usb:VENDOR:PRODUCT, or sim for the simulated lamp");
-  verb_->add_flag("--screen", screen_, "a window instead of a board's LED")->excludes(port);
+  screen_option_ = verb_
+                       ->add_option("--screen", screen_,
+                                    "a screen instead of a board's LED: window (as without a "
+                                    "value), or web[:ADDRESS:PORT], a page for any browser")
+                       ->expected(0, 1)
+                       ->excludes(port);
+  verb_
+      ->add_option("--web-token", web_token_,
+                   "file with the token that the page needs, so that other computers may open it; "
+                   "made if it is not there")
+      ->needs(screen_option_);
   verb_->add_option("--sensor", sensor_, "sensor.yaml of this sensor");
   verb_->add_option("--seconds", seconds_, "length of the pattern")
       ->check(CLI::Validator(
@@ -178,11 +193,31 @@ BandwidthCommand::BandwidthCommand(CLI::App& app)
 }
 
 int BandwidthCommand::run() const {
-  if (!screen_ && port_.empty())
+  const bool screen = screen_option_->count() > 0;
+  if (!screen && port_.empty())
     throw ConfigError(
         "bandwidth: needs a light: --port PORT for a board's LED, --port sim or --screen");
+  if (screen) check_screen();
   if (!json_.empty() && json_ != "-") check_report_file(json_);
-  return screen_ ? run_with_screen() : run_with_lamp();
+  return screen ? run_with_screen() : run_with_lamp();
+}
+
+void BandwidthCommand::check_screen() const {
+  const std::string kind = split_spec(screen_).kind;
+  if (!screen_.empty() && screen_ != "window" && kind != "web") {
+    throw ConfigError(fmt::format(
+        "--screen {}: is no screen; use --screen, or --screen web, or web:ADDRESS:PORT", screen_));
+  }
+  if (kind != "web" && !web_token_.empty())
+    throw ConfigError("--web-token: is for a page; use it with --screen web:ADDRESS:PORT");
+  if (split_spec(source_).kind == "sim") {
+    if (kind == "web")
+      throw ConfigError(
+          "--screen web: the simulated camera sees no screen; give a camera as --source, or leave "
+          "web out");
+  } else if (fast_) {
+    throw ConfigError("--fast: a camera has its own time; leave it out");
+  }
 }
 
 void BandwidthCommand::print(const std::string& text, const std::string& json) const {
@@ -192,35 +227,53 @@ void BandwidthCommand::print(const std::string& text, const std::string& json) c
 
 int BandwidthCommand::run_with_screen() const {
   const UniqueFd stop = signals_as_fd();
-  Bench bench;
-  std::unique_ptr<ScreenWindow> window;
-  FlipPatch* patch = nullptr;
-  std::string screen = "simulated, without latency";
+  const Spec screen = split_spec(screen_);
   if (split_spec(source_).kind == "sim") {
-    bench = simulated_bench(sensor_, source_, fast_);
-    patch = dynamic_cast<FlipPatch*>(bench.lamp.get());
-  } else {
-    if (fast_) throw ConfigError("--fast: a camera has its own time; leave it out");
-    window = std::make_unique<ScreenWindow>();
-    screen = window->description();
-    patch = window.get();
-    bench.input = open_input({sensor_, source_, false});
+    const Bench bench = simulated_bench(sensor_, source_, fast_);
+    auto& patch = dynamic_cast<FlipPatch&>(*bench.lamp);
+    return measure(*bench.input.source, patch, stop, [] { return "simulated, without latency"; });
   }
-  FrameSource& source = *bench.input.source;
+  if (screen.kind != "web") {
+    ScreenWindow window;
+    const Input input = open_input({sensor_, source_, false});
+    return measure(*input.source, window, stop, [&] { return window.description(); });
+  }
+  WebOptions options = parse_web("--screen web", screen.argument);
+  options.pages = built_pages();
+  std::string token_text;
+  if (!web_token_.empty()) {
+    const WebToken token = web_token(web_token_);
+    options.token = token.text;
+    token_text = token.made ? "&token=" + token.text
+                            : fmt::format("&token=... (the token is in {})", web_token_);
+  }
+  PagePatch page(options);
+  const Input input = open_input({sensor_, source_, false});
+  tell("the page: " + page.url() + token_text);
+  tell("open it on the screen that the camera looks at; Ctrl-C ends");
+  if (!page.wait_for_page(stop.get())) {
+    tell("bandwidth: " + (page.ended().empty() ? "stopped" : page.ended()));
+    return kFailed;
+  }
+  return measure(*input.source, page, stop, [&] { return page.description(); });
+}
+
+int BandwidthCommand::measure(FrameSource& source, FlipPatch& patch, const UniqueFd& stop,
+                              const std::function<std::string()>& screen) const {
   tell("source: " + source.format().description);
   tell("point the camera at the flipping patch, so that it fills the picture");
   ScreenOptions options;
   options.seconds = seconds_;
   options.stopped = [&] { return signalled(stop); };
   options.stop_fd = stop.get();
-  const ScreenMeasurement measured = measure_screen(source, *patch, options);
+  const ScreenMeasurement measured = measure_screen(source, patch, options);
   if (!measured.refusal.empty()) {
     tell("bandwidth: " + measured.refusal);
     return kFailed;
   }
   const double period = std::chrono::duration<double>(source.format().period).count();
-  print(report_text(measured, source.format().description, screen, period),
-        report_json(measured, source.format().description, screen, period));
+  print(report_text(measured, source.format().description, screen(), period),
+        report_json(measured, source.format().description, screen(), period));
   return kDone;
 }
 

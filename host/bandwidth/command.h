@@ -2,7 +2,11 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <string>
+
+#include "host/bandwidth/screen_measurement.h"
+#include "host/os/unique_fd.h"
 
 namespace tagwrench {
 
@@ -17,6 +21,9 @@ class BandwidthCommand {
 
  private:
   int run_with_screen() const;
+  int measure(FrameSource& source, FlipPatch& patch, const UniqueFd& stop,
+              const std::function<std::string()>& screen) const;
+  void check_screen() const;
   int run_with_lamp() const;
   void print(const std::string& text, const std::string& json) const;
 
@@ -26,7 +33,9 @@ class BandwidthCommand {
   std::string sensor_;
   std::string json_;
   double seconds_ = 10;
-  bool screen_ = false;
+  CLI::Option* screen_option_;
+  std::string screen_;     ///< empty: a window
+  std::string web_token_;  ///< file
   bool fast_ = false;
 };
 

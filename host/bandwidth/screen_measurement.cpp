@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
+#include <vector>
 
 namespace tagwrench {
 namespace {
@@ -17,6 +18,7 @@ constexpr double kSettle = 0.6;       // s
 constexpr double kReference = 0.5;    // s of black, and of white
 constexpr double kPatience = 3;       // s without a frame
 constexpr double kLongest = 1.5;      // s from a flip to its picture
+constexpr double kSlowest = 3;        // s from an order to its flip
 constexpr double kLeastContrast = 4;  // grey levels
 constexpr double kClearly = 6;        // standard deviations
 constexpr int kFewestFlips = 10;
@@ -47,7 +49,7 @@ class ScreenRun {
     if (out_.contrast < std::max(kLeastContrast, kClearly * (white_.sigma + black_.sigma))) {
       out_.refusal = fmt::format(
           "the camera does not see the screen flip ({:.1f} grey levels between black and white): "
-          "point it at the window, and fix its exposure",
+          "point it there, and fix its exposure",
           out_.contrast);
       return out_;
     }
@@ -67,7 +69,7 @@ class ScreenRun {
       std::array<pollfd, 2> fds{{{source_.poll_fd(), POLLIN, 0}, {options_.stop_fd, POLLIN, 0}}};
       ::poll(fds.data(), fds.size(), source_.poll_fd() < 0 ? 0 : kWake_ms);
       if (options_.stopped && options_.stopped()) return fail("stopped");
-      if (patch_.closed()) return fail("the window was closed");
+      if (std::string why = patch_.ended(); !why.empty()) return fail(std::move(why));
       if (source_.poll_fd() >= 0 && fds[0].revents == 0) continue;
       const ReadStatus status = source_.read(frame);
       if (status == ReadStatus::end) return fail("the source has no more pictures");
@@ -108,6 +110,7 @@ class ScreenRun {
     Frame frame;
     if (!first_ && !next(frame)) return false;
     patch_.show(white, last_);
+    if (!await_shown()) return false;
     const TimePoint from = last_ + duration(kSettle), to = from + duration(kReference);
     double sum = 0, squares = 0;
     int count = 0;
@@ -134,26 +137,54 @@ class ScreenRun {
       white = !white;
       // From now, not from the stamp: what would have to happen in the past happens now, and the
       // flips would no longer fall evenly between the pictures.
-      const TimePoint flipped = patch_.show(white, now() + duration(phase(random)));
+      const TimePoint ordered = now();
+      patch_.show(white, ordered + duration(phase(random)));
       Frame frame;
       bool seen = false;
-      while (!seen && seconds(last_ - flipped) < kLongest) {
+      while (!seen && seconds(last_ - patch_.shown().value_or(last_)) < kLongest) {
+        if (seconds(now() - ordered) > kSlowest) return fail("the screen does not flip any more");
         if (!next(frame)) return false;
-        seen = last_ > flipped && (mean_level(frame) > 0.5 * (white_.mean + black_.mean)) == white;
+        seen = last_ > patch_.shown().value_or(ordered) &&
+               (mean_level(frame) > 0.5 * (white_.mean + black_.mean)) == white;
       }
       if (!seen) {
         ++out_.missed;
         continue;
       }
-      if (frame.dropped > 0) continue;  // the first to show it may be the one that was lost
-      const double delay = seconds(last_ - flipped);
-      sum_ += delay;
-      squares_ += delay * delay;
-      arrivals_ += seconds(now() - flipped);
+      const bool dropped = frame.dropped > 0;  // the first to show it may be the one that was lost
+      const TimePoint stamp = last_;
+      const TimePoint arrived = now();
+      if (!await_shown()) return false;
+      const TimePoint flipped = *patch_.shown();
+      if (dropped) continue;
+      const double delay = seconds(stamp - flipped);
+      delays_.push_back(delay);
+      arrivals_ += seconds(arrived - flipped);
       ++out_.flips;
       if (!next(frame)) return false;  // the picture that saw only a part of the flip
     }
     return true;
+  }
+
+  bool await_shown() {
+    const TimePoint from = now();
+    for (Frame frame; !patch_.shown();) {
+      if (seconds(now() - from) > kSlowest) return fail("the screen does not flip any more");
+      if (!next(frame)) return false;
+    }
+    return true;
+  }
+
+  /// The widest part of a picture's period in which no flip fell, s.
+  double widest_gap(double period) const {
+    std::vector<double> phases;
+    for (const double delay : delays_)
+      phases.push_back(delay - period * std::floor(delay / period));
+    std::sort(phases.begin(), phases.end());
+    double widest = phases.front() + period - phases.back();
+    for (std::size_t i = 1; i < phases.size(); ++i)
+      widest = std::max(widest, phases[i] - phases[i - 1]);
+    return widest;
   }
 
   void evaluate() {
@@ -166,9 +197,13 @@ class ScreenRun {
     const double offset = (y_ - period * x_) / n_;
     const double residual = std::max(yy_ - offset * y_ - period * xy_, 0.0) / (n_ - 2);
     out_.frame_rate = {1 / period, std::sqrt(residual * n_ / spread) / (period * period), true};
-    const double mean = sum_ / out_.flips;
-    const double variance = std::max(squares_ / out_.flips - mean * mean, 0.0);
-    out_.latency = {mean - 0.5 * period, std::sqrt(variance / out_.flips), true};
+    double mean = 0, variance = 0;
+    for (const double delay : delays_) mean += delay / out_.flips;
+    for (const double delay : delays_) variance += (delay - mean) * (delay - mean) / out_.flips;
+    const double even = widest_gap(period) / std::sqrt(12.0);
+    const double sigma = std::hypot(std::sqrt(variance / out_.flips), even,
+                                    seconds(patch_.clock_error()) / std::sqrt(3.0));
+    out_.latency = {mean - 0.5 * period, sigma, true};
     out_.round_trip = arrivals_ / out_.flips;
   }
 
@@ -180,7 +215,8 @@ class ScreenRun {
   std::optional<TimePoint> first_;
   TimePoint last_{};
   double number_ = 0, n_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
-  double sum_ = 0, squares_ = 0, arrivals_ = 0;
+  std::vector<double> delays_;  ///< from a flip to the stamp of the picture that shows it, s
+  double arrivals_ = 0;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "host/source/frame_source.h"
@@ -18,10 +19,14 @@ class FlipPatch {
   FlipPatch& operator=(const FlipPatch&) = delete;
   virtual ~FlipPatch() = default;
 
-  /// Shows it so from `when` on, or from now if that is past; returns from when, host clock.
-  virtual TimePoint show(bool white, TimePoint when) = 0;
-  /// Whether the user has closed it.
-  virtual bool closed() { return false; }
+  /// Begins to show it so from `when` on, or from as soon as it can.
+  virtual void show(bool white, TimePoint when) = 0;
+  /// From when it has shown what was ordered last, host clock; nothing: not known yet.
+  virtual std::optional<TimePoint> shown() = 0;
+  /// By how much shown() may be wrong.
+  virtual Duration clock_error() const { return {}; }
+  /// One line: why it shows nothing any more; empty: it does.
+  virtual std::string ended() { return {}; }
 };
 
 struct ScreenOptions {
@@ -43,7 +48,8 @@ struct ScreenMeasurement {
 
 /// Flips at a random time after the picture that showed the flip before. The first picture to show
 /// a flip comes latency to latency + one period later, evenly: latency is the mean less half a
-/// period.
+/// period. A screen that flips with its refresh alone does so less evenly where that keeps step
+/// with the camera; the widest gap that is left counts into the deviation.
 ScreenMeasurement measure_screen(FrameSource& source, FlipPatch& patch,
                                  const ScreenOptions& options);
 

@@ -56,21 +56,20 @@ void ScreenWindow::paint() {
   SDL_RenderPresent(renderer_);
 }
 
-TimePoint ScreenWindow::show(bool white, TimePoint when) {
+void ScreenWindow::show(bool white, TimePoint when) {
   wait_until(when);
   white_ = white;
-  const TimePoint flipped = std::chrono::steady_clock::now();
+  shown_ = std::chrono::steady_clock::now();
   paint();
-  return flipped;
 }
 
-bool ScreenWindow::closed() {
+std::string ScreenWindow::ended() {
   for (SDL_Event event; SDL_PollEvent(&event) != 0;) {
     if (event.type == SDL_QUIT) closed_ = true;
     // What another window had covered is painted anew.
     if (event.type == SDL_WINDOWEVENT && event.window.event == SDL_WINDOWEVENT_EXPOSED) paint();
   }
-  return closed_;
+  return closed_ ? "the window was closed" : "";
 }
 
 std::string ScreenWindow::description() const {

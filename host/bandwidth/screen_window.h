@@ -14,8 +14,10 @@ class ScreenWindow final : public FlipPatch {
   ScreenWindow();
   ~ScreenWindow() override;
 
-  TimePoint show(bool white, TimePoint when) override;
-  bool closed() override;
+  /// Waits for `when`.
+  void show(bool white, TimePoint when) override;
+  std::optional<TimePoint> shown() override { return shown_; }
+  std::string ended() override;
   std::string description() const;
 
  private:
@@ -24,6 +26,7 @@ class ScreenWindow final : public FlipPatch {
   SDL_Window* window_ = nullptr;
   SDL_Renderer* renderer_ = nullptr;
   bool white_ = false;
+  TimePoint shown_{};
   bool closed_ = false;
 };
 

@@ -18,9 +18,12 @@ void SimulatedLamp::begin(Order order) {
   orders_.push_back(order);
 }
 
-TimePoint SimulatedLamp::show(bool white, TimePoint when) {
+void SimulatedLamp::show(bool white, TimePoint when) {
   const std::chrono::duration<double> since = when - zero_;
   begin({.since = since.count(), .kind = Kind::steady, .level = white ? 1.0 : 0.0});
+}
+
+std::optional<TimePoint> SimulatedLamp::shown() {
   return zero_ + Duration(std::llround(1e9 * orders_.back().since));
 }
 

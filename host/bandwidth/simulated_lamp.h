@@ -20,7 +20,8 @@ class SimulatedLamp final : public PatternLamp, public FlipPatch, public sim::Le
 
   void off() override { begin({.kind = Kind::steady, .level = 0}); }
   /// As a patch on a screen without latency.
-  TimePoint show(bool white, TimePoint when) override;
+  void show(bool white, TimePoint when) override;
+  std::optional<TimePoint> shown() override;
   void steady(int level_permille) override;
   void pattern(Duration bit, std::uint16_t seed) override;
   std::optional<PatternTiming> timing() const override;

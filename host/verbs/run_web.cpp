@@ -6,49 +6,21 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <filesystem>
-#include <system_error>
 
 #include "host/config_error.h"
 #include "host/os/config_folder.h"
 #include "host/source/v4l2_mode.h"
 #include "host/tell.h"
 #include "host/verbs/recording.h"
+#include "host/verbs/web_place.h"
 #include "host/web/server/token_file.h"
 
 namespace tagwrench {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// "ADDRESS:PORT", the address in brackets if it has colons itself.
-WebOptions parse_web(const std::string& place) {
-  WebOptions options;
-  if (place.empty()) return options;
-  const std::size_t colon = place.rfind(':');
-  const char* end = place.data() + place.size();
-  const char* digits = place.data() + std::min(colon, place.size() - 1) + 1;
-  const auto [parsed, error] = std::from_chars(digits, end, options.port);
-  if (colon == std::string::npos || colon == 0 || parsed != end || error != std::errc()) {
-    throw ConfigError(
-        fmt::format("--output web:{}: is no ADDRESS:PORT; use web, or web:127.0.0.1:8137", place));
-  }
-  options.address = place.substr(0, colon);
-  if (options.address.front() == '[' && options.address.back() == ']')
-    options.address = options.address.substr(1, options.address.size() - 2);
-  return options;
-}
-
-/// Installed, or as they were built: beside the program.
-fs::path built_pages() {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  const fs::path above = program.parent_path().parent_path();
-  const fs::path installed = above / "share/tagwrench/web";
-  return fs::is_directory(installed, error) ? installed : above / "web";
-}
 
 const Spec* web_among(const std::vector<Spec>& specs) {
   const auto found =
@@ -85,7 +57,7 @@ bool writes_for_good(const RunOptions& options) {
 bool has_web(const RunOptions& options) {
   const std::vector<Spec> specs = specs_of(options);
   const Spec* web = web_among(specs);
-  if (web != nullptr) parse_web(web->argument);
+  if (web != nullptr) parse_web("--output web", web->argument);
   if (web == nullptr && options.web.open) return true;
   if (web == nullptr && !options.web.token_file.empty())
     throw ConfigError("--web-token: is for pages; add --output web:ADDRESS:PORT");
@@ -98,7 +70,7 @@ std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& s
   const std::vector<Spec> specs = specs_of(options);
   WebBridgeOptions web;
   const Spec* spec = web_among(specs);
-  web.server = parse_web(spec == nullptr ? "" : spec->argument);
+  web.server = parse_web("--output web", spec == nullptr ? "" : spec->argument);
   web.server.pages = options.web.pages.empty() ? built_pages() : fs::path(options.web.pages);
   bool token_made = false;
   if (!options.web.token_file.empty()) {

@@ -25,6 +25,13 @@ TEST(BandwidthInput, WhatCannotBeIsRefusedInOneLine) {
   expect_refused(bandwidth({"--port", "sim"}), 2, {"--source"});
   expect_refused(bandwidth({"--source", "sim"}), 2, {"--port", "--screen"});
   expect_refused(bandwidth({"--source", "sim", "--port", "sim", "--screen"}), 2, {"--screen"});
+  expect_refused(bandwidth({"--source", "sim", "--screen", "tv"}), 2, {"--screen tv", "web"});
+  expect_refused(bandwidth({"--source", "sim", "--screen", "web"}), 2,
+                 {"--screen web", "sees no screen"});
+  expect_refused(bandwidth({"--source", "sim", "--screen", "--web-token", "token"}), 2,
+                 {"--web-token", "--screen web"});
+  expect_refused(bandwidth({"--source", "v4l2:/dev/video99", "--screen", "web:[]:8137"}), 2,
+                 {"--screen web:[]:8137", "ADDRESS:PORT"});
   expect_refused(bandwidth({"--source", "v4l2:/dev/video99", "--port", "sim"}), 2,
                  {"--port sim", "simulated sensor alone"});
   expect_refused(bandwidth({"--source", "sim", "--port", "/dev/ttyUSB99"}), 2, {"--port sim"});

@@ -124,7 +124,7 @@ void PageHub::check(TimePoint now) {
 }
 
 void PageHub::close_all() {
-  each([](PageSocket& page) { page.close(close_code::going_away, "the bridge ends"); });
+  each([](PageSocket& page) { page.close(close_code::going_away, "the program ends"); });
 }
 
 void PageHub::deliver(PageSocket& page, std::string_view type, const Text& text) {

@@ -40,10 +40,10 @@ asio::ip::address listen_address(const WebOptions& options) {
   const auto address = asio::ip::make_address(
       brackets ? options.address.substr(1, options.address.size() - 2) : options.address, error);
   if (error)
-    throw ConfigError("--output web:" + options.address +
+    throw ConfigError(options.option + ":" + options.address +
                       ": not an address; give a number, like 127.0.0.1 or [::1]");
   if (!address.is_loopback() && options.token.empty())
-    throw ConfigError("--output web:" + options.address +
+    throw ConfigError(options.option + ":" + options.address +
                       ": others could reach this sensor; give --web-token FILE, or leave the "
                       "address out for this computer alone");
   return address;
@@ -68,11 +68,11 @@ tcp::acceptor listener(asio::io_context& context, const WebOptions& options) {
   if (!error) acceptor.bind(endpoint, error);
   if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
   if (error == asio::error::address_in_use)
-    throw ConfigError("--output web: " + endpoint_text(endpoint) +
-                      " is taken, perhaps by another bridge; stop it, or give another port: "
-                      "--output web:ADDRESS:PORT");
+    throw ConfigError(options.option + ": " + endpoint_text(endpoint) +
+                      " is taken, perhaps by another bridge; stop it, or give another port: " +
+                      options.option + ":ADDRESS:PORT");
   if (error)
-    throw ConfigError("--output web: cannot listen at " + endpoint_text(endpoint) + ": " +
+    throw ConfigError(options.option + ": cannot listen at " + endpoint_text(endpoint) + ": " +
                       error.message() + "; give an address of this computer");
   return acceptor;
 }

@@ -56,10 +56,11 @@ struct WebPatience {
 };
 
 struct WebOptions {
-  std::string address = "127.0.0.1";  ///< a number, or "localhost"
-  std::uint16_t port = 8137;          ///< 0: any that is free
-  std::string token{};                ///< empty: none, which a loopback address alone allows
-  std::filesystem::path pages{};      ///< holds dashboard/, sensor/ and flip/, as far as built
+  std::string address = "127.0.0.1";    ///< a number, or "localhost"
+  std::uint16_t port = 8137;            ///< 0: any that is free
+  std::string token{};                  ///< empty: none, which a loopback address alone allows
+  std::filesystem::path pages{};        ///< holds dashboard/, sensor/ and flip/, as far as built
+  std::string option = "--output web";  ///< that said so, for complaints
   WebPatience patience{};
 };
 

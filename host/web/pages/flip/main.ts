@@ -1,4 +1,5 @@
-// A screen that flips between black and white: for this browser's camera, which measures how late it sees it, or for any other.
+// A screen that flips between black and white: for `tagwrench bandwidth` (opened with #screen, from its own address), for this browser's
+// camera, which measures how late it sees it, or for any other.
 import '../common/theme.css';
 import './flip.css';
 import { button, field, make, panel, present, say } from '../common/elements';
@@ -9,6 +10,8 @@ import { download } from '../sensor/download';
 import { BrightnessReader } from './brightness';
 import { FlipMeasurement, type Result, reportJson, reportText } from './measurement';
 import { Patch } from './patch';
+import { ProgramScreen } from './program_screen';
+import { takeToken } from '../dashboard/token';
 
 /** Flashes, that is white and black again, a second. Up to 3 are held to be safe for nearly everybody (WCAG 2.3.1). */
 const SAFE_HZ = 3;
@@ -25,6 +28,9 @@ class FlipPage {
   private readonly rateWords = make('output', { class: 'number' });
   private readonly measureButton = button('Measure with this camera', () => void this.measure(), { class: 'main', disabled: true });
   private readonly flipButton = button('Only flip', () => void this.onlyFlip(), { disabled: true });
+  private readonly screenButton = button('Be the screen', () => void this.beTheScreen(), { class: 'main', disabled: true });
+  private readonly token = takeToken();
+  private readonly forProgram = location.hash === '#screen';
   private end = (): void => {};
 
   constructor(root: HTMLElement) {
@@ -42,14 +48,15 @@ class FlipPage {
     root.append(
       make('div', { class: 'row' }, make('h1', {}, 'A screen that flips'), themeSwitch()),
       make('p', {}, 'Point the camera at this screen, so that the page fills its picture, and fix its exposure. The screen turns ' +
-        'black and white, and as soon as the camera has seen it, back: that is how late a picture comes, screen and browser included.'),
+        'black and white, and as soon as the camera has seen it, back: that is how late a picture comes, ' +
+        `screen and ${this.forProgram ? 'camera' : 'browser'} included.`),
       make('section', { class: 'panel warning', 'aria-label': 'Warning' },
         make('h2', {}, 'Flashing light can bring on fits in people with photosensitive epilepsy'),
         make('p', {}, 'The whole screen flashes. Do not go on if you, or somebody who sees this screen, may be sensitive. ' +
           'Any key or touch ends it at once.'),
         make('p', {}, make('label', {}, this.agree, 'Nobody here is sensitive to flashing light')),
         make('p', {}, make('label', {}, faster, `Allow more than ${SAFE_HZ} flashes a second (up to ${MOST_HZ})`))),
-      panel('Flip', '', rate, make('div', { class: 'row' }, this.measureButton, this.flipButton), this.trouble, this.results),
+      panel('Flip', '', rate, make('div', { class: 'row' }, ...this.buttons()), this.trouble, this.results),
     );
     addEventListener('keydown', () => this.end());
     addEventListener('pointerdown', () => this.end());
@@ -62,7 +69,24 @@ class FlipPage {
   }
 
   private allow(): void {
-    this.measureButton.disabled = this.flipButton.disabled = !this.agree.checked;
+    for (const one of [this.measureButton, this.flipButton, this.screenButton]) one.disabled = !this.agree.checked;
+  }
+
+  private buttons(): HTMLElement[] {
+    return this.forProgram ? [this.screenButton] : [this.measureButton, this.flipButton];
+  }
+
+  /** For the program that serves this page; it has the camera. */
+  private async beTheScreen(): Promise<void> {
+    this.begin();
+    const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
+    const screen = new ProgramScreen(`${scheme}://${location.host}/ws`, this.token, this.patch, (line) => say(this.progress, line));
+    say(this.progress, 'waiting for the program; any key ends it');
+    await this.shown(true);
+    this.end = () => screen.leave();
+    const why = await screen.serve();
+    await this.finish();
+    this.results.replaceChildren(make('p', { role: 'status' }, why));
   }
 
   private async shown(on: boolean): Promise<void> {
