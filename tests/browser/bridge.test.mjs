@@ -106,6 +106,26 @@ test('a page sees samples and state, and its wishes are answered', { skip: lacks
   assert.deepEqual(await child.ended, { code: 0, signal: null });
 });
 
+test('of two pages that try a profile at the same instant one is refused', { skip: lacks }, async () => {
+  const { child, page, port } = await startBridge(['--profile', 'cad']);
+  const other = await WsPage.connect(port);
+  await page.next((m) => m.type === 'state' && m.profile?.name === 'cad');
+  const { text } = await page.ask('show', { name: 'cad' });
+  for (let i = 0; i < 10; i++) {
+    const both = await Promise.all([page, other].map((one) => one.ask('try', { name: 'cad', text })));
+    const [taken, left] = both[0].ok ? both : both.toReversed();
+    assert.ok(taken.ok, taken.text);
+    assert.ok(!left.ok);
+    assert.match(left.text, /^another page tries profile cad; keep or revert it there/);
+    assert.ok((await (both[0].ok ? page : other).ask('revert')).ok);
+  }
+  // One that was refused by the desk is in nobody's way.
+  await refused(page, 'try', { name: 'cad', text: 'curve: {powr: 2}' }, /cad:1: curve/);
+  assert.ok((await other.ask('try', { name: 'cad', text })).ok);
+  child.kill('SIGINT');
+  await child.ended;
+});
+
 test('a recording begins, shows how it goes, ends and replays', { skip: lacks }, async () => {
   const { child, page, port } = await startBridge();
   await page.next(someSample((s) => s.status === 'ok'));

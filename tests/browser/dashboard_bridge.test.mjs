@@ -2,6 +2,7 @@
 // looks.
 import assert from 'node:assert/strict';
 import { spawn, spawnSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import test from 'node:test';
 import { openChromium, openPage, shoot } from './support/chromium.mjs';
@@ -86,6 +87,23 @@ class Bridge {
 const connected = (page) => page.getByText('connected', { exact: true }).waitFor();
 const look = () => document.querySelector('.trace canvas').toDataURL();
 
+/** In the page: what the job panel says to do, and how much of each axis is covered (%), as they change. */
+function watchJob() {
+  window.job = { tasks: [], covered: [] };
+  const { tasks, covered } = window.job;
+  const look = () => {
+    const task = document.querySelector('.job.running .job-task')?.textContent ?? '';
+    if (task !== '' && task !== tasks.at(-1)) tasks.push(task);
+    const cells = [...document.querySelectorAll('.job.running .coverage-row .gauge-value')];
+    const parts = cells.map((cell) => cell.textContent).filter((text) => text.endsWith('%'));
+    const axes = parts.map(parseFloat);
+    if (axes.length === 6 && axes.join() !== covered.at(-1)?.join()) covered.push(axes);
+  };
+  new MutationObserver(look).observe(document.body, { subtree: true, childList: true, characterData: true });
+}
+
+const isCalibrated = (page) => page.getByText(/Calibrated 20\d\d-/).waitFor();
+
 async function traceMoves(page) {
   const before = await page.evaluate(look);
   await page.waitForFunction((was) => document.querySelector('.trace canvas').toDataURL() !== was, before);
@@ -162,6 +180,47 @@ test(
       await page.locator('.status.ok').waitFor();
     });
 
+    await t.test('the wrench is calibrated to its end, and what comes then is in its newtons', async () => {
+      await page.getByText(/24 steps; about 10 minutes/).waitFor();
+      await page.getByText('Not calibrated: newtons come').waitFor();
+      await page.evaluate(watchJob);
+      await page.locator('[data-verb=wrench]:not([disabled])').click();
+      await page.locator('.job.running').waitFor();
+
+      // Meanwhile nothing is measured that could be shown.
+      await page.evaluate(() => (location.hash = 'live'));
+      await page.locator('.status').getByText('the camera is in use').waitFor();
+      await page.waitForFunction(() =>
+        [...document.querySelectorAll('.view-live .readings .now')].every((cell) => cell.textContent === '–'),
+      );
+      await shoot(page, 'dashboard-real-lent');
+      await page.evaluate(() => (location.hash = 'calibrate'));
+
+      await page.waitForFunction(() => window.job.covered.at(-1)?.some((part) => part > 0));
+      await shoot(page, 'dashboard-real-wrench');
+      await page.locator('.job:not(.running)').waitFor({ timeout: 240_000 });
+      await shoot(page, 'dashboard-real-wrench-done');
+      assert.match(
+        await page.locator('.job').getAttribute('class'),
+        /done/,
+        await page.locator('.job').innerText(),
+      );
+      const { tasks, covered } = await page.evaluate(() => window.job);
+      assert.ok(tasks.length >= 12, `steps that were shown: ${tasks.join(' | ')}`);
+      const sums = covered.map((axes) => axes.reduce((sum, part) => sum + part, 0));
+      assert.ok(sums.length > 6 && sums[0] < sums.at(-1), `coverage: ${sums}`);
+      assert.ok(sums.every((sum, i) => i === 0 || sum >= sums[i - 1] - 1), `coverage falls: ${sums}`);
+      assert.ok(covered.at(-1).every((part) => part >= 90), `of six axes, %: ${covered.at(-1)}`);
+      const { K } = JSON.parse(readFileSync(join(bridge.folder, 'sensor', 'calibration.json'), 'utf8'));
+      assert.equal(K.length, 6);
+      assert.match(readFileSync(bridge.sensor, 'utf8'), /calibration: 'calibration\.json'/);
+
+      await page.getByText('Next: make the certificate').waitFor();
+      await page.getByRole('button', { name: 'Close' }).click();
+      await isCalibrated(page);
+      await page.locator('.status.ok').waitFor();
+    });
+
     await t.test('the doctor reports', async () => {
       await page.evaluate(() => (location.hash = 'doctor'));
       await page.getByRole('button', { name: 'Examine' }).click();
@@ -183,6 +242,8 @@ test(
       await connected(page);
       await page.locator('.status.ok').waitFor();
       await traceMoves(page);
+      await page.evaluate(() => (location.hash = 'calibrate'));
+      await isCalibrated(page);
       assert.deepEqual(
         faults.filter((fault) => !kNoBridge.test(fault)),
         [],

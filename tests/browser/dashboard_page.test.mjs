@@ -219,6 +219,14 @@ onBridge('a slider is tried as it moves, reverted and kept', async ({ bridge, pa
   assert.equal((await asked(bridge, page, 'profile')).name, 'game');
 });
 
+onBridge('what is reverted to is said by name', async ({ bridge, page }) => {
+  await page.goto(`${page.url()}#device`);
+  await page.getByRole('slider', { name: 'sensitivity, translation' }).press('ArrowRight');
+  await page.getByRole('button', { name: 'Revert' }).click();
+  await page.locator('.newest').getByText('Profile cad is in force, as it was before the trial').waitFor();
+  assert.equal(bridge.state.profile.trial, false);
+});
+
 onBridge('a refused trial is told, and the sliders go back', async ({ bridge, page }) => {
   bridge.replies.try = () => ({ ok: false, text: 'cad:9: translation: out of range' });
   await page.goto(`${page.url()}#device`);
@@ -228,6 +236,25 @@ onBridge('a refused trial is told, and the sliders go back', async ({ bridge, pa
   await page.waitForFunction(
     () => document.querySelector('#knob-translation').getAttribute('aria-valuetext') === '1',
   );
+});
+
+onBridge('a text that is refused stays in its box, whatever is told meanwhile', async ({ bridge, page }) => {
+  bridge.replies.try = () => ({ ok: false, text: 'cad:9: translation: out of range' });
+  await page.goto(`${page.url()}#device`);
+  await page.getByText('Text of the profile').click();
+  const box = page.getByRole('textbox', { name: 'Text of the profile' });
+  await page.waitForFunction(() => document.querySelector('textarea.code').value !== '');
+  const wrong = (await box.inputValue()).replace(/\ntranslation: .*\n/, '\ntranslation: 99\n');
+  assert.match(wrong, /\ntranslation: 99\n/);
+  await box.fill(wrong);
+  await page.getByRole('button', { name: 'Try this text' }).click();
+  await page.locator('.newest.error').getByText('cad:9: translation: out of range').waitFor();
+  assert.equal(await box.inputValue(), wrong);
+  bridge.state.profile.text = bridge.state.profile.text.replace(/\ntranslation: .*\n/, '\ntranslation: 1.2\n');
+  bridge.tellState();
+  const slider = '#knob-translation[aria-valuetext="1.2"]';
+  await page.waitForFunction((there) => document.querySelector(there), slider);
+  assert.equal(await box.inputValue(), wrong);
 });
 
 onBridge('a recording is started, shown with its progress, stopped and listed', async ({ bridge, page }) => {
@@ -242,6 +269,7 @@ onBridge('a recording is started, shown with its progress, stopped and listed', 
   bridge.replies.recordings = () => ({ data: [{ name: 'hand.twr', bytes: 5, date: '2026-11-02' }] });
   await page.getByRole('button', { name: 'Stop' }).click();
   await page.getByRole('rowheader', { name: 'hand.twr' }).waitFor();
+  await page.locator('.recording-words').getByText(/^Recording ended: \/home.*300 frames/).waitFor();
   assert.equal(
     await page.getByRole('link', { name: 'Download hand.twr' }).getAttribute('href'),
     '/files/recordings/hand.twr',
@@ -282,10 +310,13 @@ onBridge('a wizard runs from its start to its end, and survives a reload', async
   bridge.tellJob({
     ...job,
     state: 'done',
-    lines: [...lines, { kind: 'result', text: 'calibration.json written' }],
+    lines: [...lines, { kind: 'note', text: 'written: /home/u/calibration.json' }],
     keys: [],
   });
   await page.getByText('Next: make the certificate').waitFor();
+  await page.locator('.job-task').getByText('Wrench calibration written', { exact: true }).waitFor();
+  await page.locator('.job-live').getByText('/home/u/calibration.json', { exact: true }).waitFor();
+  await page.locator('.newest.good').getByText('Wrench calibration written: /home/u/calibration.json').waitFor();
   await page.getByRole('button', { name: 'Close' }).click();
   await asked(bridge, page, 'job_close');
   bridge.tellJob(null);

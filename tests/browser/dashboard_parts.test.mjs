@@ -99,6 +99,39 @@ test('states of an empty, a partial and a broken bridge are read without a throw
   }
 });
 
+test('the longest arrow of a force stays in the picture, from every side', { skip }, async () => {
+  const { FARTHEST_MOVE, FIELD_DEG, TIP_LENGTH, forceArrow } = await loadModule('common/force_arrow.ts');
+  const { Orbit } = await loadModule('common/orbit.ts');
+  const { Matrix4, PerspectiveCamera, Vector3 } = await import(join(pages, 'node_modules/three/build/three.module.js'));
+  const camera = new PerspectiveCamera(FIELD_DEG, 1.5, 0.01, 1);
+  const heard = {};
+  new Orbit(camera, { addEventListener: (name, listener) => (heard[name] = listener) }, () => {});
+  const turn = (key) => heard.keydown({ key, preventDefault() {} });
+  const directions = [-1, -0.5, 0, 0.5, 1].flatMap((z) =>
+    [0, 1, 2, 3, 4, 5, 6, 7].map((k) => new Vector3(Math.cos((k * Math.PI) / 4), Math.sin((k * Math.PI) / 4), 2 * z)),
+  );
+  directions.push(new Vector3(0, 0, 1), new Vector3(0, 0, -1));
+  let farthest = 0;
+  for (let i = 0; i < 12; ++i) turn('ArrowDown');
+  for (let up = 0; up <= 20; ++up, turn('ArrowUp')) {
+    for (let round = 0; round < 63; round += 3) {
+      for (let k = 0; k < 3; ++k) turn('ArrowLeft');
+      camera.updateMatrixWorld();
+      for (const along of directions) {
+        const moved = along.clone().normalize().multiplyScalar(FARTHEST_MOVE);
+        const arrow = forceArrow(along, 9, new Matrix4().setPosition(moved));
+        const tip = arrow.foot.clone().addScaledVector(arrow.along, arrow.length + TIP_LENGTH);
+        for (const end of [arrow.foot, tip]) {
+          const { x, y } = end.project(camera);
+          farthest = Math.max(farthest, Math.abs(x), Math.abs(y));
+        }
+      }
+    }
+  }
+  assert.ok(farthest < 1, `${farthest} of the way to the edge`);
+  assert.ok(farthest > 0.8, `no smaller than it must be: ${farthest}`);
+});
+
 test('a changed profile differs in what was changed alone; comments and order stay', { skip }, async () => {
   const { ProfileText } = await loadModule('dashboard/profile_text.ts');
   const text =

@@ -8,7 +8,7 @@ import { errorAfterFit, matchPictures } from './support/after_fit.mjs';
 import { openChromium, openPage } from './support/chromium.mjs';
 import { parseTable, readTable, simulate, writeClip } from './support/clip.mjs';
 import { program, reason, scratch, webBuild } from './support/environment.mjs';
-import { displacement, load, reached, record, savedSensor, started, wrench } from './support/sensor_page.mjs';
+import { displacement, load, reached, record, savedSensor, startButton, started, wrench } from './support/sensor_page.mjs';
 import { serveFolder } from './support/static_server.mjs';
 
 const skip = reason('chromium', 'program', 'sensor');
@@ -138,6 +138,20 @@ test('a few keys can be changed on the page, and the built-in sensor comes back'
   await page.locator('.hint-words').filter({ hasText: 'sensor.yaml has tags 5 and 9' }).waitFor({ timeout: 30_000 });
   await page.getByRole('button', { name: 'Published sensor' }).click();
   await page.locator('.sensor-panel p').first().filter({ hasText: 'published sensor: tags 5, 2' }).waitFor();
+});
+
+test('stopped, it shows no number as if it were of now; started again it goes on', { skip }, async () => {
+  const { page } = opened;
+  await reached(page, 'ok');
+  const shown = (wanted) => page.waitForFunction(
+    (dashes) => [...document.querySelectorAll('.readings .now')].every((cell) => (cell.textContent === '–') === dashes), wanted);
+  await shown(false);
+  await page.getByRole('button', { name: 'Stop', exact: true }).click();
+  await page.locator('.status').getByText('stopped', { exact: true }).waitFor();
+  await shown(true);
+  await startButton(page).click();
+  await reached(page, 'ok');
+  await shown(false);
 });
 
 test('once loaded it starts and measures without a network, with the sensor of last time', { skip }, async () => {

@@ -1,10 +1,10 @@
 // What the tab says where it cannot measure, and what it makes of odd cameras.
 import assert from 'node:assert/strict';
-import { writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { openChromium, openPage, shoot } from './support/chromium.mjs';
-import { simulate, writeClip } from './support/clip.mjs';
+import { readTable, simulate, writeClip } from './support/clip.mjs';
 import { reason, scratch, webBuild } from './support/environment.mjs';
 import { load, reached, savedSensor, startButton, started } from './support/sensor_page.mjs';
 import { serveFolder } from './support/static_server.mjs';
@@ -176,6 +176,54 @@ test('a mirrored camera is noticed, and one button sets it right; then the zero 
   assert.deepEqual(faults, []);
   await browser.close();
 });
+
+test('whoever moves the platform at the start is told to let it rest; a zero while it is pushed is refused', { skip: skip || reason('program') }, async () => {
+  const folder = simulate({ scenario: 'seed: 3\ntrajectory: {motion: compound, rest_s: 0.24}\n', frames: 30 });
+  const pictures = readTable(join(folder, 'frames.csv')).map(({ file }) => readFileSync(join(folder, file), 'base64'));
+  const page = await says(bare, host.url, undefined, 'press Start');
+  await load(page, join(folder, 'sensor.yaml'));
+  await page.locator('.sensor-panel p').first().filter({ hasText: 'sensor.yaml: tags 5, 2' }).waitFor();
+  const there = pictures.slice(6);
+  await page.evaluate(cameraOf, { still: pictures.slice(0, 6), moving: [...there, ...there.toReversed()] });
+  await startButton(page).click();
+  const status = page.locator('.status');
+  const hint = page.locator('.hint-words');
+  await hint.filter({ hasText: 'the platform moved while its rest pose was learned; let it rest' }).waitFor({ timeout: 60_000 });
+  await status.filter({ hasText: 'hold still: learning the rest pose' }).waitFor();
+  await shoot(page, 'sensor-hold-still');
+  await page.evaluate(() => window.show('still'));
+  await reached(page, 'ok');
+  await hint.filter({ hasText: 'rest pose learned' }).waitFor();
+
+  const most = (test) => page.waitForFunction((code) => {
+    const read = [...document.querySelectorAll('.readings .now')].slice(0, 3);
+    const newtons = Math.max(...read.map((cell) => Math.abs(Number(cell.textContent.replace('\u2212', '-')))));
+    return code === 'rest' ? newtons < 0.02 : newtons > 0.1;
+  }, test);
+  await most('rest');
+  await page.evaluate(() => window.show('moving'));
+  await most('pushed');
+  await page.getByRole('button', { name: 'Zero' }).click();
+  await hint.filter({ hasText: 'zero: refused, the platform did not come to rest; let go of it' }).waitFor({ timeout: 60_000 });
+  await shoot(page, 'sensor-zero-refused');
+  await page.evaluate(() => window.show('still'));
+  await most('rest'); // what read at rest before is nothing still
+  await page.context().close();
+});
+
+/** In the page: the camera gives the pictures (PNG in base64) of one of two lists, in turn, 25 a second. */
+async function cameraOf({ still, moving }) {
+  const decoded = (list) => Promise.all(list.map((text) =>
+    createImageBitmap(new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]))));
+  const lists = { still: await decoded(still), moving: await decoded(moving) };
+  const canvas = Object.assign(document.createElement('canvas'), { width: 640, height: 480 });
+  const context = canvas.getContext('2d');
+  let shown = lists.moving;
+  let next = 0;
+  window.show = (name) => (shown = lists[name]);
+  setInterval(() => context.drawImage(shown[next++ % shown.length], 0, 0), 40);
+  navigator.mediaDevices.getUserMedia = async () => canvas.captureStream(25);
+}
 
 test('the bridge\'s device is read in newtons, and a board lit', { skip }, async () => {
   const page = await says(bare, host.url, mockDevices, 'press Start');

@@ -38,6 +38,14 @@ async function pushed(page) {
   }, null, { timeout: 60_000, polling: 50 });
 }
 
+const kWatchShifts = () => {
+  globalThis.shifts = [];
+  new PerformanceObserver((list) => {
+    for (const entry of list.getEntries())
+      if (!entry.hadRecentInput) globalThis.shifts.push([entry.value, ...entry.sources.map(({ node }) => node?.outerHTML?.slice(0, 80))]);
+  }).observe({ type: 'layout-shift', buffered: true });
+};
+
 /** Nothing is cut off, and what is touched is large enough. */
 async function assertUsableAt360px(page) {
   await page.setViewportSize({ width: 360, height: 740 });
@@ -67,8 +75,10 @@ async function assertUsableByKeys(page) {
 
 for (const { name, options } of kViews) {
   test(`the view ${name}`, { skip }, async () => {
-    const { page, faults, foreign } = await openPage(browser, host.url, options);
+    const { page, faults, foreign } = await openPage(browser, host.url, { ...options, init: kWatchShifts });
     await measuring(page);
+    // As browsers score it: the header that came later had 0.04.
+    assert.deepEqual((await page.evaluate(() => globalThis.shifts)).filter(([value]) => value > 1e-3), [], 'something moved by itself');
     await shoot(page, `sensor-${name}`);
     // What is out of sight is not drawn: all of it is brought into sight.
     const height = await page.evaluate(() => document.documentElement.scrollHeight);

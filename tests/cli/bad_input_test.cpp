@@ -72,6 +72,12 @@ TEST_F(BadInput, UnknownSourceAndOutput) {
                  2, {"standard output"});
 }
 
+TEST_F(BadInput, PlaceOfPagesThatIsNone) {
+  for (const std::string place : {"[]:8137", ":8137", "127.0.0.1", "127.0.0.1:", "[::1]:70000"})
+    expect_refused(run_bridge({"run", "--source", "sim", "--output", "web:" + place}), 2,
+                   {"--output web:" + place + ": is no ADDRESS:PORT"});
+}
+
 TEST_F(BadInput, UnknownCommandOrOption) {
   expect_refused(run_bridge({"fly"}), 2, {"--help"});
   expect_refused(run_bridge({"run", "--speed", "9"}), 2, {"--speed"});

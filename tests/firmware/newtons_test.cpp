@@ -39,6 +39,9 @@ mountings:
       - {do: rest}
 )";
 
+const char* const kTooSlow =
+    "calibrated; but this machine does not keep up with a check in real time";
+
 struct Newtons : testing::Test {
   TemporaryFolder folder;
   std::string scenario = (folder / "scenario.yaml").string();
@@ -75,6 +78,16 @@ struct Newtons : testing::Test {
     ASSERT_EQ(got.status, 0) << got.err;
     board.order("cell 1 0");
   }
+  /// Nothing, if the hand's press came too short for a judgement three times: a machine that does
+  /// not keep up with real time.
+  Outcome check_scale(const BoardProcess& board) const {
+    for (int tries = 0; tries < 3; ++tries) {
+      Outcome outcome = run_bridge(
+          with_board({"check", "--channel", "1", "--at", "0,0,6", "--direction", "0,0,-1"}, board));
+      if (outcome.out.find("?      scale") == std::string::npos) return outcome;
+    }
+    return {};
+  }
   std::vector<std::string> with_board(std::vector<std::string> words,
                                       const BoardProcess& board) const {
     words.insert(words.end(), {"--sensor", sensor, "--source", "sim:" + scenario, "--board",
@@ -105,16 +118,16 @@ TEST_F(Newtons, APlanForALoadCellIsDoneWithTheBoardAndCheckedWithIt) {
   EXPECT_NEAR(made.at("lag_s").at("value").get<double>(), 0, 0.01)
       << "the board's times are on the frames' clock, and this camera has no latency";
 
-  const Outcome checked = run_bridge(
-      with_board({"check", "--channel", "1", "--at", "0,0,6", "--direction", "0,0,-1"}, board));
+  const Outcome checked = check_scale(board);
+  if (checked.out.empty()) GTEST_SKIP() << kTooSlow;
   EXPECT_EQ(checked.status, 0) << checked.out << checked.err;
   EXPECT_NE(checked.out.find("fine   scale"), std::string::npos) << checked.out << checked.err;
   EXPECT_EQ(checked.out.find("OFF"), std::string::npos) << checked.out;
 
   // A cell that shows a tenth more than it feels is found.
   board.order("cell 1 gain 1.1");
-  const Outcome more = run_bridge(
-      with_board({"check", "--channel", "1", "--at", "0,0,6", "--direction", "0,0,-1"}, board));
+  const Outcome more = check_scale(board);
+  if (more.out.empty()) GTEST_SKIP() << kTooSlow;
   EXPECT_EQ(more.status, 1) << more.out << more.err;
   EXPECT_NE(more.out.find("OFF    scale"), std::string::npos) << more.out;
 }

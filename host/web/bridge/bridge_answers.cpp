@@ -15,8 +15,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kSecondsToHang = 25;     // a mass, and to let it come to rest
-constexpr double kSecondsToBegin = 10;    // any other step
 constexpr std::size_t kMostWaiting = 64;  // wishes to the desk
 constexpr const char* kNoRun = "the sensor does not run at the moment; try again when it does";
 
@@ -137,9 +135,11 @@ void WebBridge::show_profile(const Ask& ask) {
 void WebBridge::try_profile(const Ask& ask) {
   const std::string name = line_of(ask, "name");
   const std::string text = text_of(ask, "text");
-  if (trial_ && trial_->page != ask.page)
-    throw WishRefused("another page tries profile " + trial_->name + "; keep or revert it there");
+  const std::optional<Trial>& first = trial_ ? trial_ : trying_;
+  if (first && first->page != ask.page)
+    throw WishRefused("another page tries profile " + first->name + "; keep or revert it there");
   desk().ask("try " + name + "\n" + text, [this, ask, name](const DeskAnswer& said) {
+    if (--trying_->unanswered == 0) trying_.reset();
     if (said.ok && !pages_.contains(ask.page)) {  // gone before it had its answer
       trial_.reset();
       return desk_->ask("revert", [this](const DeskAnswer&) { read_profile(); });
@@ -150,6 +150,8 @@ void WebBridge::try_profile(const Ask& ask) {
            said.ok ? said.text.substr(std::min(line_end + 1, said.text.size())) : said.text);
     send_state();
   });
+  if (!trying_) trying_ = Trial{ask.page, name};
+  ++trying_->unanswered;
 }
 
 void WebBridge::keep_profile(const Ask& ask) {
@@ -323,14 +325,9 @@ void WebBridge::list_plans(const Ask& ask) {
   json plans = json::array();
   for (const ReadyPlan& ready : ready_plans()) {
     const WrenchPlan plan = parse_plan(ready.text, ready.name);
-    double seconds = 0;
-    for (const PlanStep& step : plan.steps) {
-      seconds += step.kind == StepKind::mass ? kSecondsToHang : kSecondsToBegin;
-      seconds += step.seconds;
-    }
     plans.push_back({{"name", ready.name},
                      {"needs", plan.about},
-                     {"minutes", static_cast<int>(std::lround(seconds / 60))},
+                     {"minutes", plan.minutes},
                      {"steps", plan.steps.size()}});
   }
   answer(ask, true, {}, std::move(plans));

@@ -92,6 +92,7 @@ std::unique_ptr<WebOutput> WebBridge::begin_run(const RunFacts& facts, WebOutput
     figures_.emplace(facts.sensor.camera, facts.sensor.target);
     profile_ = nullptr;
     trial_.reset();
+    trying_.reset();
     programs_.clear();
     desk_.reset();
     camera_.reset();

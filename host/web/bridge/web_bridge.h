@@ -65,6 +65,7 @@ class WebBridge final : private AskHandler {
   struct Trial {
     std::uint64_t page = 0;
     std::string name;
+    int unanswered = 0;  ///< wishes that the desk has still to answer
   };
 
   // The server's thread.
@@ -133,7 +134,8 @@ class WebBridge final : private AskHandler {
   std::optional<CameraSettings> camera_;
   std::optional<PictureFigures> figures_;
   std::set<std::uint64_t> pages_;  ///< that are there
-  std::optional<Trial> trial_;
+  std::optional<Trial> trial_;     ///< in force
+  std::optional<Trial> trying_;    ///< asked of the desk; other pages wait
   nlohmann::json profile_ = nullptr;
   std::vector<std::string> programs_;  ///< that read the spnav socket
   std::vector<DeviceReader> readers_;

@@ -20,9 +20,24 @@ bool same_letters(std::string_view a, std::string_view b) {
                     [](char x, char y) { return lower(x) == lower(y); });
 }
 
-bool is_port(std::string_view port) {
+bool is_digits(std::string_view text, std::size_t most) {
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  return !port.empty() && port.size() <= 5 && std::all_of(port.begin(), port.end(), is_digit);
+  return !text.empty() && text.size() <= most && std::all_of(text.begin(), text.end(), is_digit);
+}
+
+bool is_port(std::string_view port) { return is_digits(port, 5); }
+
+/// 127.0.0.0/8 as browsers spell it: four numbers up to 255, without zeros before them.
+bool is_loopback_number(std::string_view name) {
+  if (!name.starts_with("127.")) return false;
+  for (int dots = 3;; --dots) {
+    const std::size_t end = std::min(name.find('.'), name.size());
+    const std::string_view number = name.substr(0, end);
+    const bool is_byte = is_digits(number, 3) && (number.size() < 3 || number <= "255");
+    if (!is_byte || (number.size() > 1 && number.front() == '0')) return false;
+    if (end == name.size()) return dots == 0;
+    name.remove_prefix(end + 1);
+  }
 }
 
 /// "name", "name:port", "[number]" and "[number]:port" without the port; empty: none of these.
@@ -78,8 +93,7 @@ bool is_host(std::string_view host) noexcept {
 bool is_loopback_host(std::string_view host) noexcept {
   if (!is_host(host)) return false;
   const std::string_view name = host_name(host);
-  return same_letters(name, "localhost") || name == "[::1]" ||
-         (name.starts_with("127.") && name.find_first_not_of("0123456789.") == name.npos);
+  return same_letters(name, "localhost") || name == "[::1]" || is_loopback_number(name);
 }
 
 bool is_own_origin(std::string_view origin, std::string_view host) noexcept {

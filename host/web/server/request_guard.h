@@ -36,7 +36,7 @@ enum class Refusal : std::uint8_t {
 
 /// A name or a number with at most a port, and nothing else: safe to be repeated in a header.
 bool is_host(std::string_view host) noexcept;
-/// localhost, [::1] or a number that begins with 127, at any port: a tunnel has its own.
+/// localhost, [::1] or an address 127.x.x.x, at any port: a tunnel has its own.
 bool is_loopback_host(std::string_view host) noexcept;
 /// "http://" and the very host.
 bool is_own_origin(std::string_view origin, std::string_view host) noexcept;

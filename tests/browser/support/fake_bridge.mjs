@@ -38,9 +38,10 @@ function motionOf(value, axis) {
 }
 
 export class FakeBridge {
-  constructor({ pages, token = '', port = 0, rate_hz = 60 }) {
+  constructor({ pages, token = '', port = 0, rate_hz = 60, certificate = kCertificate }) {
     Object.assign(this, {
       pages,
+      certificate,
       token,
       port,
       rate_hz,
@@ -182,7 +183,7 @@ export class FakeBridge {
     if (this.token && request.headers.authorization !== `Bearer ${this.token}`)
       return response.writeHead(401).end('token');
     if (path.endsWith('.html'))
-      return response.writeHead(200, { 'Content-Type': 'text/html' }).end(kCertificate);
+      return response.writeHead(200, { 'Content-Type': 'text/html' }).end(this.certificate);
     response.writeHead(200, { 'Content-Type': 'application/octet-stream' }).end(`contents of ${path}`);
   }
 
@@ -242,7 +243,7 @@ export class FakeBridge {
               minutes: 10,
               steps: 24,
             },
-            { name: 'load_cell', needs: 'a load cell on the board', minutes: 8, steps: 18 },
+            { name: 'load_cell', needs: 'a load cell on the board', minutes: 5, steps: 18 },
           ],
         };
       case 'try':
@@ -253,7 +254,7 @@ export class FakeBridge {
       case 'keep':
         this.state.profile.trial = false;
         this.tellState();
-        return { text: ask.ask === 'keep' ? 'kept until this run ends' : 'as it was' };
+        return { text: this.state.profile.name };
       case 'record_start':
         this.state.recording = {
           file: `${ask.name}.twr`,
@@ -264,11 +265,11 @@ export class FakeBridge {
           disk_left_s: 86000,
         };
         this.tellState();
-        return { text: `recording to ${ask.name}.twr` };
+        return { text: `${ask.name}.twr` };
       case 'record_stop':
         this.state.recording = null;
         this.tellState();
-        return { text: 'push.twr: 300 frames' };
+        return { text: '/home/u/.local/share/tagwrench/recordings/push.twr: 300 frames, 1.23 MB' };
       default:
         return { text: 'done' };
     }

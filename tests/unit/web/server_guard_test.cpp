@@ -20,8 +20,9 @@ WebRequest socket_request() {
 }
 
 TEST(WebGuard, LoopbackNamesAtAnyPortAreThisComputer) {
-  for (const char* host : {"localhost", "localhost:8137", "LocalHost:9", "127.0.0.1",
-                           "127.0.0.1:65535", "127.0.0.2:1", "[::1]", "[::1]:8137"})
+  for (const char* host :
+       {"localhost", "localhost:8137", "LocalHost:9", "127.0.0.1", "127.0.0.1:65535", "127.0.0.2:1",
+        "127.255.255.255", "[::1]", "[::1]:8137"})
     EXPECT_TRUE(is_loopback_host(host)) << host;
 }
 
@@ -31,6 +32,17 @@ TEST(WebGuard, OtherNamesAreNot) {
                            "localhost.evil.example",
                            "127.0.0.1.evil.example",
                            "127.evil",
+                           "127.",
+                           "127.:80",
+                           "127...",
+                           "127.0.0",
+                           "127.0.0.",
+                           "127.0.0.1.",
+                           "127.0.0.1.2",
+                           "127.0.0.256",
+                           "127.0.0.01",
+                           "127.0.0.1000",
+                           "127",
                            "localhost:",
                            "localhost:x",
                            "localhost:1:2",

@@ -1,7 +1,8 @@
 // Turns a camera round the origin by pointer, wheel and keys. Up stays up (z).
 import { type PerspectiveCamera } from 'three';
+import { START_DISTANCE } from './force_arrow';
 
-const START = { azimuth: -1.15, height: 0.5, distance: 0.135 };
+const START = { azimuth: -1.15, height: 0.5, distance: START_DISTANCE };
 const CENTRE_Z = -0.001;
 const LOWEST = -0.35;
 const HIGHEST = 1.5;

@@ -20,6 +20,7 @@ import {
 import './platform_view.css';
 import { Orbit } from './orbit';
 import { make, present, say } from './elements';
+import { ARROW_FOOT, FARTHEST_MOVE, FIELD_DEG, TIP_LENGTH, forceArrow } from './force_arrow';
 import { axesTriad, setTriadColours, spring } from './platform_parts';
 import { AXES, type Sample, carriesNumbers, figure } from './sample';
 import { colour, onTheme } from './theme';
@@ -32,10 +33,7 @@ const SPRING_FEET: readonly (readonly [number, number])[] = [
   [-0.014, -0.011],
 ];
 const EXAGGERATION = 10;
-const LONGEST_ARROW = 0.022;
 const ARC_RADIUS = 0.024;
-/** On the knob, where they are seen. */
-const ARROW_FOOT = 0.0055;
 const LEAST_PART = 0.01;
 const UP = new Vector3(0, 0, 1);
 
@@ -71,7 +69,7 @@ export class PlatformView {
   private readonly caption: HTMLElement;
   private readonly materials = materials();
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(38, 1, 0.01, 1);
+  private readonly camera = new PerspectiveCamera(FIELD_DEG, 1, 0.01, 1);
   private readonly platform = new Group();
   private readonly springs: Object3D[] = [];
   private readonly force = new Group();
@@ -100,7 +98,7 @@ export class PlatformView {
       new CylinderGeometry(0.0013, 0.0013, 1, 12).rotateX(Math.PI / 2).translate(0, 0, 0.5),
       this.materials.force,
     );
-    this.forceTip = new Mesh(new ConeGeometry(0.0034, 0.009, 16).rotateX(Math.PI / 2), this.materials.force);
+    this.forceTip = new Mesh(new ConeGeometry(0.0034, 2 * TIP_LENGTH, 16).rotateX(Math.PI / 2), this.materials.force);
     this.arc = new Mesh(new TorusGeometry(ARC_RADIUS, 0.0012, 8, 48), this.materials.torque);
     this.arcTip = new Mesh(new ConeGeometry(0.0026, 0.007, 16), this.materials.torque);
     this.build();
@@ -108,8 +106,8 @@ export class PlatformView {
   }
 
   /**
-   * Full scale, N and N m: the weakest axis' makes a whole arrow; stronger pushes make it half as long
-   * again.
+   * Full scale, N and N m: the weakest axis' makes two thirds of the longest arrow, which is in the picture
+   * from every side.
    */
   setRange(range_n: readonly number[], range_nm: readonly number[]): void {
     this.range_n = Math.min(...range_n) || 1;
@@ -211,6 +209,7 @@ export class PlatformView {
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
+    this.camera.zoom = Math.min(1, this.camera.aspect);
     this.camera.updateProjectionMatrix();
     this.invalidate();
   }
@@ -230,7 +229,7 @@ export class PlatformView {
     const numbers = sample !== null && carriesNumbers(sample.status) ? sample : null;
     const [x = 0, y = 0, z = 0] = numbers?.d_m ?? [];
     const turn = new Vector3(...(numbers?.d_rad ?? [])).multiplyScalar(EXAGGERATION).clampLength(0, 1.2);
-    this.platform.position.set(x, y, z).multiplyScalar(EXAGGERATION).clampLength(0, 0.015);
+    this.platform.position.set(x, y, z).multiplyScalar(EXAGGERATION).clampLength(0, FARTHEST_MOVE);
     this.platform.quaternion.setFromAxisAngle(
       turn.length() > 1e-9 ? turn.clone().normalize() : UP,
       turn.length(),
@@ -259,19 +258,14 @@ export class PlatformView {
   }
 
   private placeForce(force: Vector3): void {
-    const part = Math.min(1.5, force.length() / this.range_n);
+    const part = force.length() / this.range_n;
     this.force.visible = part > LEAST_PART;
     if (!this.force.visible) return;
-    const length = 0.01 + part * LONGEST_ARROW;
+    const { foot, along, length } = forceArrow(force, part, this.platform.matrix);
     this.shaft.scale.set(1, 1, length);
     this.forceTip.position.z = length;
-    const along = force.normalize();
     this.force.quaternion.copy(new Quaternion().setFromUnitVectors(UP, along));
-    // A pull begins at the knob; a push ends there, or the platform would hide it.
-    const outside = Math.max(0, Math.min(1, -2 * along.z)) * (length + 0.0045);
-    this.force.position
-      .copy(new Vector3(0, 0, ARROW_FOOT).applyMatrix4(this.platform.matrix))
-      .addScaledVector(along, -outside);
+    this.force.position.copy(foot);
   }
 
   /** An arc round the torque's axis, the longer the stronger. */

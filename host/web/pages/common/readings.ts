@@ -61,7 +61,11 @@ export class Readings {
       { class: 'quiet' },
     );
     const zero = make('span', { class: 'zero-words' }, 'Zero: ', this.zeroState);
-    parent.append(table, sums, make('div', { class: 'row readings-actions' }, this.zeroButton, zero, reset));
+    parent.append(
+      table,
+      make('div', { class: 'row readings-sums' }, sums, reset),
+      make('div', { class: 'row readings-actions' }, this.zeroButton, zero),
+    );
     this.write();
   }
 

@@ -233,6 +233,8 @@ export class Traces {
       if (Number.isNaN(value[i] ?? Number.NaN)) continue;
       let end = i;
       while (end + 1 < times.length && !Number.isNaN(value[end + 1] ?? Number.NaN)) ++end;
+      // A new piece: a line would come from where the last one was closed.
+      band.moveTo(xAt(times[i] ?? 0), yAt(value[i] ?? 0));
       for (let k = i; k <= end; ++k)
         band.lineTo(xAt(times[k] ?? 0), yAt((value[k] ?? 0) + BAND_SIGMAS * (sigma[k] ?? 0)));
       for (let k = end; k >= i; --k)

@@ -1,22 +1,31 @@
-// A job of the bridge as it goes on: what to do now, big; what has been covered; what was said; keys. All of
-// it is the bridge's own state, so that a page that is loaded anew shows the same.
+// A job of the bridge as it goes on: what to do now, big; keys; what has been covered; what was said. All of
+// it is the bridge's own state, so that a page that is loaded anew shows the same. Each part has its room from
+// the start: nothing moves away from under a finger while it runs.
 import './job_panel.css';
 import { button, make, present, say } from '../common/elements';
 import { CoverageView } from './coverage_view';
-import { type Job, type JobState, textIn } from './protocol';
+import { endingOf, jobTitle, lastSaid } from './job_words';
+import { type Coverage, type Job, type JobState, textIn } from './protocol';
 import { reportLines } from './report_text';
 import type { App } from './view';
 
 const STATE_WORDS: Readonly<Record<JobState, string>> = {
   running: 'runs',
-  done: 'done',
-  failed: 'failed',
-  stopped: 'stopped',
+  done: 'Done',
+  failed: 'Failed',
+  stopped: 'Stopped',
 };
 const KEY_WORDS: Readonly<Record<string, string>> = {
   skip: 'Skip this step',
   redo: 'Do the last step again',
   stop: 'Stop',
+};
+
+/** What will be covered, before there is any of it. */
+const NOTHING_YET: Readonly<Record<string, Coverage>> = {
+  camera: { regions: Array<number>(9).fill(0) },
+  target: { range: Array<number>(6).fill(0) },
+  wrench: { axes: Array<number>(6).fill(0) },
 };
 
 /** The bars of the terminal, which the page draws itself. */
@@ -45,11 +54,8 @@ export class JobPanel {
   private readonly close: HTMLButtonElement;
   private shown = '';
 
-  constructor(
-    private readonly app: App,
-    private readonly titles: Readonly<Record<string, string>>,
-  ) {
-    this.close = button('Close', () => void app.wish('job_close'), { class: 'main' });
+  constructor(private readonly app: App) {
+    this.close = button('Close', () => void app.close(), { class: 'main' });
     this.element = make(
       'section',
       { class: 'panel job', 'aria-label': 'Job', hidden: true },
@@ -57,9 +63,9 @@ export class JobPanel {
       this.task,
       this.live,
       this.progress,
+      this.keys,
       this.coverage.element,
       this.report,
-      this.keys,
       this.lines,
     );
   }
@@ -71,17 +77,17 @@ export class JobPanel {
     if (text === this.shown) return;
     this.shown = text;
     this.element.className = `panel job ${job.state}`;
-    say(this.heading, `${this.titles[job.verb] ?? job.verb}: ${STATE_WORDS[job.state]}`);
-    say(this.task, JobPanel.headline(job));
-    say(this.live, withoutBars(job.live) || '\u00a0');
-    const running = job.state === 'running';
-    present(this.live, running);
-    present(this.progress, running && job.progress !== null);
+    const ending = endingOf(job);
+    const title = jobTitle(job.verb);
+    say(this.heading, ending ? STATE_WORDS[job.state] : `${title}: ${STATE_WORDS[job.state]}`);
+    say(this.task, ending?.what ?? (lastSaid(job, ['task']) || withoutBars(job.live) || 'Starting\u2026'));
+    say(this.live, ending?.more ?? withoutBars(job.live));
+    this.progress.classList.toggle('none', job.progress === null);
     if (job.progress !== null) {
       this.bar.style.transform = `scaleX(${Math.max(0, Math.min(1, job.progress))})`;
       this.progress.setAttribute('aria-valuenow', String(Math.round(job.progress * 100)));
     }
-    this.coverage.show(job.coverage);
+    this.coverage.show(job.coverage ?? (ending ? null : (NOTHING_YET[job.verb] ?? null)));
     this.showReport(job);
     this.showKeys(job);
     this.showLines(job);
@@ -96,7 +102,9 @@ export class JobPanel {
     const running = job.state === 'running';
     this.lines.replaceChildren(...(running ? told.reverse() : told));
     this.lines.scrollTop = running ? 0 : this.lines.scrollHeight;
-    present(this.lines, told.length > 0);
+    // The doctor says nothing on its way; above a report stands what matters.
+    const reported = textIn(job.result?.text) !== '';
+    present(this.lines, running ? job.verb !== 'doctor' : told.length > 0 && !reported);
   }
 
   /** What it printed. The doctor's is shown by its own view, also after it is closed. */
@@ -104,25 +112,6 @@ export class JobPanel {
     const text = job.verb === 'doctor' ? '' : textIn(job.result?.text);
     present(this.report, text !== '');
     this.report.replaceChildren(...(text === '' ? [] : reportLines(text)));
-  }
-
-  /** What there is to do, or how it ended. */
-  private static headline(job: Job): string {
-    const last = (kinds: readonly string[]): string =>
-      job.lines.filter((line) => kinds.includes(line.kind)).at(-1)?.text ?? '';
-    switch (job.state) {
-      case 'running':
-        return last(['task']) || withoutBars(job.live) || 'Starting\u2026';
-      case 'done':
-        // Above a report, a note of the way there would only confuse.
-        return last(['result']) || (textIn(job.result?.text) === '' && last(['note'])) || 'Done.';
-      case 'failed':
-        return (
-          last(['warning', 'note', 'result']) || 'It failed, and did not say why. Run `tagwrench doctor`.'
-        );
-      case 'stopped':
-        return 'Stopped. What was in force before still is.';
-    }
   }
 
   private showKeys(job: Job): void {

@@ -1,9 +1,11 @@
 // The frame round the views: name, connection and status above, the way between views, the latest news below.
+// Nothing of it moves when words change: each has its room, and a banner lies over the view's end.
 import { button, make, present, say } from '../common/elements';
 import { STATUS_WORDS, type Status } from '../common/sample';
 import { themeSwitch } from '../common/theme';
 import type { Link, LinkState } from './link';
-import type { Answer, BridgeState, Hello } from './protocol';
+import { endingOf, jobTitle } from './job_words';
+import type { Answer, BridgeState, Hello, Job } from './protocol';
 import { duration } from './words';
 import type { App, View } from './view';
 
@@ -27,6 +29,8 @@ export class Shell implements App {
   private readonly newest = make('span', { class: 'newest', role: 'status', 'aria-live': 'polite' });
   private readonly lines = make('ol', { class: 'lines', hidden: true, 'aria-label': 'Messages' });
   private stopped = false;
+  /** A job runs, as far as this page has heard. */
+  private awaiting = false;
   private current: View | null = null;
   private waiting: ReturnType<typeof setInterval> | undefined;
 
@@ -45,10 +49,8 @@ export class Shell implements App {
       'header',
       {},
       title,
-      this.status,
-      this.recording,
-      this.job,
-      make('span', { class: 'gap' }),
+      make('div', { class: 'status-slot' }, this.status),
+      make('div', { class: 'badges' }, this.job, this.recording),
       connection,
       themeSwitch(),
     );
@@ -56,7 +58,6 @@ export class Shell implements App {
       make('a', { class: 'skip', href: '#main' }, 'Skip to the content'),
       header,
       this.nav,
-      this.banner,
       this.main,
       this.footer(),
     );
@@ -67,7 +68,10 @@ export class Shell implements App {
     link.on('link', (state) => this.showLink(state));
     link.on('hello', (hello) => this.showHello(hello));
     link.on('state', (state) => this.showState(state));
-    link.on('job', () => this.link.state && this.showState(this.link.state));
+    link.on('job', (job) => {
+      if (this.link.state) this.showState(this.link.state);
+      else this.follow(job);
+    });
     link.on('line', (line) => this.tell(line));
     addEventListener('hashchange', () => this.go());
     document.addEventListener('keydown', (event) => this.key(event));
@@ -93,9 +97,28 @@ export class Shell implements App {
   }
 
   async wish(what: string, extra: Readonly<Record<string, unknown>> = {}): Promise<Answer> {
+    return this.wishSaying((text) => text, what, extra);
+  }
+
+  async wishSaying(
+    words: (text: string) => string,
+    what: string,
+    extra: Readonly<Record<string, unknown>> = {},
+  ): Promise<Answer> {
     const answer = await this.link.ask(what, extra);
-    this.tell(answer.text, answer.ok ? 'good' : 'error');
+    this.tell(answer.ok ? words(answer.text) : answer.text, answer.ok ? 'good' : 'error');
     return answer;
+  }
+
+  async begin(verb: string, options: Readonly<Record<string, unknown>>): Promise<void> {
+    const begun = (): string => `${jobTitle(verb)} begun`;
+    const answer = await this.wishSaying(begun, 'job_start', { verb, options });
+    // What comes after the answer is of this job, and it may have ended already.
+    if (answer.ok) this.awaiting = true;
+  }
+
+  async close(): Promise<void> {
+    await this.wishSaying(() => '', 'job_close');
   }
 
   private footer(): HTMLElement {
@@ -108,7 +131,7 @@ export class Shell implements App {
       },
       { class: 'quiet', 'aria-expanded': 'false' },
     );
-    return make('footer', {}, this.lines, make('div', { class: 'news' }, this.newest, toggle));
+    return make('footer', {}, this.banner, this.lines, make('div', { class: 'news' }, this.newest, toggle));
   }
 
   private go(): void {
@@ -208,6 +231,7 @@ export class Shell implements App {
     const lent = !state.running && state.job?.state === 'running';
     this.status.className = `status ${lent ? 'acquiring' : state.status}`;
     say(this.status, lent ? 'the camera is in use' : why);
+    this.status.title = this.status.textContent;
     this.showStopped(!state.running && !lent, state.words);
     present(this.recording, state.recording !== null);
     if (state.recording) say(this.recording, `recording ${duration(state.recording.seconds)}`);
@@ -217,5 +241,13 @@ export class Shell implements App {
         state.job.verb === 'doctor' || state.job.verb === 'certificate' ? `#${state.job.verb}` : '#calibrate';
       say(this.job, `${state.job.verb} runs`);
     }
+    this.follow(state.job);
+  }
+
+  /** Tells a job's end, once, to pages that heard of its beginning. */
+  private follow(job: Job | null): void {
+    const ending = job ? endingOf(job) : null;
+    if (ending && this.awaiting) this.tell([ending.what, ending.more].filter(Boolean).join(': '), ending.kind);
+    this.awaiting = job !== null && ending === null;
   }
 }

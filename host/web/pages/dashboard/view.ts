@@ -18,4 +18,14 @@ export interface App {
   tell(text: string, kind?: 'news' | 'good' | 'error'): void;
   /** Asks, and tells what came of it. */
   wish(what: string, extra?: Readonly<Record<string, unknown>>): Promise<Answer>;
+  /** As wish(); `words` are made of what the bridge answers when it did it, empty: nothing is told then. */
+  wishSaying(
+    words: (text: string) => string,
+    what: string,
+    extra?: Readonly<Record<string, unknown>>,
+  ): Promise<Answer>;
+  /** Begins a job; its end will be told. */
+  begin(verb: string, options: Readonly<Record<string, unknown>>): Promise<void>;
+  /** Puts away the job that has ended. */
+  close(): Promise<void>;
 }

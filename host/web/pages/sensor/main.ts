@@ -7,19 +7,17 @@ import { firstTrouble } from './checks';
 import { Instrument } from './instrument';
 import { keepOffline } from './offline';
 
-function header(): { bar: HTMLElement; kept: HTMLElement } {
+/** Fills the header, which has its room from the start; gives where it is said what is kept. */
+function header(): HTMLElement {
   const kept = make('span', { class: 'hint', role: 'status' });
-  const bar = make(
-    'header', { class: 'top' },
-    make('h1', {}, 'tagwrench'), make('span', { class: 'hint' }, 'the sensor in this tab'), kept, themeSwitch(),
-  );
-  return { bar, kept };
+  const about = make('span', { class: 'hint about' }, 'the sensor in this tab');
+  document.querySelector('.top')?.append(make('h1', {}, 'tagwrench'), about, kept, themeSwitch());
+  return kept;
 }
 
 const root = document.getElementById('sensor') ?? document.body;
 root.replaceChildren();
-const { bar, kept } = header();
-document.body.prepend(bar);
+const kept = header();
 const trouble = firstTrouble();
 if (trouble) {
   root.append(make(

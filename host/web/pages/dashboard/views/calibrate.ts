@@ -3,18 +3,10 @@ import './calibrate.css';
 import { button, field, make, panel, present, say } from '../../common/elements';
 import { CameraPicture } from '../camera_picture';
 import { JobPanel } from '../job_panel';
+import { jobTitle } from '../job_words';
 import { type Hello, type Job, listIn, numberIn, said, textIn } from '../protocol';
 import type { App, View } from '../view';
 
-const TITLES: Readonly<Record<string, string>> = {
-  camera: 'Camera calibration',
-  target: 'Target calibration',
-  wrench: 'Wrench calibration',
-  check: 'Check',
-  zero: 'Zero',
-  certificate: 'Certificate',
-  doctor: 'Doctor',
-};
 const NEXT: Readonly<Record<string, string>> = {
   camera: 'Next: the target. Its places belong to this lens.',
   target: 'Next: the wrench. Its newtons belong to these tags.',
@@ -76,13 +68,13 @@ export class CalibrateView implements View {
   private withPicture = false;
 
   constructor(private readonly app: App) {
-    this.job = new JobPanel(app, TITLES);
+    this.job = new JobPanel(app);
     this.picture = new CameraPicture(app.link, 'what the camera sees');
     this.pictured = panel('Camera', 'wizard-picture', this.picture.element);
     this.plan.addEventListener('change', () => this.showPlan());
     this.choices.append(this.cameraCard(), this.targetCard(), this.wrenchCard(), this.keepCard());
     this.jobRow.append(make('div', { class: 'column' }, this.job.element, this.next), this.pictured);
-    this.element.append(this.known, this.jobRow, this.choices);
+    this.element.append(this.jobRow, this.known, this.choices);
     app.link.on('job', (job) => this.showJob(job));
     app.link.on('state', (state) => this.showJob(state.job));
     app.link.on('hello', (hello) => this.showHello(hello));
@@ -95,7 +87,7 @@ export class CalibrateView implements View {
   }
 
   private card(verb: string, number: string, about: string, ...controls: readonly Node[]): HTMLElement {
-    const title = number === '' ? 'Keep it true' : `${number}. ${TITLES[verb] ?? verb}`;
+    const title = number === '' ? 'Keep it true' : `${number}. ${jobTitle(verb)}`;
     return panel(title, 'wizard', make('p', {}, about), ...controls);
   }
 
@@ -172,7 +164,7 @@ export class CalibrateView implements View {
   }
 
   private starter(verb: string, options: () => Record<string, unknown>, words = 'Start'): HTMLButtonElement {
-    return button(words, () => void this.app.wish('job_start', { verb, options: options() }), {
+    return button(words, () => void this.app.begin(verb, options()), {
       class: 'main',
       'data-verb': verb,
     });
@@ -195,7 +187,7 @@ export class CalibrateView implements View {
       start.title = start.disabled
         ? 'This bridge cannot: it needs a sensor file (--sensor sensor.yaml) and a camera or the simulation'
         : '';
-      if (start.disabled) off.add(TITLES[start.dataset.verb ?? '']?.toLowerCase() ?? '');
+      if (start.disabled) off.add(jobTitle(start.dataset.verb ?? '').toLowerCase());
     }
     if (off.size > 0)
       this.known.append(
@@ -210,7 +202,7 @@ export class CalibrateView implements View {
     const mine = job && job.verb !== 'doctor' && job.verb !== 'certificate' ? job : null;
     this.job.show(mine);
     present(this.jobRow, mine !== null);
-    present(this.choices, job === null);
+    for (const part of [this.known, this.choices]) present(part, job === null);
     const next = mine?.state === 'done' ? NEXT[mine.verb] : undefined;
     present(this.next, next !== undefined);
     if (next) say(this.next, next);

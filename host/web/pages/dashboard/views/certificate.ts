@@ -6,6 +6,8 @@ import { fetchFile } from '../token';
 import type { App, View } from '../view';
 
 const KINDS = ['pdf', 'json', 'html'] as const;
+/** What the certificate's page is wide, with its scroll bar. */
+const SHEET_PX = 760;
 
 export class CertificateView implements View {
   readonly name = 'certificate';
@@ -20,24 +22,25 @@ export class CertificateView implements View {
     title: 'Certificate',
     sandbox: '',
     referrerpolicy: 'no-referrer',
-    hidden: true,
   });
+  private readonly sheet = make('div', { class: 'sheet', hidden: true }, this.frame);
   private shownFiles = '';
 
   constructor(private readonly app: App) {
-    this.job = new JobPanel(app, { certificate: 'Certificate' });
+    this.job = new JobPanel(app);
     this.start = button(
       'Make the certificate',
-      () => void app.wish('job_start', { verb: 'certificate', options: {} }),
+      () => void app.begin('certificate', {}),
       { class: 'main' },
     );
     const about =
       'One page on how well this sensor measures: accuracy on loads the fit had not seen, cross-talk, noise, drift. It needs a wrench calibration.';
+    const top = panel('Certificate', '', make('p', {}, about), make('div', { class: 'row' }, this.start));
     this.element.append(
-      panel('Certificate', '', make('p', {}, about), make('div', { class: 'row' }, this.start, this.links)),
-      this.job.element,
-      this.frame,
+      make('div', { class: 'column' }, top, this.job.element),
+      make('div', { class: 'column' }, this.links, this.sheet),
     );
+    new ResizeObserver(() => this.fit()).observe(this.sheet);
     app.link.on('job', (job) => this.show(job));
     app.link.on('state', (state) => this.show(state.job));
     app.link.on('hello', ({ can }) => {
@@ -58,8 +61,13 @@ export class CertificateView implements View {
     this.links.replaceChildren(...files.map(([kind, path]) => this.link(kind, path)));
     const page = files.find(([kind]) => kind === 'html')?.[1];
     // A frame carries no token; then the files are fetched by the buttons.
-    present(this.frame, page !== undefined && this.app.token === '');
+    present(this.sheet, page !== undefined && this.app.token === '');
     if (page && this.app.token === '') this.frame.src = page;
+  }
+
+  private fit(): void {
+    const scale = Math.min(1, this.sheet.clientWidth / SHEET_PX) || 1;
+    this.frame.style.setProperty('--sheet-scale', scale.toFixed(4));
   }
 
   private link(kind: string, path: string): HTMLElement {

@@ -53,12 +53,24 @@ export class DeviceView implements View {
 
   constructor(private readonly app: App) {
     this.knobs = new KnobPanel((changes) => this.attempt(this.text.with(changes)));
-    this.choice.addEventListener('change', () => void app.wish('profile', { name: this.choice.value }));
+    // The bridge answers these with the name of the profile that is in force from then on.
+    const inForce = (name: string): string => `Profile ${name} is in force`;
+    const kept = (name: string): string => `Profile ${name} stays as tried until this run ends`;
+    const reverted = (name: string): string => `Profile ${name} is in force, as it was before the trial`;
+    this.choice.addEventListener(
+      'change',
+      () => void app.wishSaying(inForce, 'profile', { name: this.choice.value }),
+    );
     this.trialButtons = [
-      button('Keep', () => void app.wish('keep'), { class: 'main', title: 'In force until this run ends' }),
-      button('Revert', () => void app.wish('revert'), { title: 'As it was before the sliders moved' }),
+      button('Keep', () => void app.wishSaying(kept, 'keep'), {
+        class: 'main',
+        title: 'In force until this run ends',
+      }),
+      button('Revert', () => void app.wishSaying(reverted, 'revert'), {
+        title: 'As it was before the sliders moved',
+      }),
     ];
-    const next = button('Next', () => void app.wish('next_profile'), {
+    const next = button('Next', () => void app.wishSaying(inForce, 'next_profile'), {
       title: 'The next profile of the list',
     });
     const save = button('Save to a file', () => void this.save(), {

@@ -20,8 +20,8 @@ export class DoctorView implements View {
   private shownText = '';
 
   constructor(app: App) {
-    this.job = new JobPanel(app, { doctor: 'Doctor' });
-    const start = button('Examine', () => void app.wish('job_start', { verb: 'doctor', options: {} }), {
+    this.job = new JobPanel(app);
+    const start = button('Examine', () => void app.begin('doctor', {}), {
       class: 'main',
     });
     const copy = button(
@@ -34,11 +34,8 @@ export class DoctorView implements View {
     );
     const about =
       'Looks at the camera, the devices, rights, and programs that read them, and says what to do about what is amiss.';
-    this.element.append(
-      panel('Doctor', '', make('p', {}, about), make('div', { class: 'row' }, start, copy)),
-      this.job.element,
-      this.report,
-    );
+    const top = panel('Doctor', '', make('p', {}, about), make('div', { class: 'row' }, start, copy));
+    this.element.append(make('div', { class: 'column' }, top, this.job.element), this.report);
     app.link.on('job', (job) => this.show(job));
     app.link.on('state', (state) => this.show(state.job));
     app.link.on('hello', ({ can }) => {

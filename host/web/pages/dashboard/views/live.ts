@@ -48,7 +48,7 @@ export class LiveView implements View {
     this.platform = new PlatformView(platform);
     this.picture = new CameraPicture(app.link, 'camera picture');
     const camera = panel('Camera', 'panel-camera', this.picture.element, this.quality.element);
-    const run = panel('Bridge', 'panel-run', this.makeFacts(), this.clients, this.origin);
+    const run = panel('Bridge', 'panel-run', this.makeFacts(), this.origin, this.clients);
     const column = make('div', { class: 'column' }, numbers, platform);
     this.element.append(tracesPanel, column, make('div', { class: 'column' }, camera, run));
     app.link.on('samples', ({ samples, lost }) => this.push(samples, lost));

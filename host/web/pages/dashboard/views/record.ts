@@ -1,7 +1,7 @@
 // Recordings: begin and end one while the sensor runs, see how it goes, fetch what there is.
 import './record.css';
 import { button, field, make, panel, present, say } from '../../common/elements';
-import { listIn, numberIn, said, textIn, type BridgeState } from '../protocol';
+import { listIn, numberIn, said, textIn, type BridgeState, type RecordingState } from '../protocol';
 import { fetchFile } from '../token';
 import type { App, View } from '../view';
 import { bytes, day, duration } from '../words';
@@ -11,6 +11,10 @@ const KEEP: readonly (readonly [string, string])[] = [
   ['raw', 'whole pictures, as the camera sent them (large)'],
   ['none', 'numbers only, no pictures (tiny)'],
 ];
+
+const IDLE = 'Nothing is being recorded.';
+const UNABLE =
+  'This run cannot be recorded from here: all of it is recorded already, or its source is a recording.';
 
 interface Kept {
   name: string;
@@ -48,7 +52,7 @@ export class RecordView implements View {
   private readonly start: HTMLButtonElement;
   private readonly stop: HTMLButtonElement;
   private readonly facts = make('dl', { class: 'facts wide' });
-  private readonly idle = make('p', { class: 'hint' }, 'Nothing is being recorded.');
+  private readonly words = make('p', { class: 'hint recording-words', role: 'status' }, IDLE);
   private readonly folder = make('p', { class: 'hint' });
   private able = true;
   private readonly rows = make('tbody');
@@ -71,8 +75,8 @@ export class RecordView implements View {
       field('name', this.file, 'Letters, digits, dot, - and _'),
       field('keep', this.keep),
       make('div', { class: 'row' }, this.start, this.stop),
-      this.idle,
       this.facts,
+      this.words,
     );
     const head = ['name', 'size', 'made', ''].map((name) => make('th', { scope: 'col' }, name));
     const table = make(
@@ -94,12 +98,7 @@ export class RecordView implements View {
     app.link.on('state', (state) => this.showState(state));
     app.link.on('hello', ({ can }) => {
       this.able = can.record;
-      say(
-        this.idle,
-        can.record
-          ? 'Nothing is being recorded.'
-          : 'This run cannot be recorded from here: all of it is recorded already, or its source is a recording.',
-      );
+      say(this.words, can.record ? IDLE : UNABLE);
       if (this.visible) void this.list();
     });
   }
@@ -111,14 +110,16 @@ export class RecordView implements View {
 
   private async begin(): Promise<void> {
     if (!this.file.reportValidity()) return;
-    await this.app.wish('record_start', {
+    await this.app.wishSaying((name) => `Recording begun: ${name}`, 'record_start', {
       name: this.file.value.trim() || 'recording',
       keep: this.keep.value,
     });
   }
 
   private async end(): Promise<void> {
-    await this.app.wish('record_stop');
+    const ended = (file: string): string => `Recording ended: ${file}`;
+    const answer = await this.app.wishSaying(ended, 'record_stop');
+    if (answer.ok) say(this.words, ended(answer.text));
     await this.list();
   }
 
@@ -126,11 +127,16 @@ export class RecordView implements View {
     const running = recording !== null;
     this.start.disabled = running || !this.able;
     this.stop.disabled = !running;
-    present(this.idle, !running);
-    present(this.facts, running);
-    if (this.running === true && !running && this.visible) void this.list();
+    if (this.running === true && !running) {
+      say(this.words, 'Recording ended.');
+      if (this.visible) void this.list();
+    }
     this.running = running;
-    if (!recording) return;
+    if (recording) this.showProgress(recording);
+  }
+
+  private showProgress(recording: RecordingState): void {
+    say(this.words, 'Recording.');
     const words: Readonly<Record<string, string>> = {
       file: recording.file,
       time: duration(recording.seconds),
