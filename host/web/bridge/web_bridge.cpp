@@ -363,6 +363,7 @@ json WebBridge::state() const {
           {"skipped", seen.skipped},
           {"frames", figures.frames},
           {"running", running_},
+          {"setting_up", !running_ && failure_.empty()},
           {"status", running_ ? name(seen.status) : name(Status::lost)},
           {"words", words(seen, fresh_)},
           {"image", running_ ? image() : json()},

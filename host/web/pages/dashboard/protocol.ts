@@ -87,6 +87,8 @@ export interface BridgeState {
   words: string;
   /** False: the sensor could not be started, or its camera is lent to a job. */
   running: boolean;
+  /** It does not run yet, and nothing went wrong. */
+  settingUp: boolean;
   image: {
     white: number;
     black: number;
@@ -296,6 +298,7 @@ export function stateFrom(message: Said): BridgeState {
     status: textIn(message.status),
     words: textIn(message.words),
     running: message.running !== false,
+    settingUp: message.setting_up === true,
     image: imageFrom(message.image),
     profile: profileFrom(message.profile),
     zero_state: textIn(message.zero_state),

@@ -232,7 +232,7 @@ export class Shell implements App {
     this.status.className = `status ${lent ? 'acquiring' : state.status}`;
     say(this.status, lent ? 'the camera is in use' : why);
     this.status.title = this.status.textContent;
-    this.showStopped(!state.running && !lent, state.words);
+    this.showStopped(!state.running && !lent && !state.settingUp, state.words);
     present(this.recording, state.recording !== null);
     if (state.recording) say(this.recording, `recording ${duration(state.recording.seconds)}`);
     present(this.job, state.job?.state === 'running');

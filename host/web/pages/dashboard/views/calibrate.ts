@@ -226,8 +226,7 @@ export class CalibrateView implements View {
 
   private showPlan(): void {
     const plan = this.plans.find((one) => one.name === this.plan.value);
-    const told = /minute/.test(plan?.needs ?? '');
-    const time = plan && plan.minutes > 0 && !told ? `; about ${plan.minutes} minutes` : '';
+    const time = plan && plan.minutes > 0 ? `; about ${plan.minutes} minutes` : '';
     say(this.planNeeds, plan ? `Needs ${plan.needs}. ${plan.steps} steps${time}.` : '');
   }
 }

@@ -161,7 +161,10 @@ export class DeviceView implements View {
     this.text = text;
     if (text.broken) return;
     this.shapes = PROFILE_AXES.map((axis) => text.shape(axis));
-    for (const [index, shape] of this.shapes.entries()) this.plots[index]?.draw(shape);
+    for (const [index, shape] of this.shapes.entries()) {
+      const whole = Number.isFinite(shape.full) && Number.isFinite(shape.dead); // a text may leave them to the ready-made
+      if (whole) this.plots[index]?.draw(shape);
+    }
   }
 
   /** One at a time; of those that come meanwhile the newest counts. */
