@@ -15,6 +15,7 @@
 #include "host/config/sha256.h"
 #include "host/config_error.h"
 #include "host/tell.h"
+#include "host/verbs/calibrate_wrench/checks.h"
 #include "host/verbs/calibrate_wrench/recorder.h"
 #include "host/verbs/calibrate_wrench/references.h"
 #include "host/verbs/calibrate_wrench/replay.h"
@@ -23,6 +24,7 @@
 #include "host/verbs/exit_status.h"
 #include "host/verbs/hands_off.h"
 #include "host/verbs/recording_sensor.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 namespace {
@@ -30,7 +32,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kRecordingFailed = 1, kAttempts = 3;  // attempts of the simulated person
-constexpr double kUnknownRange = 1e8;
 
 int list_plans() {
   for (const ReadyPlan& ready : ready_plans()) {
@@ -58,80 +59,6 @@ Matrix6 known_stiffness(const SensorConfig& sensor, const std::string& file) {
       "roughly, wrench: {{springs: {{centres_mm: ..., axial_n_per_mm: ..., lateral_n_per_mm: "
       "...}}}}",
       file));
-}
-
-/// Refuses a plan that leaves something open, or says what will be completed.
-void check_plan(const WrenchPlan& plan, const Vector6& range, bool require_all) {
-  std::string missing;
-  for (const std::string& line : coverage_of(plan, range).missing())
-    missing += (missing.empty() ? "" : "; ") + line;
-  if (missing.empty()) return;
-  if (require_all) throw ConfigError(fmt::format("--plan {}: {}; add steps", plan.name, missing));
-  tell(
-      fmt::format("--plan {}: {}; that stays as the spring model has it and is marked so "
-                  "(--require-all refuses)",
-                  plan.name, missing));
-}
-
-/// What is in the way of the files to be written.
-void check_files(const CalibrationFiles& files, const CalibrateWrenchOptions& options) {
-  for (const fs::path& file : {files.calibration, files.data, files.progress, files.before})
-    check_replaceable(file);
-  std::error_code none;
-  const bool waits = fs::exists(files.progress, none);
-  if (options.resume && !waits) {
-    throw ConfigError(fmt::format("--resume: there is no {} to go on from; leave it out",
-                                  files.progress.string()));
-  }
-  if (options.resume || options.force) return;
-  if (waits) {
-    throw ConfigError(
-        fmt::format("{}: a calibration was stopped here; --resume goes on, --force begins anew",
-                    files.progress.string()));
-  }
-  if (!fs::exists(files.calibration, none)) return;
-  try {
-    read_calibration(files.calibration);
-  } catch (const ConfigError&) {
-    throw ConfigError(
-        fmt::format("--out {}: is there, but is no calibration; name another file, "
-                    "or --force",
-                    files.calibration.string()));
-  }
-}
-
-/// Pictures cannot be asked to hang a weight, and a person before a camera needs no pipe.
-void check_source(const CalibrateWrenchOptions& options) {
-  if (!options.emulated_cell.empty() && split_spec(options.source).kind != "sim") {
-    throw ConfigError(
-        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
-                    options.source));
-  }
-  if (split_spec(options.source).kind == "images") {
-    throw ConfigError(fmt::format(
-        "--source {}: nobody is there who could do what the plan asks; give a camera, sim, or the "
-        "recording of a calibration",
-        options.source));
-  }
-  if (!options.record) return;
-  check_recording(*options.record, "--record");
-  if (options.resume) {
-    throw ConfigError(
-        "--record, --resume: what was measured before would not be in the recording; leave one "
-        "out");
-  }
-}
-
-/// What a recording has already, or cannot do any more.
-void check_replay_options(const CalibrateWrenchOptions& options) {
-  if (!options.record && !options.resume && !options.seconds && options.board.empty() &&
-      options.cells.empty() && options.optoforce.empty() && options.counts_per_unit.empty() &&
-      options.emulated_cell.empty())
-    return;
-  throw ConfigError(
-      "--record, --resume, --seconds, --board, --cells, --optoforce, --counts-per-unit, "
-      "--emulated-cell: are for loads that are still to come, the recording has its own; leave "
-      "them out");
 }
 
 std::string now_utc() {
@@ -191,6 +118,7 @@ void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject
                                     .require_all = options.require_all,
                                     .zero_in_use = data.zero_in_use});
   check_some_axis(fit);
+  const std::string poorer = what_is_lost(subject.files, fit);
   add_predictions(plan, fit, data);
   data.trial.sensor = sensor_sha256(subject.sensor);
   write_calibration(subject.files, subject.sensor_text, options.sensor, subject.sensor, data,
@@ -200,6 +128,7 @@ void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject
   for (const std::string& line :
        describe(plan, data, fit, subject.range, subject.sensor.wrench.range))
     tell(line);
+  if (!poorer.empty()) tell(poorer);
   tell(fmt::format("written: {}, {} and wrench.calibration in {}",
                    subject.files.calibration.string(), subject.files.data.string(),
                    options.sensor));
@@ -235,27 +164,6 @@ bool end_recording(CalibrationRecorder& recorder, const std::string& file) {
                        : ""));
   if (!trouble.empty()) tell(trouble);
   return trouble.empty() && state.lost_frames == 0 && state.lost_others == 0;
-}
-
-/// A rest that is learned at the start is that of the mounting in which the program was started.
-void check_resumable(const SensorConfig& sensor, const WrenchPlan& plan, const Progress& progress,
-                     const fs::path& partial) {
-  if (rest_is_calibrated(sensor)) return;
-  int next = 0;
-  const auto done = [&] {
-    return std::any_of(progress.records.begin(), progress.records.end(),
-                       [&](const StepRecord& record) { return record.step == next; }) ||
-           std::find(progress.skipped.begin(), progress.skipped.end(), next) !=
-               progress.skipped.end();
-  };
-  while (next < static_cast<int>(plan.steps.size()) && done()) ++next;
-  if (next == static_cast<int>(plan.steps.size()) ||
-      plan.steps[static_cast<std::size_t>(next)].mounting == plan.steps.front().mounting)
-    return;
-  throw ConfigError(fmt::format(
-      "--resume: this sensor's rest is learned anew at every start, and now it lies otherwise than "
-      "when {} was begun; run `tagwrench calibrate target`, then begin again with --force",
-      partial.string()));
 }
 
 int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles& files) {

@@ -194,6 +194,17 @@ TEST_F(CalibrateWrench, AxesThatNoStepReachesAreCompletedAndMarkedOrRefusedByNam
   EXPECT_NE(axes[5].at("reason"), "");
 }
 
+TEST_F(CalibrateWrench, WhoLosesAxesOfTheOneBeforeIsToldAndKeepsIt) {
+  ASSERT_EQ(calibrate("six_orientations").status, 0);
+  const std::string old = read_file(out_);
+  const Outcome poorer = calibrate(plan_);
+  ASSERT_EQ(poorer.status, 0) << poorer.err;
+  EXPECT_NE(poorer.err.find("the calibration before knew Fx "), std::string::npos) << poorer.err;
+  EXPECT_EQ(read_file(out_.string() + ".before"), old);
+  const Outcome alike = calibrate(plan_);
+  EXPECT_EQ(alike.err.find("the calibration before knew"), std::string::npos) << alike.err;
+}
+
 TEST_F(CalibrateWrench, StepsThatTellNoAxisReplaceNothing) {
   ASSERT_EQ(calibrate(plan_).status, 0);
   const std::string old = read_file(out_);

@@ -107,6 +107,25 @@ void check_some_axis(const WrenchFit& fit) {
       reasons));
 }
 
+std::string what_is_lost(const CalibrationFiles& files, const WrenchFit& fit) {
+  std::error_code none;
+  if (!fs::exists(files.calibration, none)) return {};
+  std::string lost;
+  try {
+    const CalibrationRecord before = read_calibration(files.calibration).record;
+    for (std::size_t i = 0; before.axis && i < 6; ++i) {
+      const bool knew = (*before.axis)[i].state == AxisState::calibrated;
+      if (knew && fit.axis[i].state != AxisState::calibrated)
+        lost += fmt::format("{}{}", lost.empty() ? "" : " ", kWrenchAxes[i]);
+    }
+  } catch (const ConfigError&) {
+    return {};  // it is no calibration, and --force was given
+  }
+  if (lost.empty()) return {};
+  return fmt::format("the calibration before knew {} by loads, this one does not; it is kept: {}",
+                     lost, files.before.string());
+}
+
 void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
                        const fs::path& sensor_file, const SensorConfig& sensor,
                        const WrenchData& data, Calibration calibration) {

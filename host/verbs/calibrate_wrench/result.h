@@ -26,6 +26,10 @@ CalibrationFiles files_of(const std::filesystem::path& calibration);
 /// ConfigError with every axis' reason.
 void check_some_axis(const WrenchFit& fit);
 
+/// What the calibration in the file knows by loads and this fit does not, in one line; empty:
+/// nothing, or there is none.
+std::string what_is_lost(const CalibrationFiles& files, const WrenchFit& fit);
+
 /// Writes data and calibration, and names it in sensor.yaml, whose text is `sensor_text`. An
 /// earlier calibration is kept as `before`, and its data likewise. Throws ConfigError or
 /// std::runtime_error; then the old calibration is in force.
