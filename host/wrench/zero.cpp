@@ -81,7 +81,8 @@ ZeroState ZeroTracking::judge(const Sample& sample, const Vector6& noise) noexce
 
 /// A hand is felt by what scatters: who merely rests his hand on the sensor does not get a zero.
 void ZeroTracking::answer(const Sample& sample) noexcept {
-  if (!asked_at_) asked_at_ = sample.capture_time;
+  const bool just_asked = !asked_at_;
+  if (just_asked) asked_at_ = sample.capture_time;
   const bool range_known = range_.maxCoeff() > 0;
   const bool at_rest =
       sample.zero_state == ZeroState::following || sample.zero_state == ZeroState::far;
@@ -100,6 +101,7 @@ void ZeroTracking::answer(const Sample& sample) noexcept {
   } else if (sample.capture_time - *asked_at_ >= options_.patience) {
     answer_ = at_rest ? ZeroAnswer::loaded : ZeroAnswer::moving;
   } else {
+    if (just_asked && asked_) answer_ = ZeroAnswer::waits;
     return;
   }
   if (!asked_ && answer_ != ZeroAnswer::done) answer_ = ZeroAnswer::none;

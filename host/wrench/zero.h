@@ -70,7 +70,8 @@ struct ZeroOptions {
 
 /// What became of a zero on demand.
 enum class ZeroAnswer : std::uint8_t {
-  none,      ///< nothing was asked, or it waits for rest
+  none,      ///< nothing was asked, or all is said
+  waits,     ///< not at rest yet; another answer follows
   done,      ///< what read is zero now
   loaded,    ///< it stands still, but as under a load
   moving,    ///< it did not come to rest: somebody holds it
@@ -93,12 +94,15 @@ class ZeroTracking {
   void follow(Sample& sample, const Vector6& noise) noexcept;
 
   bool follows() const noexcept { return follow_; }
-  /// Zero on demand, with the next sample at rest.
-  void ask() noexcept { asked_ = true; }
+  /// Zero on demand, with the next sample at rest. While it waits, asking again changes nothing.
+  void ask() noexcept {
+    if (!asked_) asked_at_.reset();
+    asked_ = true;
+  }
   /// The computer has slept, and what it left warm is cold: what reads next at rest is zero, where
   /// the zero may follow and within the band. If it was a load, it is given back when that goes.
   void wake() noexcept { woke_ = woke_ || (follow_ && !asked_); }
-  /// Told once for each ask().
+  /// Each is told once: for each ask() one that is final, where it takes time after `waits`.
   ZeroAnswer take_answer() noexcept { return std::exchange(answer_, ZeroAnswer::none); }
   /// How far it has moved from the one that was set, N and N m.
   const Vector6& moved() const noexcept { return moved_; }

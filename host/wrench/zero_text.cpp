@@ -6,6 +6,8 @@ std::string_view zero_text(ZeroAnswer answer) noexcept {
   switch (answer) {
     case ZeroAnswer::none:
       return {};
+    case ZeroAnswer::waits:
+      return "zero: waits until the platform rests; hands off";
     case ZeroAnswer::done:
       return "zero: what read is nothing now";
     case ZeroAnswer::loaded:

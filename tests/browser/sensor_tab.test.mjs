@@ -135,7 +135,7 @@ test('a few keys can be changed on the page, and the built-in sensor comes back'
   await page.getByLabel('Tag ids').fill('5, 9');
   await page.getByRole('button', { name: 'Use these' }).click();
   await page.locator('.sensor-panel p').first().filter({ hasText: 'tags 5, 9' }).waitFor();
-  await page.locator('.hint-words').filter({ hasText: 'sensor.yaml has tags 5 and 9' }).waitFor({ timeout: 30_000 });
+  await page.locator('.hint-words').filter({ hasText: 'sensor.yaml has tags 5 and 9' }).waitFor();
   await page.getByRole('button', { name: 'Published sensor' }).click();
   await page.locator('.sensor-panel p').first().filter({ hasText: 'published sensor: tags 5, 2' }).waitFor();
 });

@@ -89,8 +89,7 @@ test('a camera that is refused, in use, or without such a mode', { skip }, async
 });
 
 test('a tracker that cannot be fetched', { skip }, async () => {
-  const context = await bare.newContext();
-  const page = await context.newPage();
+  const { page, context } = await openPage(bare, 'about:blank');
   await page.route(/\.wasm$/, (route) => route.abort());
   await page.goto(host.url);
   await page.getByText('the tracker cannot be loaded').waitFor();
@@ -100,7 +99,7 @@ test('a tracker that cannot be fetched', { skip }, async () => {
 test('a picture without tags says what is wrong; another size than the sensor\'s is told', { skip }, async () => {
   const page = await says(wired, host.url, undefined);
   await started(page);
-  await page.locator('.hint-words').filter({ hasText: /no tag is seen|image is/ }).waitFor({ timeout: 60_000 });
+  await page.locator('.hint-words').filter({ hasText: /no tag is seen|image is/ }).waitFor();
   await page.getByLabel('Size', { exact: true }).selectOption('320x240');
   await page.getByText('delivers 320×240, but the sensor is described for 640×480').waitFor();
   await page.context().close();
@@ -154,7 +153,7 @@ test('a mirrored camera is noticed, and one button sets it right; then the zero 
   const browser = await openChromium({ clip: writeClip(folder, join(scratch('clip'), 'mirrored.y4m')) });
   const { page, faults } = await openPage(browser, host.url);
   await started(page);
-  await page.getByRole('button', { name: 'My camera is mirrored' }).click({ timeout: 60_000 });
+  await page.getByRole('button', { name: 'My camera is mirrored' }).click();
   await reached(page, 'ok');
   assert.ok(await page.getByRole('button', { name: 'My camera is mirrored' }).isHidden());
 
@@ -171,13 +170,13 @@ test('a mirrored camera is noticed, and one button sets it right; then the zero 
   }, newtons);
   await reads(-0.112);
   await page.keyboard.press('0');
-  await page.getByText('zero: what read is nothing now').waitFor({ timeout: 60_000 });
+  await page.getByText('zero: what read is nothing now').waitFor();
   await reads(0);
   assert.deepEqual(faults, []);
   await browser.close();
 });
 
-test('whoever moves the platform at the start is told to let it rest; a zero while it is pushed is refused', { skip: skip || reason('program') }, async () => {
+test('whoever moves the platform at the start is told to let it rest; a zero while it is pushed waits, and is refused', { skip: skip || reason('program') }, async () => {
   const folder = simulate({ scenario: 'seed: 3\ntrajectory: {motion: compound, rest_s: 0.24}\n', frames: 30 });
   const pictures = readTable(join(folder, 'frames.csv')).map(({ file }) => readFileSync(join(folder, file), 'base64'));
   const page = await says(bare, host.url, undefined, 'press Start');
@@ -188,7 +187,7 @@ test('whoever moves the platform at the start is told to let it rest; a zero whi
   await startButton(page).click();
   const status = page.locator('.status');
   const hint = page.locator('.hint-words');
-  await hint.filter({ hasText: 'the platform moved while its rest pose was learned; let it rest' }).waitFor({ timeout: 60_000 });
+  await hint.filter({ hasText: 'the platform moved while its rest pose was learned; let it rest' }).waitFor();
   await status.filter({ hasText: 'hold still: learning the rest pose' }).waitFor();
   await shoot(page, 'sensor-hold-still');
   await page.evaluate(() => window.show('still'));
@@ -204,7 +203,8 @@ test('whoever moves the platform at the start is told to let it rest; a zero whi
   await page.evaluate(() => window.show('moving'));
   await most('pushed');
   await page.getByRole('button', { name: 'Zero' }).click();
-  await hint.filter({ hasText: 'zero: refused, the platform did not come to rest; let go of it' }).waitFor({ timeout: 60_000 });
+  await hint.filter({ hasText: 'zero: waits until the platform rests; hands off' }).waitFor();
+  await hint.filter({ hasText: 'zero: refused, the platform did not come to rest; let go of it' }).waitFor();
   await shoot(page, 'sensor-zero-refused');
   await page.evaluate(() => window.show('still'));
   await most('rest'); // what read at rest before is nothing still

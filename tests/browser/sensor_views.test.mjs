@@ -35,7 +35,7 @@ async function pushed(page) {
   await page.waitForFunction(() => {
     const force = Number(document.querySelectorAll('.readings tbody tr')[1].querySelector('.now').textContent.replace('\u2212', '-'));
     return Math.abs(force) > 0.2;
-  }, null, { timeout: 60_000, polling: 50 });
+  }, null, { polling: 50 });
 }
 
 const kWatchShifts = () => {

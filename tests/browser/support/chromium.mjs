@@ -13,6 +13,8 @@
 //   kViews    desktop and phone, light and dark: {name, options for openPage}
 import { chromiumPath, nodePackage, screenshotPath } from './environment.mjs';
 
+const kPatience_ms = 120_000; // of a busy machine; nothing is judged by time
+
 const kArguments = [
   '--no-sandbox',
   '--disable-gpu',
@@ -31,11 +33,12 @@ export async function openChromium({ clip, camera = false, ask = false, hosts = 
   if (!ask) all.push('--use-fake-ui-for-media-stream');
   const rules = Object.entries(hosts).map(([name, address]) => `MAP ${name} ${address}`);
   if (rules.length) all.push(`--host-resolver-rules=${rules.join(',')}`);
-  return nodePackage('playwright-core').chromium.launch({ executablePath: chromiumPath, headless: true, args: all });
+  return nodePackage('playwright-core').chromium.launch({ executablePath: chromiumPath, headless: true, args: all, timeout: kPatience_ms });
 }
 
 export async function openPage(browser, url, { init, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
+  context.setDefaultTimeout(kPatience_ms);
   const page = await context.newPage();
   const faults = [];
   const foreign = [];

@@ -16,7 +16,7 @@ export async function started(page) {
   if ((await words.textContent()) === 'press Start') await startButton(page).click();
 }
 
-export const reached = (page, status) => page.locator(`.status[data-status='${status}']`).waitFor({ timeout: 60_000 });
+export const reached = (page, status) => page.locator(`.status[data-status='${status}']`).waitFor();
 
 export async function load(page, ...paths) {
   await page.locator('.sensor-panel input[type=file]').setInputFiles(paths);
@@ -31,7 +31,7 @@ export async function record(page, rows) {
   await page.getByRole('button', { name: 'Record', exact: true }).click();
   await page.waitForFunction(
     (wanted) => Number(/^(\d+) samples/.exec(document.querySelector('.record-panel .row > .number').textContent)?.[1]) >= wanted,
-    rows, { timeout: 120_000 },
+    rows,
   );
   await page.getByRole('button', { name: 'Stop recording' }).click();
   const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', { name: 'Download CSV' }).click()]);
