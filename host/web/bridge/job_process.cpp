@@ -50,6 +50,8 @@ struct Child {
   std::string program;
   std::vector<std::string> words;
   std::vector<char*> argv;
+  Pipe* go;  ///< a byte comes once its end is watched: where SIGCHLD is ignored, one that has ended
+             ///< is nobody
   pid_t parent = ::getpid();
 
   [[noreturn]] void become() {
@@ -59,6 +61,9 @@ struct Child {
     ::signal(SIGPIPE, SIG_DFL);
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(127);
+    ::close(go->write.get());
+    char told;
+    if (::read(go->read.get(), &told, 1) != 1) ::_exit(127);
     for (std::size_t i = 0; i < fds.size(); ++i) {
       if (::dup2(fds[i], static_cast<int>(i)) < 0) ::_exit(127);
     }
@@ -99,12 +104,14 @@ std::shared_ptr<JobProcess> JobProcess::start(boost::asio::io_context& context,
 
 void JobProcess::spawn(const std::string& program, const JobCommand& command) {
   Pipe in = make_pipe(), out = make_pipe(), err = make_pipe(), events = make_pipe();
+  Pipe go = make_pipe();
   ::fcntl(events.write.get(), F_SETPIPE_SZ, kRoom);
   Child child{{in.read.get(), out.write.get(), err.write.get(), events.write.get()},
               {0, 1, 2, kEventsFd},
               program,
               {"tagwrench"},
-              {}};
+              {},
+              &go};
   child.words.insert(child.words.end(), command.arguments.begin(), command.arguments.end());
   if (command.tells_events) child.words.push_back(fmt::format("--events={}", kEventsFd));
   for (std::string& word : child.words) child.argv.push_back(word.data());
@@ -120,6 +127,9 @@ void JobProcess::spawn(const std::string& program, const JobCommand& command) {
     throw ConfigError(fmt::format("job: its end cannot be watched: {}; end other programs",
                                   std::strerror(errno)));
   }
+  if (::write(go.write.get(), "g", 1) != 1)
+    throw ConfigError(
+        fmt::format("job: {} did not start: {}; try again", program, std::strerror(errno)));
   for (auto [stream, fd] : {std::pair{&out_.stream, &out.read},
                             {&err_.stream, &err.read},
                             {&events_.stream, &events.read},
