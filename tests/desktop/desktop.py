@@ -201,10 +201,10 @@ class Desk(contextlib.ExitStack):
                 check_shift(axis, before, after)
 
 
-def end(process):
+def end(process, patience=1):
     process.send_signal(signal.SIGTERM)
     try:
-        process.wait(1)
+        process.wait(patience)
     except subprocess.TimeoutExpired:
         process.kill()  # Blender takes its time over SIGTERM
         process.wait()

@@ -154,7 +154,7 @@ def follow(desk, kind, windows, programs):
     wait_until(lambda: heard(f"profile: cad ({cad_told})"), "the other window")
     windows.window("mail")
     wait_until(lambda: heard("profile: research (mail)"), "a new window that no profile is for")
-    desktop.end(bridge)
+    desktop.end(bridge, desktop.PATIENCE)
     check(f"{kind}: the profile follows the focus", bridge.returncode == 0, f"exit {bridge.returncode}")
 
 

@@ -13,9 +13,10 @@ IDENTITY = "usb:0403:6001"
 REFERENCE = "/run/reference.csv"
 
 
-def touch(path):
-    with open(path, "w", encoding="utf-8"):
-        pass
+def wish(what):
+    """Of the hand outside, tests/kernel/rig/usb_plug.py."""
+    with open(f"/run/rig/{what}", "w", encoding="utf-8") as file:
+        file.write("please\n")
 
 
 def cells(lines):
@@ -54,11 +55,11 @@ def body(setup):
     watch.wait_line("{", patience=60)
     second, _, err = rig.run(setup.tagwrench, "board", "info", "--port", port, patience=60)
     rig.check("a second host is told that the port is taken", second == 2 and err.count("\n") == 1, err)
-    touch("/run/rig/usb-unplug")
+    wish("usb-unplug")
     rig.check("an unplugged board is said to be gone", watch.wait_error("the port is gone"), watch.state())
     rig.check("and its device node goes", rig.wait_until(lambda: not os.path.exists(port)), port)
     seen = len(watch.out)
-    touch("/run/rig/usb-plug")
+    wish("usb-plug")
     watch.wait_line("{", since=seen, patience=60)
     rig.check("plugged in again it goes on by itself", watch.running(), watch.state())
     rig.wait_until(lambda: len({s["channel"] for s in cells(watch.out[seen:])}) == 4)

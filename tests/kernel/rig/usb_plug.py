@@ -38,7 +38,7 @@ def main(folder):
                 ("usb-plug", "device_add", {"driver": "usb-serial", "chardev": "adapter", "bus": "usb.0", "port": "1",
                                            "serial": "bench", "id": "plug"})):
             path = f"{folder}/{wish}"
-            if not os.path.exists(path):
+            if not os.path.exists(path) or os.path.getsize(path) == 0:  # the guest is still opening it
                 continue
             reply = ask(stream, command, **arguments)
             if "error" in reply:  # the device that leaves is not quite gone yet
