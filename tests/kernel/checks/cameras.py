@@ -122,12 +122,12 @@ def interruptions(setup):
     start_time = time.monotonic() - start
     rig.check("the gain is locked while the bridge runs", controls().get("gain_automatic") == "value=0", controls())
     ends, left, altered = [bridge.stop(signal.SIGINT)], [], []
-    for step in range(12):
+    for step in range(8):
         gain = "gain_automatic=0,gain=33" if step % 2 else "gain_automatic=1"
         rig.run("v4l2-ctl", "-d", VIVID, "--set-ctrl", gain)
         before = controls()
         bridge = start_on_vivid(setup)
-        time.sleep(start_time * step / 8)
+        time.sleep(start_time * step / 5)
         ends.append(bridge.stop(signal.SIGINT))
         if not rig.wait_until(lambda: not rig.our_devices() and not rig.processes("tw-")):
             left.append(rig.our_devices())
@@ -136,7 +136,7 @@ def interruptions(setup):
     rig.check("Ctrl-C at any moment: a clean end", all(end in (0, -signal.SIGINT) for end in ends), ends)
     rig.check("Ctrl-C at any moment: no device left", not left, left)
     rig.check("Ctrl-C at any moment: the camera's controls as before", not altered, altered)
-    print(f"     exit statuses every {start_time / 8:.2f} s: {ends[1:]}")
+    print(f"     exit statuses every {start_time / 5:.2f} s: {ends[1:]}")
 
 
 def settings_from_a_page(setup):
