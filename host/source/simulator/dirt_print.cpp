@@ -30,9 +30,10 @@ void draw(Texture& t, const Mark& mark, double reflectance) {
       const double share = std::clamp(0.5 - mark.distance(t.x(u), t.y(v)) / kEdge, 0.0, 1.0);
       if (share <= 0) continue;
       // Texels hold reflectance times coverage; dirt lies on paper alone.
-      float& texel = t.reflectance[t.index(u, v)];
-      const double paper = t.coverage[t.index(u, v)];
-      texel = static_cast<float>(texel + share * (reflectance * paper - texel));
+      Texel& texel = t.texels[t.index(u, v)];
+      const double paper = texel.coverage;
+      texel.reflectance =
+          static_cast<float>(texel.reflectance + share * (reflectance * paper - texel.reflectance));
     }
   }
 }

@@ -53,7 +53,7 @@ double draw_screw(double below, double x, double y, double screw_x) {
 
 Texture print_plate(const Mechanics& mechanics, double half_x, double half_y, double texels_per_m,
                     std::uint64_t seed) {
-  Texture t = Texture::of_size(half_x, half_y, texels_per_m, true);
+  Texture t = Texture::of_size(half_x, half_y, texels_per_m);
   Random random(seed, kPlate);
   const SmoothNoise stains(random, 1.3e-3), scratches(random, 0.12e-3), grain(random, 0.04e-3);
   const double sx = mechanics.spring_half_spacing_x;
@@ -71,7 +71,8 @@ Texture print_plate(const Mechanics& mechanics, double half_x, double half_y, do
       for (const double side_x : {-sx, sx}) {
         for (const double side_y : {-sy, sy}) shade = draw_spring(shade, x, y, side_x, side_y);
       }
-      t.reflectance[t.index(u, v)] = static_cast<float>(std::clamp(shade, 0.02, 1.0));
+      t.texels[t.index(u, v)] = {.reflectance = static_cast<float>(std::clamp(shade, 0.02, 1.0)),
+                                 .coverage = 1};
     }
   }
   return t;
@@ -80,7 +81,7 @@ Texture print_plate(const Mechanics& mechanics, double half_x, double half_y, do
 Texture print_pad(double half_paper, double margin, double texels_per_m, std::uint64_t seed) {
   const double half_x = half_paper + margin;
   const double half_y = half_paper + 0.35 * margin;
-  Texture t = Texture::of_size(half_x, half_y, texels_per_m, false);
+  Texture t = Texture::of_size(half_x, half_y, texels_per_m);
   Random random(seed, kPlate + 1);
   const SmoothNoise glue(random, 0.5e-3), grain(random, 0.06e-3);
   for (int v = 0; v < t.height; ++v) {
@@ -90,8 +91,9 @@ Texture print_pad(double half_paper, double margin, double texels_per_m, std::ui
       const double cover = inside(std::abs(x) - half_x) * inside(std::abs(y) - half_y);
       const double lines = 0.03 * std::sin(kTau * x / 0.21e-3);
       const double shade = kPadReflectance + lines + 0.04 * glue(x, y) + 0.01 * grain(x, y);
-      t.coverage[t.index(u, v)] = static_cast<float>(cover);
-      t.reflectance[t.index(u, v)] = static_cast<float>(cover * std::clamp(shade, 0.0, 1.0));
+      t.texels[t.index(u, v)] = {
+          .reflectance = static_cast<float>(cover * std::clamp(shade, 0.0, 1.0)),
+          .coverage = static_cast<float>(cover)};
     }
   }
   return t;

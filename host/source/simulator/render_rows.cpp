@@ -2,11 +2,17 @@
 // written so that the compiler turns the arithmetic into vector code.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "host/source/simulator/renderer.h"
 
 namespace tagwrench::sim {
 namespace {
+
+// GCC's and clang's, which every processor has: reflectance and coverage of one texel, and those of
+// its neighbour to the right.
+using OneTexel [[gnu::vector_size(8)]] = float;
+using TwoTexels [[gnu::vector_size(16)]] = float;
 
 // Where in a pixel each of its 2 x 2 samples lies.
 struct Offset {
@@ -25,10 +31,22 @@ constexpr int kEvenSamples = 5;
 // left.
 constexpr int kOrders[4][4] = {{0, 1, 3, 2}, {0, 3, 1, 2}, {3, 2, 0, 1}, {3, 0, 2, 1}};
 
-float bilinear(const float* texel, int stride, float fu, float fv) {
-  const float top = texel[0] + fu * (texel[1] - texel[0]);
-  const float bottom = texel[stride] + fu * (texel[stride + 1] - texel[stride]);
-  return top + fv * (bottom - top);
+/// Bilinear, of what lies (u, v) texels from the first.
+OneTexel texel_between(const Texture& t, float u, float v) {
+  const int column = static_cast<int>(u);
+  const int row = static_cast<int>(v);
+  const float fu = u - static_cast<float>(column);
+  const float fv = v - static_cast<float>(row);
+  const Texel* texel = t.texels.data() + row * t.width + column;
+  TwoTexels top, bottom;
+  std::memcpy(&top, texel, sizeof top);
+  std::memcpy(&bottom, texel + t.width, sizeof bottom);
+  const TwoTexels left = __builtin_shufflevector(top, bottom, 0, 1, 4, 5);
+  const TwoTexels right = __builtin_shufflevector(top, bottom, 2, 3, 6, 7);
+  const TwoTexels rows = left + fu * (right - left);
+  const OneTexel upper = __builtin_shufflevector(rows, rows, 0, 1);
+  const OneTexel lower = __builtin_shufflevector(rows, rows, 2, 3);
+  return upper + fv * (lower - upper);
 }
 
 // Texel coordinates of rays, kept inside of the texture (whose outermost texels are empty or
@@ -52,18 +70,12 @@ void find_texels(const std::array<float, 9>& h, const float* x, const float* y, 
 void Renderer::draw_opaque(const View& view, int row) noexcept {
   const Texture& t = *view.texture;
   const int width = camera_.width_px;
-  const float* texels = t.reflectance.data();
   float* u = scratch_.u.data();
   float* v = scratch_.v.data();
   find_texels(view.instants[0], rays_.x(row), rays_.y(row), width,
               static_cast<float>(t.width) - 1.01F, static_cast<float>(t.height) - 1.01F, u, v);
   float* out = scene_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
-  for (int i = 0; i < width; ++i) {
-    const int ui = static_cast<int>(u[i]);
-    const int vi = static_cast<int>(v[i]);
-    out[i] = view.shade * bilinear(texels + vi * t.width + ui, t.width,
-                                   u[i] - static_cast<float>(ui), v[i] - static_cast<float>(vi));
-  }
+  for (int i = 0; i < width; ++i) out[i] = view.shade * texel_between(t, u[i], v[i])[0];
 }
 
 void Renderer::add_samples(const Texture& t, const TexelFromRay& h, int count, int first,
@@ -72,17 +84,12 @@ void Renderer::add_samples(const Texture& t, const TexelFromRay& h, int count, i
   float* v = scratch_.v.data();
   find_texels(h, scratch_.x.data(), scratch_.y.data(), count, static_cast<float>(t.width) - 1.01F,
               static_cast<float>(t.height) - 1.01F, u, v);
-  const float* reflectance = t.reflectance.data();
-  const float* coverage = t.coverage.data();
-  for (int i = 0; i < count; ++i) {
-    const int ui = static_cast<int>(u[i]);
-    const int vi = static_cast<int>(v[i]);
-    const float fu = u[i] - static_cast<float>(ui);
-    const float fv = v[i] - static_cast<float>(vi);
-    const int at = vi * t.width + ui;
-    const auto to = static_cast<std::size_t>(first + i * stride);
-    scratch_.reflectance[to] += bilinear(reflectance + at, t.width, fu, fv);
-    scratch_.coverage[to] += bilinear(coverage + at, t.width, fu, fv);
+  Texel* to = scratch_.sum.data() + first;
+  for (int i = 0; i < count; ++i, to += stride) {
+    OneTexel sum;
+    std::memcpy(&sum, to, sizeof sum);
+    sum += texel_between(t, u[i], v[i]);
+    std::memcpy(static_cast<void*>(to), &sum, sizeof sum);
   }
 }
 
@@ -91,8 +98,7 @@ void Renderer::draw_coarse(const View& view, int row) noexcept {
   if (count <= 0) return;
   std::copy_n(rays_.x(row) + view.left, count, scratch_.x.begin());
   std::copy_n(rays_.y(row) + view.left, count, scratch_.y.begin());
-  std::fill_n(scratch_.reflectance.begin(), count, 0.0F);
-  std::fill_n(scratch_.coverage.begin(), count, 0.0F);
+  std::fill_n(scratch_.sum.begin(), count, Texel{});
   add_samples(*view.texture, view.instants[0], count, 0, 1);
   composite(view, row, 1.0F);
 }
@@ -100,8 +106,7 @@ void Renderer::draw_coarse(const View& view, int row) noexcept {
 void Renderer::draw_fine(const View& view, int row) noexcept {
   const int count = view.right - view.left;
   if (count <= 0) return;
-  std::fill_n(scratch_.reflectance.begin(), count, 0.0F);
-  std::fill_n(scratch_.coverage.begin(), count, 0.0F);
+  std::fill_n(scratch_.sum.begin(), count, Texel{});
   const float* x = rays_.x(row) + view.left;
   const float* y = rays_.y(row) + view.left;
   const auto row_step = rays_.x(1) - rays_.x(0);
@@ -139,8 +144,7 @@ void Renderer::draw_fine(const View& view, int row) noexcept {
 void Renderer::draw_even(const View& view, int row) noexcept {
   const int count = view.right - view.left;
   if (count <= 0) return;
-  std::fill_n(scratch_.reflectance.begin(), count, 0.0F);
-  std::fill_n(scratch_.coverage.begin(), count, 0.0F);
+  std::fill_n(scratch_.sum.begin(), count, Texel{});
   const float* x = rays_.x(row) + view.left;
   const float* y = rays_.y(row) + view.left;
   const auto row_step = rays_.x(1) - rays_.x(0);
@@ -166,11 +170,10 @@ void Renderer::composite(const View& view, int row, float weight) noexcept {
   float* out = scene_.data() +
                static_cast<std::size_t>(row) * static_cast<std::size_t>(camera_.width_px) +
                view.left;
-  const float* reflectance = scratch_.reflectance.data();
-  const float* coverage = scratch_.coverage.data();
+  const Texel* sum = scratch_.sum.data();
   const float lit = weight * view.shade;
   for (int i = 0; i < view.right - view.left; ++i) {
-    out[i] = out[i] * (1.0F - weight * coverage[i]) + lit * reflectance[i];
+    out[i] = out[i] * (1.0F - weight * sum[i].coverage) + lit * sum[i].reflectance;
   }
 }
 

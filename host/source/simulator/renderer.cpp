@@ -64,6 +64,7 @@ Renderer::Renderer(const Scenario& scenario)
                      &scratch_.coverage}) {
     line->resize(columns + 2);
   }
+  scratch_.sum.resize(columns + 2);
   Random random(seed_, kNoiseTable);
   normals_.resize(kNormals + columns);
   for (float& value : normals_) value = static_cast<float>(random.normal());

@@ -83,6 +83,7 @@ class Renderer {
   };
   struct Scratch {  ///< one row of texel lookups
     std::vector<float> x, y, u, v, reflectance, coverage;
+    std::vector<Texel> sum;  ///< of each pixel's samples
   };
 
   void build_layers(const Scenario& scenario);

@@ -157,7 +157,7 @@ Texture print_tag(const Target& target, const TagCells& cells, double texels_per
                   std::uint64_t seed) {
   const double half_paper = 0.5 * target.tag_size + target.border;
   const double half = half_paper + kLargestRaggedness * target.paper_raggedness;
-  Texture t = Texture::of_size(half, half, texels_per_m, false);
+  Texture t = Texture::of_size(half, half, texels_per_m);
   Random random(seed, kPrint);
   const SmoothNoise ink_x(random, kInkEdgeSize), ink_y(random, kInkEdgeSize);
   const SmoothNoise cut_x(random, kCutSize), cut_y(random, kCutSize);
@@ -179,8 +179,8 @@ Texture print_tag(const Target& target, const TagCells& cells, double texels_per
       const double clean =
           target.paper_reflectance + black * (target.ink_reflectance - target.paper_reflectance);
       const double reflectance = std::clamp(clean + target.ink_grain * grain(x, y), 0.0, 1.0);
-      t.coverage[t.index(u, v)] = static_cast<float>(paper);
-      t.reflectance[t.index(u, v)] = static_cast<float>(paper * reflectance);
+      t.texels[t.index(u, v)] = {.reflectance = static_cast<float>(paper * reflectance),
+                                 .coverage = static_cast<float>(paper)};
     }
   }
   return t;

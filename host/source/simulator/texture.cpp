@@ -37,16 +37,14 @@ std::vector<float> blurred_columns(const std::vector<float>& from, int width,
 
 }  // namespace
 
-Texture Texture::of_size(double half_x, double half_y, double texels_per_m, bool opaque) {
+Texture Texture::of_size(double half_x, double half_y, double texels_per_m) {
   Texture t;
   t.texels_per_m = texels_per_m;
   t.width = 2 * static_cast<int>(std::ceil(half_x * texels_per_m)) + 4;
   t.height = 2 * static_cast<int>(std::ceil(half_y * texels_per_m)) + 4;
   t.centre_u = 0.5 * (t.width - 1);
   t.centre_v = 0.5 * (t.height - 1);
-  const std::size_t size = static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.height);
-  t.reflectance.assign(size, 0.0F);
-  if (!opaque) t.coverage.assign(size, 0.0F);
+  t.texels.resize(static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.height));
   return t;
 }
 
@@ -59,18 +57,17 @@ Texture softened(const Texture& t, double sigma_texels) {
   out.height += 2 * more;
   out.centre_u += more;
   out.centre_v += more;
-  const auto soften = [&](const std::vector<float>& from) {
-    if (from.empty()) return from;
-    std::vector<float> wide(static_cast<std::size_t>(out.width) *
-                            static_cast<std::size_t>(out.height));
+  out.texels.assign(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height), {});
+  for (float Texel::*part : {&Texel::reflectance, &Texel::coverage}) {
+    std::vector<float> wide(out.texels.size());
     for (int v = 0; v < t.height; ++v) {
-      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(t.index(0, v)), t.width,
-                  wide.begin() + static_cast<std::ptrdiff_t>(out.index(more, v + more)));
+      for (int u = 0; u < t.width; ++u)
+        wide[out.index(u + more, v + more)] = t.texels[t.index(u, v)].*part;
     }
-    return blurred_columns(blurred_columns(wide, out.width, weights), out.height, weights);
-  };
-  out.reflectance = soften(t.reflectance);
-  out.coverage = soften(t.coverage);
+    const std::vector<float> soft =
+        blurred_columns(blurred_columns(wide, out.width, weights), out.height, weights);
+    for (std::size_t i = 0; i < soft.size(); ++i) out.texels[i].*part = soft[i];
+  }
   return out;
 }
 

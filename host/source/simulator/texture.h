@@ -8,20 +8,25 @@
 
 namespace tagwrench::sim {
 
+/// `reflectance` is multiplied by `coverage`; of an opaque picture the coverage counts for nothing.
+/// Side by side, for whoever looks up one needs the other.
+struct Texel {
+  float reflectance = 0;
+  float coverage = 0;
+};
+
 /// A picture on a plane. The plane point (x, y), in metres, lies at texel (x, y) * texels_per_m +
-/// (centre_u, centre_v), texel centres at integers. `reflectance` is multiplied by `coverage`; an
-/// empty `coverage` means opaque.
+/// (centre_u, centre_v), texel centres at integers.
 struct Texture {
   int width = 0;
   int height = 0;
   double texels_per_m = 0;
   double centre_u = 0;
   double centre_v = 0;
-  std::vector<float> reflectance;
-  std::vector<float> coverage;
+  std::vector<Texel> texels;
 
   /// A picture of +-half_x by +-half_y metres; fill it texel by texel.
-  static Texture of_size(double half_x, double half_y, double texels_per_m, bool opaque);
+  static Texture of_size(double half_x, double half_y, double texels_per_m);
 
   std::size_t index(int u, int v) const {
     return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
