@@ -16,9 +16,11 @@ struct tagwrench_device {
 // Reports that are drained at once: the kernel keeps 64, the rest came meanwhile.
 enum { kMostDrained = 256 };
 
-// hidapi's libusb backend knows no usages and says 0.
+// hidapi's libusb backend knows no usages and says 0. A device without a path went while it was
+// looked at.
 static bool is_wrench(const struct hid_device_info* d) {
-  return d->vendor_id == TAGWRENCH_VENDOR_ID && d->product_id == TAGWRENCH_PRODUCT_ID &&
+  return d->path != NULL && d->vendor_id == TAGWRENCH_VENDOR_ID &&
+         d->product_id == TAGWRENCH_PRODUCT_ID &&
          (d->usage_page == TAGWRENCH_USAGE_PAGE || d->usage_page == 0);
 }
 
@@ -92,7 +94,7 @@ tagwrench_device* tagwrench_open_path(const char* path, char* why, size_t why_si
   snprintf(info.path, sizeof info.path, "%s", path);
   struct hid_device_info* all = hid_enumerate(0, 0);
   for (const struct hid_device_info* d = all; d != NULL; d = d->next) {
-    if (strcmp(d->path, path) == 0) describe(d, &info);
+    if (d->path != NULL && strcmp(d->path, path) == 0) describe(d, &info);
   }
   hid_free_enumeration(all);
   return open_described(&info, why, why_size);

@@ -53,6 +53,7 @@ std::vector<HidNode> hid_nodes() {
   std::vector<HidNode> nodes;
   hid_device_info* all = hid_enumerate(0, 0);
   for (const hid_device_info* d = all; d != nullptr; d = d->next) {
+    if (d->path == nullptr) continue;  // it went while it was looked at
     const std::string product = utf8(d->product_string);
     const std::optional<HidKind> kind = kind_of(*d, product);
     // A device with several collections is listed several times.
