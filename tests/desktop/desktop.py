@@ -147,7 +147,7 @@ class Desk(contextlib.ExitStack):
 
     def screen(self):
         ours, theirs = os.pipe()
-        self.start("Xvfb", "-displayfd", str(theirs), "-screen", "0", "800x600x24", "-nolisten", "tcp", log="xvfb",
+        self.start("Xvfb", "-displayfd", str(theirs), "-screen", "0", "800x600x24", "-noreset", "-nolisten", "tcp", log="xvfb",
                    pass_fds=[theirs])
         os.close(theirs)
         with os.fdopen(ours, encoding="ascii") as told:

@@ -35,7 +35,7 @@ class Focus : public testing::Test {
       ::prctl(PR_SET_PDEATHSIG, SIGTERM);
       ::dup2(ends[1], 3);
       ::dup2(::open("/dev/null", O_WRONLY), 2);
-      ::execlp("Xvfb", "Xvfb", "-displayfd", "3", "-nolisten", "tcp", nullptr);
+      ::execlp("Xvfb", "Xvfb", "-displayfd", "3", "-noreset", "-nolisten", "tcp", nullptr);
       ::_exit(127);
     }
     ::close(ends[1]);
