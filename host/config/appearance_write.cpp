@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 #include <vector>
 
 #include "host/config/appearance_file.h"
 #include "host/config/sensor_edit.h"
+#include "host/source/png_write.h"
 
 namespace tagwrench {
 
@@ -16,14 +16,12 @@ void save_rest_image(const std::filesystem::path& path, const RestImage& image) 
           static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
     throw std::invalid_argument("rest image: size and levels do not agree");
   }
-  cv::Mat picture(image.height, image.width, CV_16UC1);
-  std::transform(image.level.begin(), image.level.end(), picture.ptr<std::uint16_t>(),
-                 [](float level) {
-                   return static_cast<std::uint16_t>(
-                       std::clamp(std::round(level * kRestCountsPerLevel), 0.0F, 65535.0F));
-                 });
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", picture, bytes);
+  std::vector<std::uint16_t> counts(image.level.size());
+  std::transform(image.level.begin(), image.level.end(), counts.begin(), [](float level) {
+    return static_cast<std::uint16_t>(
+        std::clamp(std::round(level * kRestCountsPerLevel), 0.0F, 65535.0F));
+  });
+  const std::vector<std::uint8_t> bytes = encode_png(counts.data(), image.width, image.height);
   write_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 

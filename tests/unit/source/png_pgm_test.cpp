@@ -6,6 +6,7 @@
 
 #include "host/source/pgm.h"
 #include "host/source/png.h"
+#include "host/source/png_write.h"
 
 namespace tagwrench {
 namespace {
@@ -51,6 +52,20 @@ TEST(Png, SixteenBitsComeBackAsTheyAreOrAsTheirUpperEight) {
   for (std::size_t i = 0; i < grey.size(); ++i) EXPECT_EQ(grey[i], counts[i] / 256) << i;
   EXPECT_FALSE(decode_png(encoded(picture(CV_8UC1), ".png"), 23, 17, counts));
   EXPECT_FALSE(decode_png(encoded(picture(CV_16UC3), ".png"), 23, 17, counts));
+}
+
+TEST(Png, WhatIsWrittenIsReadByOthersAsItWas) {
+  const cv::Mat grey = picture(CV_8UC1);
+  const cv::Mat deep = picture(CV_16UC1);
+  const cv::Mat grey_back =
+      cv::imdecode(encode_png(grey.ptr<std::uint8_t>(), 23, 17), cv::IMREAD_UNCHANGED);
+  const cv::Mat deep_back =
+      cv::imdecode(encode_png(deep.ptr<std::uint16_t>(), 23, 17), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(grey_back.type(), CV_8UC1);
+  ASSERT_EQ(deep_back.type(), CV_16UC1);
+  EXPECT_EQ(levels<std::uint8_t>(grey_back), levels<std::uint8_t>(grey));
+  EXPECT_EQ(levels<std::uint16_t>(deep_back), levels<std::uint16_t>(deep));
+  EXPECT_THROW(encode_png(grey.ptr<std::uint8_t>(), 0, 17), std::runtime_error);
 }
 
 TEST(Png, OfColoursTheLuminanceCounts) {
