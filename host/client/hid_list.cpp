@@ -1,14 +1,12 @@
 #include "host/client/hid_list.h"
 
 #include <fmt/format.h>
-#include <hidapi.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <string_view>
 
-#include "host/client/hid_text.h"
+#include "host/client/hid_sysfs.h"
 #include "host/client/six_axis.h"
 #include "host/client/tagwrench_hid.h"
 #include "host/config_error.h"
@@ -20,17 +18,11 @@ constexpr std::uint16_t kGenericDesktop = 0x01;
 constexpr std::uint16_t kMultiAxisController = 0x08;
 constexpr std::uint16_t kWrenchUsage = 0x10;
 
-std::string utf8(const wchar_t* text) {
-  std::array<char, TAGWRENCH_TEXT_SIZE> out{};
-  tagwrench_utf8(text, out.data(), out.size());
-  return out.data();
-}
-
-std::optional<HidKind> kind_of(const hid_device_info& d, const std::string& name) {
-  const bool ours = d.vendor_id == TAGWRENCH_VENDOR_ID && d.product_id == TAGWRENCH_PRODUCT_ID;
-  const bool ours_by_name = d.usage == kWrenchUsage && name.starts_with("tagwrench");
-  if (d.usage_page == TAGWRENCH_USAGE_PAGE && (ours || ours_by_name)) return HidKind::wrench;
-  if (d.usage_page == kGenericDesktop && d.usage == kMultiAxisController) return HidKind::puck;
+std::optional<HidKind> kind_of(const HidInterface& d, const HidUsage& usage) {
+  const bool ours = d.vendor == TAGWRENCH_VENDOR_ID && d.product == TAGWRENCH_PRODUCT_ID;
+  const bool ours_by_name = usage.usage == kWrenchUsage && d.name.starts_with("tagwrench");
+  if (usage.page == TAGWRENCH_USAGE_PAGE && (ours || ours_by_name)) return HidKind::wrench;
+  if (usage.page == kGenericDesktop && usage.usage == kMultiAxisController) return HidKind::puck;
   return std::nullopt;
 }
 
@@ -49,20 +41,15 @@ std::string HidNode::label() const {
                      path);
 }
 
-std::vector<HidNode> hid_nodes() {
+std::vector<HidNode> hid_nodes(const std::filesystem::path& hidraw_class) {
   std::vector<HidNode> nodes;
-  hid_device_info* all = hid_enumerate(0, 0);
-  for (const hid_device_info* d = all; d != nullptr; d = d->next) {
-    if (d->path == nullptr) continue;  // it went while it was looked at
-    const std::string product = utf8(d->product_string);
-    const std::optional<HidKind> kind = kind_of(*d, product);
-    // A device with several collections is listed several times.
-    const bool known = std::any_of(nodes.begin(), nodes.end(),
-                                   [&](const HidNode& node) { return node.path == d->path; });
-    if (!kind || known) continue;
-    nodes.push_back({*kind, d->vendor_id, d->product_id, d->path, utf8(d->serial_number), product});
+  for (const HidInterface& d : hid_interfaces(hidraw_class)) {
+    std::optional<HidKind> kind;
+    for (const HidUsage& usage : d.usages) {
+      if (!kind) kind = kind_of(d, usage);
+    }
+    if (kind) nodes.push_back({*kind, d.vendor, d.product, d.path, d.serial, d.name});
   }
-  hid_free_enumeration(all);
   std::stable_sort(nodes.begin(), nodes.end(),
                    [](const HidNode& a, const HidNode& b) { return a.kind < b.kind; });
   return nodes;

@@ -1,8 +1,8 @@
-// The 6-DOF and wrench HID devices that are plugged in, as hidapi lists them, and the choice of
-// one.
+// The 6-DOF and wrench HID devices that are plugged in, and the choice of one.
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,7 +32,7 @@ struct HidNode {
 };
 
 /// Wrench sensors first; no device needs to be readable for it to be listed.
-std::vector<HidNode> hid_nodes();
+std::vector<HidNode> hid_nodes(const std::filesystem::path& hidraw_class);
 
 /// What a person names a device by. Empty: the only one, or the wrench sensor beside pucks.
 class HidChoice {

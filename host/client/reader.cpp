@@ -157,7 +157,7 @@ class Reader {
 
   /// The device that was read before, or the one that was asked for.
   std::optional<HidNode> find() const {
-    const std::vector<HidNode> nodes = hid_nodes();
+    const std::vector<HidNode> nodes = hid_nodes(options_.hidraw_class);
     if (!node_) return choice_.among(nodes);
     const auto again = std::find_if(nodes.begin(), nodes.end(),
                                     [&](const HidNode& node) { return node.is_again(*node_); });
@@ -294,7 +294,7 @@ class Reader {
 }  // namespace
 
 int list_hid() {
-  const std::vector<HidNode> nodes = hid_nodes();
+  const std::vector<HidNode> nodes = hid_nodes(kHidrawClass);
   if (nodes.empty()) tell("no wrench sensor or 6-DOF device is plugged in");
   TextSink out("-", /*lossless=*/true);
   if (out.write(list_text(nodes)) != SendStatus::failed) return 0;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "host/client/hid_sysfs.h"
 #include "host/types.h"
 
 namespace tagwrench {
@@ -17,6 +18,7 @@ struct ReadOptions {
   Style style = Style::people;
   std::string log;             ///< CSV file beside what is printed; empty: none
   std::string nodes = "/dev";  ///< where device nodes come and go
+  std::string hidraw_class = kHidrawClass;
 };
 
 /// Prints the list; returns the exit status.

@@ -11,6 +11,7 @@ import rig
 USER = "1500"
 FOLDER = "/run/reading"
 JSONL = f"{FOLDER}/out/bridge.jsonl"
+LOG = f"{FOLDER}/out/log.csv"
 EXAMPLES = ("read_wrench.py", "log_events.py", "joystick_mapping.md")
 PLATEAU_N = 0.9  # of the held push: readings between the ends of it
 
@@ -106,7 +107,7 @@ def start_readers(setup):
                                  f"{FOLDER}/out/read.csv"),
         "read_wrench.c": reader("read_wrench.c", f"{FOLDER}/read_wrench"),
         "read_wrench.py": reader("read_wrench.py", "python3", f"{FOLDER}/read_wrench.py"),
-        "log_events.py": reader("log_events.py", "python3", f"{FOLDER}/log_events.py", f"{FOLDER}/out/log.csv"),
+        "log_events.py": reader("log_events.py", "python3", f"{FOLDER}/log_events.py", LOG),
         "puck": reader("puck", setup.tagwrench, "read", "256f:c62e", "--json"),
         "controller": reader("controller", "python3", f"{FOLDER}/controller.py", f"{FOLDER}/joystick_mapping.md"),
     }
@@ -114,6 +115,7 @@ def start_readers(setup):
         programs[name].wait_line("")
     programs["controller"].wait_line("controller tagwrench joystick")
     programs["log_events.py"].wait_error("logging")
+    rig.check("the log begins with samples", rig.wait_until(lambda: of_log(LOG)[1]), programs["log_events.py"].state())
     return programs
 
 
@@ -159,7 +161,7 @@ def check_readings(setup, programs, own):
     wanted = abs(truth(setup))
     readings = {name: of_text(programs[name].out) for name in ("read_wrench.c", "read_wrench.py")}
     readings["tagwrench read"] = of_json(programs["tagwrench read"].out)
-    rows, readings["log_events.py"] = of_log(f"{FOLDER}/out/log.csv")
+    rows, readings["log_events.py"] = of_log(LOG)
     for name, got in readings.items():
         peak = compare(name, got, own)
         plateau = sorted(abs(v[2]) for _, _, v in got if abs(v[2]) > PLATEAU_N * peak)
@@ -196,8 +198,7 @@ def check_replugged(setup, programs):
     missing = [json.loads(line)["missing"] for line in read.out[mark:mark + 1]]
     rig.check("a new bridge is no gap", missing == [0], missing)
     logger = programs["log_events.py"]
-    rig.check("the logger goes on, too", rig.wait_until(lambda: any(row["kind"] == "back" for row in of_log(
-        f"{FOLDER}/out/log.csv")[0])), logger.state())
+    rig.check("the logger goes on, too", rig.wait_until(lambda: any(row["kind"] == "back" for row in of_log(LOG)[0])), logger.state())
     rig.check("Ctrl-C ends read with status 0 and a summary", read.stop(signal.SIGINT) == 0
               and "latency median" in read.err[-1], read.state())
     print(f"     {read.err[-1]}")

@@ -23,7 +23,7 @@ using OwnedDevice = std::unique_ptr<tagwrench_device, CloseDevice>;
 
 class ClientDevice : public ::testing::Test {
  protected:
-  ~ClientDevice() override { test::fake_hids().clear(); }
+  ~ClientDevice() override { test::unplug_all(); }
 
   OwnedDevice open(const char* serial = nullptr) {
     return OwnedDevice(tagwrench_open(serial, why_.data(), why_.size()));
@@ -45,6 +45,16 @@ TEST_F(ClientDevice, OnlyWrenchSensorsAreListed) {
   EXPECT_STREQ(infos[0].serial, "tagwrench-0");
   EXPECT_STREQ(infos[0].name, "tagwrench wrench sensor");
   EXPECT_STREQ(infos[1].serial, "bench");
+}
+
+TEST_F(ClientDevice, ADeviceThatGoesWhileItIsListedIsNoDevice) {
+  plug({.path = "/dev/hidraw0", .serial = L"left", .half_gone = true});
+  plug({.path = "/dev/hidraw1", .serial = L"right"});
+  EXPECT_EQ(tagwrench_enumerate(nullptr, 0), 1u);
+  EXPECT_EQ(open("left"), nullptr);
+  EXPECT_STREQ(tagwrench_info(open().get())->serial, "right");
+  const OwnedDevice by_path(tagwrench_open_path("/dev/hidraw1", why_.data(), why_.size()));
+  EXPECT_STREQ(tagwrench_info(by_path.get())->serial, "right");
 }
 
 TEST_F(ClientDevice, MoreDevicesThanRoomAreCountedAndNotWritten) {

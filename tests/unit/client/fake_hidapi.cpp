@@ -1,20 +1,68 @@
 #include "fake_hidapi.h"
 
+#include <fmt/format.h>
 #include <hidapi.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+
+#include "tests/cli/bridge.h"
 
 struct hid_device_ {
   std::shared_ptr<tagwrench::test::FakeHid> fake;
 };
 
 namespace tagwrench::test {
+namespace {
 
 std::vector<std::shared_ptr<FakeHid>>& fake_hids() {
   static std::vector<std::shared_ptr<FakeHid>> hids;
   return hids;
+}
+
+std::string ascii(const std::wstring& text) { return {text.begin(), text.end()}; }
+
+/// What the kernel shows of a device that no USB port is behind.
+void write_sysfs(const FakeHid& hid) {
+  const std::string device =
+      hidraw_class() + "/" + hid.path.substr(hid.path.rfind('/') + 1) + "/device";
+  std::filesystem::create_directories(device);
+  write_file(device + "/uevent",
+             fmt::format("DRIVER=hid-generic\nHID_ID=0003:{:08X}:{:08X}\nHID_NAME={}\n"
+                         "HID_PHYS=\nHID_UNIQ={}\nMODALIAS=hid:b0003g0001\n",
+                         hid.vendor, hid.product, ascii(hid.name), ascii(hid.serial)));
+  // Usage Page (2 bytes), Usage (1 byte), Collection (Application), End Collection
+  const char descriptor[] = {'\x06',
+                             static_cast<char>(hid.usage_page),
+                             static_cast<char>(hid.usage_page >> 8),
+                             '\x09',
+                             static_cast<char>(hid.usage),
+                             '\xa1',
+                             '\x01',
+                             '\xc0'};
+  write_file(device + "/report_descriptor", {descriptor, sizeof descriptor});
+}
+
+}  // namespace
+
+const std::string& hidraw_class() {
+  static const TemporaryFolder folder;
+  static const std::string path = folder.path();
+  return path;
+}
+
+std::shared_ptr<FakeHid> plug(FakeHid hid) {
+  write_sysfs(hid);
+  fake_hids().push_back(std::make_shared<FakeHid>(std::move(hid)));
+  return fake_hids().back();
+}
+
+void unplug_all() {
+  fake_hids().clear();
+  for (const auto& entry : std::filesystem::directory_iterator(hidraw_class()))
+    std::filesystem::remove_all(entry);
 }
 
 }  // namespace tagwrench::test
@@ -30,7 +78,7 @@ hid_device_info* hid_enumerate(unsigned short vendor, unsigned short product) {
     if ((vendor != 0 && vendor != hid->vendor) || (product != 0 && product != hid->product))
       continue;
     *end = new hid_device_info{};
-    (*end)->path = ::strdup(hid->path.c_str());
+    (*end)->path = hid->half_gone ? nullptr : ::strdup(hid->path.c_str());
     (*end)->vendor_id = hid->vendor;
     (*end)->product_id = hid->product;
     (*end)->serial_number = ::wcsdup(hid->serial.c_str());

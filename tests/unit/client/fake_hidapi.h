@@ -1,4 +1,5 @@
-// Another hidapi under the library: devices made of queues.
+// Another hidapi under the library: devices made of queues. They are in a folder like
+// /sys/class/hidraw, too.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +20,7 @@ struct FakeHid {
   std::uint16_t usage_page = 0xff00;
   std::uint16_t usage = 0x10;
   bool opens = true;
+  bool half_gone = false;  ///< listed without a path
   bool gone = false;
   bool interrupted = false;  ///< the next empty read ends as by a signal
   std::deque<std::vector<std::uint8_t>> reports = {};
@@ -26,12 +28,12 @@ struct FakeHid {
   std::function<void()> idle = {};
 };
 
-/// The devices that are plugged in. Emptied by FakeHidTest.
-std::vector<std::shared_ptr<FakeHid>>& fake_hids();
+std::shared_ptr<FakeHid> plug(FakeHid hid);
 
-inline std::shared_ptr<FakeHid> plug(FakeHid hid) {
-  fake_hids().push_back(std::make_shared<FakeHid>(std::move(hid)));
-  return fake_hids().back();
-}
+/// All of them, and the folder's.
+void unplug_all();
+
+/// Made at the first call; it goes with the program.
+const std::string& hidraw_class();
 
 }  // namespace tagwrench::test

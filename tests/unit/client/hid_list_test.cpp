@@ -23,10 +23,10 @@ test::FakeHid spacemouse(const std::string& path, const std::wstring& serial) {
 
 class HidList : public ::testing::Test {
  protected:
-  ~HidList() override { test::fake_hids().clear(); }
+  ~HidList() override { test::unplug_all(); }
 
   static std::string chosen(const std::string& text) {
-    const auto node = HidChoice(text).among(hid_nodes());
+    const auto node = HidChoice(text).among(hid_nodes(test::hidraw_class()));
     return node ? node->path : "none";
   }
 };
@@ -35,10 +35,9 @@ TEST_F(HidList, WrenchesComeFirstAndOtherDevicesNotAtAll) {
   plug(spacemouse("/dev/hidraw0", L"a"));
   plug({.path = "/dev/hidraw1", .vendor = 0x046d, .product = 0xc077, .usage_page = 1, .usage = 2});
   plug({.path = "/dev/hidraw2", .serial = L"b"});
-  plug({.path = "/dev/hidraw2", .serial = L"b"});  // a second collection of the same node
   plug({.path = "/dev/hidraw3", .vendor = 0x1234, .usage_page = 0xff00, .usage = 0x10});  // own id
   plug({.path = "/dev/hidraw4", .vendor = 0x1234, .name = L"other"});
-  const std::vector<HidNode> nodes = hid_nodes();
+  const std::vector<HidNode> nodes = hid_nodes(test::hidraw_class());
   ASSERT_EQ(nodes.size(), 3u);
   EXPECT_EQ(nodes[0].path, "/dev/hidraw2");
   EXPECT_EQ(nodes[1].path, "/dev/hidraw3");
@@ -49,7 +48,7 @@ TEST_F(HidList, WrenchesComeFirstAndOtherDevicesNotAtAll) {
 TEST_F(HidList, NamesEachWithKindIdPathSerialAndModel) {
   plug(spacemouse("/dev/hidraw0", L""));
   plug({.path = "/dev/hidraw12"});
-  EXPECT_EQ(list_text(hid_nodes()),
+  EXPECT_EQ(list_text(hid_nodes(test::hidraw_class())),
             "wrench  1209:7a6e  /dev/hidraw12  tagwrench-0       tagwrench wrench sensor\n"
             "6-dof   256f:c62e  /dev/hidraw0   -                 tagwrench SpaceMouse, as "
             "SpaceMouse Wireless (cable) (combined layout)\n");

@@ -20,9 +20,10 @@ class ReadLoop : public ::testing::Test {
  protected:
   ReadLoop() {
     options_.nodes = folder_.path();
+    options_.hidraw_class = test::hidraw_class();
     options_.log = folder_ / "log.csv";
   }
-  ~ReadLoop() override { test::fake_hids().clear(); }
+  ~ReadLoop() override { test::unplug_all(); }
 
   int read() { return read_hid(options_, stop_.get()); }
   void stop() { ::eventfd_write(stop_.get(), 1); }
@@ -84,7 +85,7 @@ TEST_F(ReadLoop, WhoWaitsGoesOnWhenTheSameDeviceIsBack) {
       plug({.path = "/dev/hidraw0", .serial = L"left", .reports = {numbered_report(900)}});
   first->idle = [&] {
     first->gone = true;
-    test::fake_hids().clear();
+    test::unplug_all();
     plug({.path = "/dev/hidraw0", .serial = L"right", .reports = {numbered_report(77)}});
     const auto again = plug({.path = "/dev/hidraw1",
                              .serial = L"left",
