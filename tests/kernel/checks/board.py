@@ -65,7 +65,10 @@ def body(setup):
     rig.wait_until(lambda: len({s["channel"] for s in cells(watch.out[seen:])}) == 4)
     channels = sorted({sample["channel"] for sample in cells(watch.out[seen:])})
     rig.check("with all four load cells", channels == [0, 1, 2, 3], channels)
-    times = [sample["t_ns"] for sample in cells(watch.out) if sample["channel"] == 0]
+    def times_of_the_first():
+        return [sample["t_ns"] for sample in cells(watch.out) if sample["channel"] == 0]
+    rig.wait_until(lambda: len(times_of_the_first()) > 100, patience=60)
+    times = times_of_the_first()
     backwards = [(a, b) for a, b in zip(times, times[1:]) if a >= b]
     rig.check("time stamps go on growing", len(times) > 100 and not backwards, backwards[:3])
     rig.check("Ctrl-C ends it with status 0", watch.stop(rig.signal.SIGINT) == 0, watch.state())
