@@ -45,6 +45,8 @@ wchar_t next_character(std::string_view& text) {
     whole = (byte & 0xc0U) == 0x80U;
     character = character << 6 | (byte & 0x3fU);
   }
+  constexpr std::array<std::uint32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
+  whole = whole && character >= kLeast[size];  // an overlong form is none
   text.remove_prefix(whole ? size : 1);
   return whole ? static_cast<wchar_t>(character) : L'?';
 }
@@ -57,7 +59,7 @@ std::string shown(std::string_view text) {
   return out.data();
 }
 
-std::string first_line(const std::string& text) { return shown({text.data(), text.find('\n')}); }
+std::string first_line(std::string_view text) { return shown(text.substr(0, text.find('\n'))); }
 
 /// What follows "KEY=" in a uevent file.
 std::optional<std::string_view> value_of(std::string_view key, std::string_view uevent) {

@@ -60,6 +60,17 @@ TEST_F(HidSysfs, ADeviceOnUsbHasItsProductsNameWithoutTheManufacturer) {
   ASSERT_EQ(devices.size(), 1u);
   EXPECT_EQ(devices[0].name, "SpaceMouse Compact");
   EXPECT_EQ(devices[0].serial, "");
+  test::write_file(folder_ / "devices/usb1/1-1/product", "without an end of line");
+  EXPECT_EQ(list().at(0).name, "without an end of line");
+}
+
+TEST_F(HidSysfs, ADeviceMayHaveNeitherNameNorSerial) {
+  add("hidraw0", "a", "HID_ID=0003:00000001:00000002");
+  const auto devices = list();
+  ASSERT_EQ(devices.size(), 1u);
+  EXPECT_EQ(devices[0].product, 2);
+  EXPECT_EQ(devices[0].name, "");
+  EXPECT_EQ(devices[0].serial, "");
 }
 
 TEST_F(HidSysfs, WhatIsHalfThereIsLeftOut) {
@@ -94,11 +105,11 @@ TEST_F(HidSysfs, AMachineWithoutHidDevicesHasNone) {
 TEST_F(HidSysfs, TextsAreFitForATerminal) {
   add("hidraw0", "a",
       "HID_ID=0003:00000001:00000002\nHID_NAME=K\xc3\xa4se \x1b[31m \xff\xe2\x82 \xc2\x9b\n"
-      "HID_UNIQ=\xf0\x9f\x98\x80\x07\n");
+      "HID_UNIQ=\xf0\x9f\x98\x80\x07 \xe0\x80\x80 \xf0\x80\x80\x9b\n");
   const auto devices = list();
   ASSERT_EQ(devices.size(), 1u);
   EXPECT_EQ(devices[0].name, "K\xc3\xa4se ?[31m ??? ?");
-  EXPECT_EQ(devices[0].serial, "\xf0\x9f\x98\x80?");
+  EXPECT_EQ(devices[0].serial, "\xf0\x9f\x98\x80? ??? ????");
 }
 
 TEST(TopLevelUsages, EveryCollectionOnTheOutsideCounts) {
