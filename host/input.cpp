@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/signalfd.h>
 
-#include <csignal>
 #include <filesystem>
 #include <utility>
 
 #include "host/config/scenario_config.h"
 #include "host/config_error.h"
+#include "host/os/termination.h"
 #include "host/record/reader.h"
 #include "host/source/images.h"
 #include "host/source/recording.h"
@@ -22,15 +21,6 @@
 
 namespace tagwrench {
 namespace {
-
-/// They wait until the loop reads them.
-sigset_t block_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
-  sigprocmask(SIG_BLOCK, &signals, nullptr);
-  return signals;
-}
 
 /// The sensor that was asked for.
 bool given_sensor(const InputOptions& options, Input& input) {
@@ -94,7 +84,7 @@ Input open_camera(const InputOptions& options, const std::string& argument) {
   V4l2Options camera = parse_v4l2_spec(argument);
   camera.preferred_width = input.sensor.camera.width_px;
   camera.preferred_height = input.sensor.camera.height_px;
-  block_signals();  // from here on the camera's settings must be put back
+  const UniqueFd caught = termination_fd();  // from here on the camera's settings must be put back
   input.source = std::make_unique<V4l2Source>(camera);
   input.camera = true;
   return input;
@@ -151,16 +141,6 @@ void check_appearance(const Input& input) {
       "sensor.yaml: rest.appearance: the picture does not show tag {} of {} where the rest pose "
       "puts it (likeness {:.2f}); run `tagwrench calibrate target`, or remove rest.appearance",
       mismatch->id, name(sensor.target.family), mismatch->likeness));
-}
-
-UniqueFd signals_as_fd() {
-  const sigset_t signals = block_signals();
-  return UniqueFd(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK));
-}
-
-bool signalled(const UniqueFd& stop) {
-  pollfd entry{stop.get(), POLLIN, 0};
-  return ::poll(&entry, 1, 0) > 0;
 }
 
 Next next_frame(FrameSource& source, const UniqueFd& stop, Frame& frame) {

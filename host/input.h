@@ -1,5 +1,4 @@
-// Where the frames of a command come from: SRC and sensor.yaml to the objects, and the signals that
-// end a command.
+// Where the frames of a command come from: SRC and sensor.yaml to the objects.
 #pragma once
 
 #include <cstdint>
@@ -51,13 +50,6 @@ void check_size(const Input& input);
 
 /// Throws ConfigError unless the picture of the sensor at rest, where one is given, shows its tags.
 void check_appearance(const Input& input);
-
-/// Ctrl-C, kill and a closed terminal no longer end the program at once; the descriptor is readable
-/// once one of them has come.
-UniqueFd signals_as_fd();
-
-/// Whether one of them has come to signals_as_fd().
-bool signalled(const UniqueFd& stop);
 
 enum class Next : std::uint8_t { frame, nothing, end, stopped };
 

@@ -19,6 +19,7 @@
 #include "host/config/sensor_edit.h"
 #include "host/config_error.h"
 #include "host/input.h"
+#include "host/os/termination.h"
 #include "host/output/dead_man.h"
 #include "host/output/wrench_hid.h"
 #include "host/source/simulator/folder_export.h"
@@ -226,7 +227,7 @@ void BandwidthCommand::print(const std::string& text, const std::string& json) c
 }
 
 int BandwidthCommand::run_with_screen() const {
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   const Spec screen = split_spec(screen_);
   if (split_spec(source_).kind == "sim") {
     const Bench bench = simulated_bench(sensor_, source_, fast_);
@@ -264,7 +265,7 @@ int BandwidthCommand::measure(FrameSource& source, FlipPatch& patch, const Uniqu
   tell("point the camera at the flipping patch, so that it fills the picture");
   ScreenOptions options;
   options.seconds = seconds_;
-  options.stopped = [&] { return signalled(stop); };
+  options.stopped = [&] { return termination_requested(); };
   options.stop_fd = stop.get();
   const ScreenMeasurement measured = measure_screen(source, patch, options);
   if (!measured.refusal.empty()) {
@@ -278,7 +279,7 @@ int BandwidthCommand::measure(FrameSource& source, FlipPatch& patch, const Uniqu
 }
 
 int BandwidthCommand::run_with_lamp() const {
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   Bench bench = port_ == "sim" ? simulated_bench(sensor_, source_, fast_)
                                : board_bench(sensor_, source_, port_, fast_);
   if (!bench.lamp) return kFailed;
@@ -289,7 +290,7 @@ int BandwidthCommand::run_with_lamp() const {
   BandwidthOptions options;
   options.seconds = seconds_;
   options.process = [&](Frame& frame) { processing.take(frame); };
-  options.stopped = [&] { return signalled(stop); };
+  options.stopped = [&] { return termination_requested(); };
   options.stop_fd = stop.get();
   options.say = [](const std::string& line) { tell(line); };
   const BandwidthMeasurement measured =

@@ -10,6 +10,7 @@
 #include "host/config_error.h"
 #include "host/input.h"
 #include "host/link/cell_file.h"
+#include "host/os/termination.h"
 #include "host/tell.h"
 
 namespace tagwrench {
@@ -42,7 +43,7 @@ link::BoardSessionOptions session_options(const BoardOptions& options) {
 
 BoardLoop::BoardLoop(const std::string& port, const link::BoardSessionOptions& options,
                      const std::string& option)
-    : link_(port, options, link::kBaud, option), stop_(signals_as_fd()) {
+    : link_(port, options, link::kBaud, option), stop_(termination_fd()) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
 }
 

@@ -7,8 +7,8 @@
 #include <csignal>
 
 #include "host/board/options.h"
-#include "host/input.h"
 #include "host/link/optoforce_sensor.h"
+#include "host/os/termination.h"
 #include "host/output/text_sink.h"
 #include "host/tell.h"
 
@@ -51,7 +51,7 @@ class ForceWatch {
   explicit ForceWatch(const BoardOptions& options)
       : options_(options),
         out_("-", /*lossless=*/true),
-        stop_(signals_as_fd()),
+        stop_(termination_fd()),
         sensor_({.port = options.port,
                  .baud = 1'000'000,
                  .rate_hz = options.force_rate,

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <signal.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -13,6 +12,7 @@
 #include <utility>
 
 #include "host/config_error.h"
+#include "host/os/termination.h"
 
 namespace tagwrench {
 namespace {
@@ -21,13 +21,6 @@ namespace {
 /// interrupts no poll().
 constexpr int kSignalCheck_ms = 50;
 constexpr int kLastWait_ms = 100;
-
-bool stop_is_pending() {
-  sigset_t pending;
-  return sigpending(&pending) == 0 &&
-         (sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1 ||
-          sigismember(&pending, SIGHUP) == 1);
-}
 
 const char* remedy(int error) {
   switch (error) {
@@ -101,7 +94,7 @@ bool TextSink::writable(int timeout_ms) noexcept {
 }
 
 bool TextSink::wait_writable() noexcept {
-  while (!stop_is_pending()) {
+  while (!termination_requested()) {
     errno = 0;
     if (writable(kSignalCheck_ms)) return true;
     if (errno == EINTR) return false;

@@ -15,6 +15,7 @@
 #include "host/config/sensor_edit.h"
 #include "host/config_error.h"
 #include "host/input.h"
+#include "host/os/termination.h"
 #include "host/source/images.h"
 #include "host/tell.h"
 #include "host/verbs/events.h"
@@ -107,8 +108,7 @@ CameraModel camera_for(const Record& record, const SourceFormat& format) {
 /// Every picture of the folders; nothing if stopped by a signal.
 std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& options,
                                                const std::vector<std::string>& folders,
-                                               const BoardSpec& board, const Record& record,
-                                               const UniqueFd& stop) {
+                                               const BoardSpec& board, const Record& record) {
   std::vector<std::unique_ptr<ImagesSource>> sources;
   std::size_t all = 0;
   for (const std::string& folder : folders) {
@@ -128,7 +128,7 @@ std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& opt
   TimePoint said = Clock::now();
   for (const auto& source : sources) {
     for (Frame frame;;) {
-      if (signalled(stop)) return nullptr;
+      if (termination_requested()) return nullptr;
       const ReadStatus status = source->read(frame);
       if (status == ReadStatus::end) break;
       ++seen;
@@ -317,8 +317,7 @@ void report(const CameraFit& fit, const std::vector<CameraView>& views, const Co
 std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
                                        const BoardSpec& board, const Record& record,
                                        const UniqueFd& stop) {
-  if (!options.folders.empty())
-    return look_at_folders(options, options.folders, board, record, stop);
+  if (!options.folders.empty()) return look_at_folders(options, options.folders, board, record);
   if (options.source.empty())
     throw ConfigError(
         "calibrate camera: nothing to look at; give --source v4l2:/dev/videoN or --images DIR");
@@ -329,7 +328,7 @@ std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
         "images:DIR");
   }
   if (spec.kind == "images" && !spec.argument.empty())
-    return look_at_folders(options, {spec.argument}, board, record, stop);
+    return look_at_folders(options, {spec.argument}, board, record);
   return look_at_camera(options, board, record, stop);
 }
 
@@ -338,7 +337,7 @@ std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
 int calibrate_camera(const CalibrateCameraOptions& options) {
   const BoardSpec board = parse_board(options.board);
   const Record record = open_record(options);
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   std::unique_ptr<ViewCollector> collector = collect(options, board, record, stop);
   if (!collector) {
     tell("stopped; nothing was written");
@@ -360,7 +359,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
     if (fit.views[i].used) coverage.add(views[i].corners, fit.views[i].pose);
   }
   check_fit(fit, coverage);
-  if (signalled(stop)) {
+  if (termination_requested()) {
     tell("stopped; nothing was written");
     return kExitStopped;
   }

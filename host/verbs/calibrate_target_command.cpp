@@ -15,6 +15,7 @@
 #include "host/config_error.h"
 #include "host/hint_text.h"
 #include "host/input.h"
+#include "host/os/termination.h"
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
 #include "host/verbs/events.h"
@@ -209,7 +210,7 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   check_editable(text, placeholders(), options.sensor);
   check_size(input);
   const SensorConfig& sensor = input.sensor;
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   Events events(options.events);
   TargetRecorder record(sensor.camera, sensor.target, sensor.rest, kMostKeyframes);
   tell("source: " + input.source->format().description);
@@ -226,9 +227,9 @@ int calibrate_target(const CalibrateTargetOptions& options) {
           said = Clock::now();
           tell(fmt::format("{:.0f} %", 100 * share));
         }
-        return !signalled(stop);
+        return !termination_requested();
       });
-  if (signalled(stop)) return stopped();
+  if (termination_requested()) return stopped();
   check_estimate(estimate, sensor.camera);
   write(sensor_file, text, appearance, estimate, sensor, record.at_rest().image);
   for (const std::string& line : describe(record, estimate, sensor.target, sensor.camera))

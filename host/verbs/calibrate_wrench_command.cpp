@@ -14,6 +14,7 @@
 #include "host/config/sensor_edit.h"
 #include "host/config/sha256.h"
 #include "host/config_error.h"
+#include "host/os/termination.h"
 #include "host/tell.h"
 #include "host/verbs/calibrate_wrench/checks.h"
 #include "host/verbs/calibrate_wrench/recorder.h"
@@ -210,7 +211,7 @@ int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles
                     .gain_sigma = reference ? reference->gain_sigma() : 0,
                     .notes = options.notes};
 
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   std::optional<CalibrationRecorder> recorder;
   if (options.record) {
     record::Head head = recording_head(at.input, options.record->keep);

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "host/config_error.h"
+#include "host/os/termination.h"
 #include "host/os/unique_fd.h"
 #include "host/tell.h"
 
@@ -48,7 +49,7 @@ bool takes_camera_event(int events) {
 std::optional<Input> wait_for_camera(const std::function<std::optional<Input>()>& look,
                                      ServiceWatch* watch) {
   const UniqueFd events = watch_dev();  // before the first look, or a camera might come in between
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   if (std::optional<Input> input = look()) return input;
   tell(kWaiting);
   if (watch != nullptr) watch->ready(kWaiting);

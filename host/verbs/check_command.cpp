@@ -8,6 +8,7 @@
 
 #include "host/config_error.h"
 #include "host/link/cell_calibration.h"
+#include "host/os/termination.h"
 #include "host/tell.h"
 #include "host/tracker/rotation.h"
 #include "host/verbs/check_text.h"
@@ -177,7 +178,7 @@ int CheckCommand::run() const {
   Input& input = at.input;
   check_size(input);
   check_calibrated_rest(input.sensor, "check");
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   if (board && !board->settle_light(input, stop)) return stopped();
   HandsOff hands_off(input.sensor, std::chrono::seconds(2),
                      options_.mass_g ? kPatienceForMass : kPatience);
@@ -199,7 +200,7 @@ int CheckCommand::run() const {
   bool fine = print(judge(hands_off.result()));
   if (options_.mass_g) fine = by_mass(at, stop, hands_off, events) && fine;
   if (board) fine = by_cell(at, stop, *board, *cell) && fine;
-  if (signalled(stop)) return stopped();
+  if (termination_requested()) return stopped();
   return fine ? 0 : kOff;
 }
 

@@ -14,6 +14,7 @@
 #include "host/check/focus_guide.h"
 #include "host/config_error.h"
 #include "host/input.h"
+#include "host/os/termination.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/tell.h"
 #include "host/tracker/acquire.h"
@@ -232,7 +233,7 @@ int run_focus(const FocusOptions& options) {
   using Clock = std::chrono::steady_clock;
   const std::string source = options.source.empty() ? only_camera() : options.source;
   Input input = open_input({options.sensor, source, false, WrenchCalibration::ignore});
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   tell("source: " + input.source->format().description);
   FocusView view(input.sensor);
   FocusScreen screen;

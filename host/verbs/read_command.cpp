@@ -2,7 +2,7 @@
 
 #include <csignal>
 
-#include "host/input.h"
+#include "host/os/termination.h"
 
 namespace tagwrench {
 
@@ -35,7 +35,7 @@ int ReadCommand::run() {
   if (seconds_) {
     options_.time = std::chrono::duration_cast<Duration>(std::chrono::duration<double>(*seconds_));
   }
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   return read_hid(options_, stop.get());
 }
 

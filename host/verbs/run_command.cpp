@@ -17,6 +17,7 @@
 #include "host/config/zero_options.h"
 #include "host/config_error.h"
 #include "host/input.h"
+#include "host/os/termination.h"
 #include "host/output/service_watch.h"
 #include "host/pipeline.h"
 #include "host/source/region_source.h"
@@ -212,7 +213,7 @@ std::optional<int> run_once(Session& session) {
   std::optional<Input> found = open_run_input(options, session.watch.get());
   if (!found) return 0;
   Input input = std::move(*found);
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   check_size(input);
   check_appearance(input);
   stay_with(input, options);
@@ -267,7 +268,7 @@ std::optional<int> run_once(Session& session) {
     report = pipeline.run(limits);
   }
   session.frames += report.frames;
-  if (report.end == RunReport::End::interrupted && !signalled(stop)) {
+  if (report.end == RunReport::End::interrupted && !termination_requested()) {
     session.kept = keep_outputs(outputs);
     return {};
   }
@@ -290,7 +291,7 @@ std::optional<int> run_once(Session& session) {
 
 /// One run after the other, as pages want the camera and give it back.
 int run_with_pages(Session& session) {
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   const std::unique_ptr<WebBridge> web = open_web(session.options, stop);
   session.web = web.get();
   for (bool first = true;; first = false) {

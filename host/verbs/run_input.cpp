@@ -13,6 +13,7 @@
 #include "host/config/sensor_config.h"
 #include "host/config_error.h"
 #include "host/os/config_folder.h"
+#include "host/os/termination.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/source/v4l2_source.h"
 #include "host/tell.h"
@@ -26,7 +27,7 @@ namespace {
 /// then sees it too.
 bool sees_tags(Input& input, Duration patience) {
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   const TimePoint until = std::chrono::steady_clock::now() + patience;
   for (TimePoint now; (now = std::chrono::steady_clock::now()) < until;) {
     pollfd fds[2] = {{input.source->poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};

@@ -14,7 +14,7 @@ namespace tagwrench {
 /// Whether `web` is among the outputs. Throws ConfigError where it is, but cannot be.
 bool has_web(const RunOptions& options);
 
-/// Binds, and says where; nothing is served yet. `stop` is of signals_as_fd().
+/// Binds, and says where; nothing is served yet. `stop` is of termination_fd().
 std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& stop);
 
 /// `desk`: it listens to wishes.

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "host/config_error.h"
-#include "host/input.h"
+#include "host/os/termination.h"
 #include "host/output/service_watch.h"
 #include "host/output/spnav_keeper.h"
 #include "host/output/spnav_link.h"
@@ -53,7 +53,7 @@ int SpnavCommand::run() const {
   const std::string path = spnav_socket_path(socket_);
   const bool inherited = !inherited_.empty();
   ::prctl(PR_SET_NAME, "tw-spnav");  // so that a kill by the bridge's name spares it
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   SpnavSockets sockets =
       inherited ? inherited_spnav(path, inherited_[0], inherited_[1]) : make_sockets(path);
   SpnavKeeperOptions options;

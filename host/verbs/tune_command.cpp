@@ -13,7 +13,7 @@
 #include "host/config_error.h"
 #include "host/desk/control_socket.h"
 #include "host/desk/live.h"
-#include "host/input.h"
+#include "host/os/termination.h"
 #include "host/verbs/tune/tuning.h"
 #include "host/verbs/tune/tuning_screen.h"
 #include "host/verbs/tune/tuning_view.h"
@@ -80,7 +80,7 @@ class TuneSession {
   std::string path_;
   std::optional<ControlClient> sensor_;
   std::optional<Tuning> tuning_;
-  UniqueFd stop_ = signals_as_fd();
+  UniqueFd stop_ = termination_fd();
   std::optional<TuningScreen> screen_;
   LiveReading now_;
   bool over_ = false;

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <ctime>
 
+#include "host/os/termination.h"
 #include "host/tell.h"
 #include "host/verbs/bench_input.h"
 #include "host/verbs/check_text.h"
@@ -81,7 +82,7 @@ int ZeroCommand::run() const {
   check_editable(yaml, {{"wrench", zero_entries(Vector6::Zero(), "")}}, options_.sensor);
   check_size(at.input);
   check_calibrated_rest(sensor, "zero");
-  const UniqueFd stop = signals_as_fd();
+  const UniqueFd stop = termination_fd();
   HandsOff hands_off(sensor);
   Events events(options_.events);
   tell("source: " + at.input.source->format().description);

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/hint_text.h"
+#include "host/os/termination.h"
 #include "host/tell.h"
 #include "host/tracker/tracker.h"
 #include "host/verbs/calibrate_wrench/keys.h"
@@ -102,7 +103,7 @@ class Runner {
 
  private:
   void wait() {
-    if (signalled(*run_.stop)) end_ = GuideEnd::stopped;
+    if (termination_requested()) end_ = GuideEnd::stopped;
     if (source_.poll_fd() < 0) return;
     std::array<pollfd, 4> fds{
         {{source_.poll_fd(), POLLIN, 0},

@@ -18,7 +18,7 @@ struct GuideRun {
   BenchInput* at = nullptr;
   Reference* reference = nullptr;           ///< null: masses
   CalibrationRecorder* recorder = nullptr;  ///< null: nothing is recorded
-  const UniqueFd* stop = nullptr;           ///< of signals_as_fd()
+  const UniqueFd* stop = nullptr;           ///< of termination_fd()
   const WrenchPlan* plan = nullptr;
   std::filesystem::path progress;
   ProgressOf of;
