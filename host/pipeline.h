@@ -41,8 +41,8 @@ struct RunReport {
 
 class Pipeline {
  public:
-  /// Borrows everything; `stop_fd` becomes readable when the run shall end (a signalfd), -1 for
-  /// never. `log` is told of every frame; there may be none.
+  /// Borrows everything; `stop_fd` becomes readable when the run shall end (of termination_fd()),
+  /// -1 for never. `log` is told of every frame; there may be none.
   Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, Desk& desk,
            std::vector<std::unique_ptr<Output>>& outputs, DeadMan& dead_man, int stop_fd,
            FrameLog* log = nullptr);

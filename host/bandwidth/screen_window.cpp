@@ -3,6 +3,7 @@
 #include <SDL.h>
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <ctime>
 
 #include "host/config_error.h"
@@ -16,7 +17,8 @@ void wait_until(TimePoint when) {
   const auto ns = when.time_since_epoch().count();
   const timespec time{static_cast<time_t>(ns / 1'000'000'000),
                       static_cast<long>(ns % 1'000'000'000)};
-  ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
+  while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
+  }
 }
 
 [[noreturn]] void no_screen() {

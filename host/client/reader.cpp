@@ -203,7 +203,7 @@ class Reader {
     errno = 0;
     const int size = hid_read_timeout(device_.get(), report_.data(), report_.size(),
                                       whole_ms(std::min(kSlice, end_ - before)));
-    if (size < 0) return errno == EINTR;
+    if (size < 0) return errno == EINTR || stopped();
     const TimePoint now = clock_now();
     if (size > 0) take({report_.data(), static_cast<std::size_t>(size)}, now);
     // What came last is shown even if nothing comes after it: a release, above all.

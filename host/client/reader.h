@@ -24,9 +24,9 @@ struct ReadOptions {
 /// Prints the list; returns the exit status.
 int list_hid();
 
-/// Until `stop_fd` (a signalfd) is readable or the time is over; prints the summary and returns the
-/// exit status: 1 if the device went away, or what was read could not be written. Throws
-/// ConfigError if there is no such device, or it may not be opened.
+/// Until `stop_fd` (of termination_fd()) is readable or the time is over; prints the summary and
+/// returns the exit status: 1 if the device went away, or what was read could not be written.
+/// Throws ConfigError if there is no such device, or it may not be opened.
 int read_hid(const ReadOptions& options, int stop_fd);
 
 }  // namespace tagwrench

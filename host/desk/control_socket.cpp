@@ -9,6 +9,7 @@
 
 #include "host/config_error.h"
 #include "host/os/runtime_folder.h"
+#include "host/os/uninterrupted.h"
 
 namespace tagwrench {
 namespace {
@@ -42,6 +43,11 @@ UniqueFd datagram_socket() {
     throw ConfigError(std::string("tagwrench control: no socket to be had: ") +
                       std::strerror(errno) + "; end other programs");
   return made;
+}
+
+/// Within the time that an answer may take.
+bool is_ready(pollfd& entry) {
+  return uninterrupted([&] { return ::poll(&entry, 1, kPatience_ms); }) > 0;
 }
 
 bool somebody_listens(const sockaddr_un& address) {
@@ -142,13 +148,12 @@ std::string ControlClient::ask(std::string_view wish) {
   };
   pollfd room{socket_.get(), POLLOUT, 0};  // many ask at once, or it is stopped
   bool sent = send();
-  if (!sent && errno == EAGAIN && ::poll(&room, 1, kPatience_ms) > 0) sent = send();
+  if (!sent && errno == EAGAIN && is_ready(room)) sent = send();
   if (!sent && errno != EAGAIN) fail();
   pollfd waiting{socket_.get(), POLLIN, 0};
   std::string answer(ControlSocket::kLongestAnswer, '\0');
-  const ssize_t size = sent && ::poll(&waiting, 1, kPatience_ms) > 0
-                           ? ::recv(socket_.get(), answer.data(), answer.size(), 0)
-                           : -1;
+  const ssize_t size =
+      sent && is_ready(waiting) ? ::recv(socket_.get(), answer.data(), answer.size(), 0) : -1;
   if (size < 0) throw ConfigError(path_ + ": no answer within 2 s; is `tagwrench run` stopped?");
   answer.resize(static_cast<std::size_t>(size));
   return answer;

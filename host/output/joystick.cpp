@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "host/config_error.h"
+#include "host/os/uninterrupted.h"
 #include "host/output/shown.h"
 #include "host/output/uhid_device.h"
 
@@ -22,6 +23,12 @@ constexpr std::uint16_t kAxes[] = {ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ};
 // joystick to both.
 constexpr std::array<std::uint16_t, kJoystickButtons> kButtons = {
     BTN_TRIGGER, BTN_THUMB, BTN_THUMB2, BTN_TOP, BTN_TOP2, BTN_PINKIE, BTN_BASE, BTN_BASE2};
+
+/// The driver's lock is interruptible.
+template <typename... Argument>
+bool order(int fd, unsigned long request, Argument... argument) {
+  return uninterrupted([&] { return ::ioctl(fd, request, argument...); }) == 0;
+}
 
 uinput_setup setup_of(const JoystickOptions& options) {
   uinput_setup setup{};
@@ -60,16 +67,16 @@ JoystickOutput::JoystickOutput(const JoystickOptions& options) {
   uinput_.reset(::open(kPath, O_WRONLY | O_CLOEXEC | O_NONBLOCK));
   if (!uinput_) throw ConfigError(cannot_open_node(kPath, "uinput", errno));
   const int fd = uinput_.get();
-  bool good = ioctl(fd, UI_SET_EVBIT, EV_KEY) == 0 && ioctl(fd, UI_SET_EVBIT, EV_ABS) == 0;
-  for (const int button : kButtons) good = good && ioctl(fd, UI_SET_KEYBIT, button) == 0;
+  bool good = order(fd, UI_SET_EVBIT, EV_KEY) && order(fd, UI_SET_EVBIT, EV_ABS);
+  for (const int button : kButtons) good = good && order(fd, UI_SET_KEYBIT, button);
   for (const std::uint16_t axis : kAxes) {
     uinput_abs_setup abs{};
     abs.code = axis;
     abs.absinfo.minimum = -kJoystickLimit_counts;
     abs.absinfo.maximum = kJoystickLimit_counts;
-    good = good && ioctl(fd, UI_ABS_SETUP, &abs) == 0;
+    good = good && order(fd, UI_ABS_SETUP, &abs);
   }
-  good = good && ioctl(fd, UI_DEV_SETUP, &setup) == 0 && ioctl(fd, UI_DEV_CREATE) == 0;
+  good = good && order(fd, UI_DEV_SETUP, &setup) && order(fd, UI_DEV_CREATE);
   if (!good) {
     throw ConfigError(std::string(kPath) + ": the kernel refused " + options.name + ": " +
                       std::strerror(errno) + "; it needs Linux 4.5 or later");
@@ -78,7 +85,7 @@ JoystickOutput::JoystickOutput(const JoystickOptions& options) {
 
 JoystickOutput::~JoystickOutput() {
   JoystickOutput::move(Sample{});
-  ioctl(uinput_.get(), UI_DEV_DESTROY);  // the guardian's duplicate of the fd would keep it alive
+  order(uinput_.get(), UI_DEV_DESTROY);  // the guardian's duplicate of the fd would keep it alive
 }
 
 SendStatus JoystickOutput::move(const Sample& sample) noexcept {
@@ -89,8 +96,9 @@ SendStatus JoystickOutput::move(const Sample& sample) noexcept {
     counts = to_counts(sample.motion, kJoystickLimit_counts);
   }
   const JoystickEvents events = joystick_events(counts, pressed);
-  if (::write(uinput_.get(), events.data(), sizeof events) >= 0) return SendStatus::ok;
-  if (errno == EAGAIN || errno == EINTR) return SendStatus::skipped;
+  const auto write = [&] { return ::write(uinput_.get(), events.data(), sizeof events); };
+  if (uninterrupted(write) >= 0) return SendStatus::ok;
+  if (errno == EAGAIN) return SendStatus::skipped;
   error_ = errno;
   return SendStatus::failed;
 }

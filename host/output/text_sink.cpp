@@ -13,13 +13,11 @@
 
 #include "host/config_error.h"
 #include "host/os/termination.h"
+#include "host/os/uninterrupted.h"
 
 namespace tagwrench {
 namespace {
 
-/// How often a lossless wait looks for a signal that is blocked (read through a signalfd) and so
-/// interrupts no poll().
-constexpr int kSignalCheck_ms = 50;
 constexpr int kLastWait_ms = 100;
 
 const char* remedy(int error) {
@@ -90,16 +88,15 @@ bool TextSink::writable(int timeout_ms) noexcept {
   if (kind_ == Kind::file) return true;
   pollfd waiting{fd_.get(), POLLOUT, 0};
   // A hang-up counts as writable: the write then names the error.
-  return ::poll(&waiting, 1, timeout_ms) > 0;
+  return uninterrupted([&] { return ::poll(&waiting, 1, timeout_ms); }) > 0;
 }
 
+/// False: termination was requested before there was room.
 bool TextSink::wait_writable() noexcept {
-  while (!termination_requested()) {
-    errno = 0;
-    if (writable(kSignalCheck_ms)) return true;
-    if (errno == EINTR) return false;
-  }
-  return false;
+  if (kind_ == Kind::file) return true;
+  pollfd fds[2] = {{fd_.get(), POLLOUT, 0}, {borrowed_termination_fd(), POLLIN, 0}};
+  uninterrupted([&] { return ::poll(fds, 2, -1); });
+  return fds[0].revents != 0;
 }
 
 long TextSink::put(const char* data, std::size_t size) noexcept {
@@ -141,7 +138,7 @@ SendStatus TextSink::write(std::string_view block) noexcept {
     const long done = put(block.data(), block.size());
     if (done < 0) {
       if (errno != EAGAIN && errno != EINTR) return fail(errno);
-      if (!lossless_) return SendStatus::skipped;
+      if (!lossless_ || termination_requested()) return SendStatus::skipped;
       continue;  // a pipe that has room, but less than the block
     }
     const auto written = static_cast<std::size_t>(done);

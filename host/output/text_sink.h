@@ -20,7 +20,7 @@ class TextSink {
   static constexpr std::size_t kMaxBlock = 8192;
 
   /// Creates the file afresh; `-` is standard output. Lossless: write() waits for a slow reader,
-  /// but returns `skipped` when a signal arrives or is pending, so that Ctrl-C works. Throws
+  /// but returns `skipped` if termination (termination.h) is requested meanwhile. Throws
   /// ConfigError if the path cannot be written.
   TextSink(const std::string& path, bool lossless);
 

@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "host/config_error.h"
+#include "host/os/uninterrupted.h"
 
 namespace tagwrench {
 namespace {
@@ -37,6 +38,11 @@ void copy_text(const std::string& text, std::uint8_t (&field)[Size], const char*
         fmt::format("HID {}: must be printable and shorter than {} bytes; shorten it", what, Size));
   }
   std::memcpy(field, text.data(), text.size());
+}
+
+/// The driver's lock is interruptible, and what is written may be the return to rest.
+ssize_t write_event(const UniqueFd& uhid, const void* event, std::size_t size) {
+  return uninterrupted([&] { return ::write(uhid.get(), event, size); });
 }
 
 UniqueFd open_uhid() {
@@ -86,7 +92,7 @@ UhidDevice::UhidDevice(UniqueFd uhid, const UhidIdentity& identity,
 UhidDevice::~UhidDevice() {
   if (!uhid_) return;
   const std::uint32_t destroy = UHID_DESTROY;
-  [[maybe_unused]] const ssize_t written = ::write(uhid_.get(), &destroy, sizeof destroy);
+  [[maybe_unused]] const ssize_t written = write_event(uhid_, &destroy, sizeof destroy);
 }
 
 void UhidDevice::create(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor) {
@@ -107,7 +113,7 @@ void UhidDevice::create(const UhidIdentity& identity, std::span<const std::uint8
   request.vendor = identity.vendor;
   request.product = identity.product;
   request.version = 0x0100;
-  if (::write(uhid_.get(), event_.get(), sizeof(uhid_event)) < 0) {
+  if (write_event(uhid_, event_.get(), sizeof(uhid_event)) < 0) {
     throw ConfigError(fmt::format("{}: the kernel refused the device: {}; see dmesg", label_,
                                   std::strerror(errno)));
   }
@@ -138,8 +144,8 @@ SendStatus UhidDevice::send(std::span<const std::uint8_t> report) noexcept {
   if (report.size() > sizeof input.data) return SendStatus::failed;
   input.size = static_cast<std::uint16_t>(report.size());
   std::memcpy(input.data, report.data(), report.size());
-  if (::write(uhid_.get(), &input, kInputHeader + report.size()) < 0) {
-    if (errno == EAGAIN || errno == EINTR) return SendStatus::skipped;
+  if (write_event(uhid_, &input, kInputHeader + report.size()) < 0) {
+    if (errno == EAGAIN) return SendStatus::skipped;
     error_ = errno;
     return SendStatus::failed;
   }
@@ -175,7 +181,7 @@ void UhidDevice::answer_get_report() noexcept {
     reply.size = static_cast<std::uint16_t>(last_input_.size);
     std::memcpy(reply.data, last_input_.bytes.data(), last_input_.size);
   }
-  [[maybe_unused]] const ssize_t written = ::write(uhid_.get(), event_.get(), sizeof(uhid_event));
+  [[maybe_unused]] const ssize_t written = write_event(uhid_, event_.get(), sizeof(uhid_event));
 }
 
 std::optional<HidOutputReport> UhidDevice::next_output() noexcept {
@@ -199,7 +205,7 @@ std::optional<HidOutputReport> UhidDevice::next_output() noexcept {
       event_->type = UHID_SET_REPORT_REPLY;
       event_->u.set_report_reply.id = id;
       event_->u.set_report_reply.err = output ? 0 : EIO;
-      [[maybe_unused]] const ssize_t n = ::write(uhid_.get(), event_.get(), sizeof(uhid_event));
+      [[maybe_unused]] const ssize_t n = write_event(uhid_, event_.get(), sizeof(uhid_event));
       if (output) return report;
     }
   }

@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "host/config_error.h"
+#include "host/os/uninterrupted.h"
 #include "host/source/v4l2_controls.h"
 #include "host/source/v4l2_nodes.h"
 
@@ -57,7 +58,7 @@ TimePoint time_of(const timeval& stamp) {
 }
 
 int open_node(const std::string& path, UniqueFd& fd) {
-  fd.reset(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+  fd.reset(uninterrupted([&] { return ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC); }));
   return fd ? 0 : errno;
 }
 

@@ -11,6 +11,7 @@
 
 #include "host/config_error.h"
 #include "host/os/config_folder.h"
+#include "host/os/uninterrupted.h"
 #include "host/source/v4l2_mode.h"
 #include "host/tell.h"
 #include "host/verbs/recording.h"
@@ -34,15 +35,20 @@ std::vector<Spec> specs_of(const RunOptions& options) {
   return specs;
 }
 
-/// In the browser of the desktop, where there is one; the shell leaves it to itself.
+/// In the browser of the desktop, where there is one; the shell leaves it to itself, and Ctrl-C in
+/// our terminal too.
 void open_in_browser(const std::string& url) {
   if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
   std::string shell = "sh", option = "-c", command = "xdg-open \"$0\" >/dev/null 2>&1 </dev/null &",
               address = url;
   char* const arguments[] = {shell.data(), option.data(), command.data(), address.data(), nullptr};
+  posix_spawnattr_t own_session;
+  ::posix_spawnattr_init(&own_session);
+  ::posix_spawnattr_setflags(&own_session, POSIX_SPAWN_SETSID);
   pid_t pid = 0;
-  if (::posix_spawn(&pid, "/bin/sh", nullptr, nullptr, arguments, environ) == 0)
-    ::waitpid(pid, nullptr, 0);
+  if (::posix_spawn(&pid, "/bin/sh", nullptr, &own_session, arguments, environ) == 0)
+    uninterrupted([&] { return ::waitpid(pid, nullptr, 0); });
+  ::posix_spawnattr_destroy(&own_session);
 }
 
 /// What a job would cut off.

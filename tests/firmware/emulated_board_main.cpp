@@ -7,7 +7,6 @@
 // light, `led TIME_S LEVEL`, times on CLOCK_MONOTONIC, levels from 0 to 1.
 #include <poll.h>
 #include <sys/prctl.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -17,6 +16,7 @@
 #include <fstream>
 
 #include "host/config_error.h"
+#include "host/os/termination.h"
 #include "tests/firmware/board_orders.h"
 #include "tests/firmware/other_version.h"
 
@@ -213,14 +213,6 @@ class RealTimeBoard {
   bool same_baud_ = true;
 };
 
-UniqueFd ends() {
-  sigset_t ends;
-  sigemptyset(&ends);
-  for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&ends, number);
-  sigprocmask(SIG_BLOCK, &ends, nullptr);
-  return UniqueFd(::signalfd(-1, &ends, SFD_CLOEXEC));
-}
-
 int run(int argc, char** argv) {
   Options options;
   CLI::App app("tagwrench's board, emulated: the flashable image on a pseudo terminal");
@@ -255,8 +247,8 @@ int run(int argc, char** argv) {
     options.cells.push_back(*cell);
   }
   // Before the port has its name, which whoever ends this program wants removed.
-  const UniqueFd signals = ends();
-  return RealTimeBoard(options).run(signals.get());
+  const UniqueFd termination = termination_fd();
+  return RealTimeBoard(options).run(termination.get());
 }
 
 }  // namespace

@@ -26,8 +26,7 @@ RecordedCalibration calibration_in(const record::Head& head);
 
 class CalibrationRecorder {
  public:
-  /// Starts a thread: signals that a descriptor waits for must be blocked by then. Throws
-  /// ConfigError.
+  /// Starts a thread. Throws ConfigError.
   CalibrationRecorder(const record::WriterOptions& options, const record::Head& head)
       : writer_(options, head) {}
 

@@ -16,6 +16,7 @@
 
 #include "host/config_error.h"
 #include "host/os/close_files.h"
+#include "host/os/termination.h"
 #include "host/os/unique_fd.h"
 
 namespace tagwrench {
@@ -43,7 +44,8 @@ Pipe make_pipe() {
           UniqueFd(::fcntl(write.get(), F_DUPFD_CLOEXEC, kAboveOthers))};
 }
 
-/// Of the child, between fork and exec: nothing but system calls.
+/// Of the child, between fork and exec: nothing but system calls, as other threads run and may hold
+/// any lock. (_Fork(): no handlers of libraries either.)
 struct Child {
   std::array<int, 4> fds;  ///< that become 0 to 3
   std::vector<int> kept;
@@ -55,6 +57,7 @@ struct Child {
   pid_t parent = ::getpid();
 
   [[noreturn]] void become() {
+    forget_termination();  // before it can come
     sigset_t none;
     sigemptyset(&none);
     ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
@@ -116,7 +119,7 @@ void JobProcess::spawn(const std::string& program, const JobCommand& command) {
   if (command.tells_events) child.words.push_back(fmt::format("--events={}", kEventsFd));
   for (std::string& word : child.words) child.argv.push_back(word.data());
   child.argv.push_back(nullptr);
-  pid_ = ::fork();
+  pid_ = ::_Fork();
   if (pid_ == 0) child.become();
   if (pid_ < 0) {
     throw ConfigError(fmt::format("job: {} cannot be started: {}; end other programs", program,
