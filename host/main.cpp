@@ -215,8 +215,7 @@ void open_standard_streams() {
 int main(int argc, char** argv) {
   open_standard_streams();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes becomes an error code
-  cv::setNumThreads(
-      1);  // one thread, one poll loop; and a fork must find a single-threaded process
+  cv::setNumThreads(1);           // one thread, one poll loop
   try {
     return dispatch(argc, argv);
   } catch (const tagwrench::ConfigError& e) {
