@@ -1,5 +1,6 @@
 #include "host/os/close_files.h"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,8 +11,10 @@ namespace {
 
 void close_gap(unsigned first, unsigned last) noexcept {
   if (first > last || close_range(first, last, 0) == 0) return;
-  const long limit = std::min<long>(sysconf(_SC_OPEN_MAX), 65536);  // kernels before 5.9
-  for (unsigned fd = first; fd <= last && static_cast<long>(fd) < limit; ++fd) {
+  rlimit files{};  // kernels before 5.9
+  getrlimit(RLIMIT_NOFILE, &files);
+  const rlim_t limit = std::min<rlim_t>(files.rlim_cur, 65536);
+  for (unsigned fd = first; fd <= last && fd < limit; ++fd) {
     ::close(static_cast<int>(fd));
   }
 }

@@ -35,8 +35,9 @@ constexpr char kReady = 'r';
 static_assert(std::atomic<std::int64_t>::is_always_lock_free);
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-// From here to the end of the namespace: the guardian's side. It may be forked from a process with
-// threads, so it makes async-signal-safe calls only, and no allocation.
+// From here to the end of the namespace: the guardian's side. It is forked from a process that may
+// have threads, so it makes async-signal-safe calls only (and prctl, a plain system call): no
+// allocation, no lock, no locale.
 
 std::int64_t now_ns() {
   timespec t{};
@@ -118,7 +119,7 @@ DeadMan::DeadMan(const std::vector<DeadManDevice>& devices) {
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
-  guardian_ = fork();
+  guardian_ = _Fork();
   if (guardian_ != 0) {
     const int error = errno;
     char ready = 0;

@@ -30,10 +30,13 @@ struct DeadManDevice {
   std::vector<std::uint8_t> destroy;  ///< may be empty: the last close() then removes the device
 };
 
-/// Construct it after the outputs and before any thread; destroy it before the outputs. A camera
-/// may be open: the guardian keeps no other file open, and capture buffers are mapped
-/// MADV_DONTFORK. It leaves the terminal's session, so Ctrl-C and Ctrl-Z reach the bridge alone;
-/// its name is "tw-guardian", so that a kill by the bridge's name spares it.
+/// Construct it after the outputs; destroy it before the outputs. Other threads may run, as
+/// libraries start them: _Fork() calls no handlers of theirs, and the guardian makes
+/// async-signal-safe calls only, so that no lock which such a thread held at the fork is ever
+/// taken. (A program of its own would load the same libraries, and have their threads in the
+/// guardian.) A camera may be open: the guardian keeps no other file open, and capture buffers are
+/// mapped MADV_DONTFORK. It leaves the terminal's session, so Ctrl-C and Ctrl-Z reach the bridge
+/// alone; its name is "tw-guardian", so that a kill by the bridge's name spares it.
 class DeadMan {
  public:
   /// Throws ConfigError if there are no processes or memory to be had. Without devices nothing is

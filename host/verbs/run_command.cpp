@@ -84,8 +84,7 @@ void say_zero(const ZeroTracking& zero, const Vector6& range, double band) {
       most > 0.9 * band ? ", about as far as it may: run `tagwrench zero`" : ""));
 }
 
-/// What is recorded of the run, told to all who have something to say. The guardian of the outputs
-/// has been forked already: the recording has a thread.
+/// What is recorded of the run, told to all who have something to say.
 Recording& start_recording(const RunOptions& options, const record::Head& head, const Input& input,
                            const RunLimits& limits, RunBoard* board, Outputs& outputs) {
   const bool lossless = options.fast && input.source->poll_fd() < 0;
