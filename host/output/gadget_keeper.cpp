@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "host/config_error.h"
+#include "host/os/uninterrupted.h"
 #include "host/output/hid_report.h"
 
 namespace tagwrench {
@@ -46,6 +47,7 @@ GadgetKeeper::GadgetKeeper(GadgetFace face, UniqueFd link, UniqueFd watch, Opene
 }
 
 void GadgetKeeper::run() noexcept {
+  tell_bridge(GadgetNews::ready);
   while (true) {
     flush();
     if (ended_ && (!node_.fd || away_ || !reports_.owed())) return;
@@ -200,11 +202,13 @@ void rest_gadget(int node, GadgetFace face) noexcept {
     const auto left =
         std::chrono::ceil<milliseconds>(end - std::chrono::steady_clock::now()).count();
     pollfd room{node, POLLOUT, 0};
-    return left > 0 && ::poll(&room, 1, static_cast<int>(left)) > 0;
+    if (left <= 0) return false;
+    const int ready = ::poll(&room, 1, static_cast<int>(left));
+    return ready > 0 || (ready < 0 && errno == EINTR);
   };
   while (reports.owed()) {
     const std::span<const std::uint8_t> report = reports.next();
-    if (::write(node, report.data(), report.size()) >= 0) {
+    if (uninterrupted([&] { return ::write(node, report.data(), report.size()); }) >= 0) {
       reports.taken();
     } else if (errno != EAGAIN || !wait_for_room()) {
       return;

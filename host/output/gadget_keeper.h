@@ -26,6 +26,7 @@ namespace tagwrench {
 /// What the keeper tells the bridge, a message of one byte each.
 enum class GadgetNews : std::uint8_t {
   none,
+  ready,   ///< it is there: the first message
   taken,   ///< the other computer takes reports
   nobody,  ///< there is no other computer, or it has not set the device up
   asleep,  ///< it does not ask for reports

@@ -1,5 +1,6 @@
 #include "host/output/gadget_output.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
@@ -16,7 +17,9 @@
 #include <utility>
 
 #include "host/config_error.h"
-#include "host/os/close_files.h"
+#include "host/os/spawn_daemon.h"
+#include "host/os/termination.h"
+#include "host/os/uninterrupted.h"
 #include "host/output/hid_report.h"
 #include "host/output/shown.h"
 
@@ -24,6 +27,7 @@ namespace tagwrench {
 namespace {
 
 constexpr std::uint16_t k3dconnexion = 0x256f;
+constexpr int kStart_ms = 10'000;  // of a keeper on a busy machine
 constexpr int kPatience_ms = 300;  // with a computer that takes rest in its own time
 
 using Packet =
@@ -62,6 +66,7 @@ std::string_view news_text(GadgetNews news) noexcept {
     case GadgetNews::led_on:
       return "gadget: LED on";
     case GadgetNews::none:
+    case GadgetNews::ready:
       break;
   }
   return {};
@@ -73,6 +78,10 @@ std::string up_command(const GadgetOptions& options) {
     command += fmt::format(" --face {}", face_name(*options.face));
   if (options.name != GadgetOptions().name) command += " --name " + options.name;
   return command;
+}
+
+[[noreturn]] void no_keeper(const char* what, const char* why) {
+  throw ConfigError(fmt::format("gadget: {}: {}; end other programs", what, why));
 }
 
 [[noreturn]] void cannot_open(const GadgetOptions& options, const OpenedNode& node) {
@@ -112,52 +121,69 @@ GadgetPort find_gadget(const GadgetOptions& options) {
   GadgetPort port;
   port.face = *found->face;
   port.spnav_order = found->id.vendor != k3dconnexion;
-  port.folder = options.places.devices;
-  port.open = [places = options.places, function = tree.function(options.name, port.face)] {
-    return open_gadget_node(GadgetFiles(), places, function);
-  };
-  port.node = port.open();
+  port.places = options.places;
+  port.function = tree.function(options.name, port.face);
+  port.node = open_gadget_node(files, port.places, port.function);
   if (!port.node.fd) cannot_open(options, port.node);
   return port;
 }
 
-GadgetOutput::GadgetOutput(GadgetPort port)
-    : face_(port.face), spnav_order_(port.spnav_order), open_(port.open) {
-  start_keeper(std::move(port));
+void keep_gadget(const GadgetInheritance& given) {
+  ::prctl(PR_SET_NAME, "tw-gadget");  // so that a kill by the bridge's name spares it
+  ignore_signals();                   // Ctrl-C is for the bridge: the keeper ends with its link
+  UniqueFd link(kFirstDaemonFd), watch(kFirstDaemonFd + 1);
+  OpenedNode node;
+  node.fd.reset(kFirstDaemonFd + 2);
+  node.path = given.node;
+  for (const UniqueFd* fd : {&link, &watch, &node.fd}) {
+    // A bridge's they are not if the verb is typed.
+    if (::fcntl(fd->get(), F_SETFD, FD_CLOEXEC) != 0)
+      throw ConfigError("gadget keep: is for `tagwrench run --output gadget`, which starts it");
+  }
+  GadgetKeeper(given.face, std::move(link), std::move(watch), std::move(node), [given] {
+    return open_gadget_node(GadgetFiles(), given.places, given.function);
+  }).run();
 }
 
-void GadgetOutput::start_keeper(GadgetPort port) {
-  const auto fail = [](const char* what) {
-    throw ConfigError(
-        fmt::format("gadget: {}: {}; end other programs", what, std::strerror(errno)));
-  };
-  UniqueFd watch = watch_nodes(port.folder);
+GadgetOutput::GadgetOutput(GadgetPort port)
+    : face_(port.face),
+      spnav_order_(port.spnav_order),
+      places_(port.places),
+      function_(port.function) {
+  start_keeper(port);
+  port.node.fd.reset();  // the keeper's alone
+  await_keeper();
+}
+
+/// By exec and not by fork alone: it allocates, and a thread of a library may hold malloc's lock.
+void GadgetOutput::start_keeper(const GadgetPort& port) {
+  const UniqueFd watch = watch_nodes(port.places.devices);
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0)
-    fail("cannot make a socket");
+    no_keeper("cannot make a socket", std::strerror(errno));
   link_.reset(ends[0]);
-  UniqueFd keeper_end(ends[1]);
-  std::vector<int> kept{keeper_end.get(), watch.get(), port.node.fd.get()};
-  std::sort(kept.begin(), kept.end());
+  const UniqueFd keeper_end(ends[1]);
+  const int inherited[] = {keeper_end.get(), watch.get(), port.node.fd.get()};
+  const int error =
+      spawn_daemon(keeper_, port.program,
+                   {"tagwrench", "gadget", "keep", "--face", std::string(face_name(face_)),
+                    "--sysfs", port.places.sysfs, "--devices", port.places.devices, "--function",
+                    port.function, "--node", port.node.path},
+                   inherited, DaemonSignals::blocked);
+  if (error != 0) no_keeper("cannot start its process", std::strerror(error));
+}
 
-  // Ctrl-C is for the bridge: the keeper ends with its link.
-  sigset_t all, before;
-  sigfillset(&all);
-  ::pthread_sigmask(SIG_SETMASK, &all, &before);
-  keeper_ = ::fork();
-  if (keeper_ == 0) {
-    ::setsid();
-    ::prctl(PR_SET_NAME, "tw-gadget");  // so that a kill by the bridge's name spares it
-    close_all_but(kept);
-    GadgetKeeper(face_, std::move(keeper_end), std::move(watch), std::move(port.node),
-                 std::move(port.open))
-        .run();
-    ::_exit(0);
-  }
-  const int error = errno;
-  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  errno = error;
-  if (keeper_ < 0) fail("cannot start its process");
+void GadgetOutput::await_keeper() {
+  pollfd first{link_.get(), POLLIN, 0};
+  uninterrupted([&] { return ::poll(&first, 1, kStart_ms); });
+  GadgetNews news{};
+  const ssize_t got = ::recv(link_.get(), &news, sizeof news, MSG_DONTWAIT);
+  if (got == sizeof news && news == GadgetNews::ready) return;
+  const char* why = got < 0 ? "it says nothing" : "it has ended";
+  link_.reset();
+  ::kill(keeper_, SIGKILL);
+  uninterrupted([this] { return ::waitpid(keeper_, nullptr, 0); });
+  no_keeper("its process does not begin", why);
 }
 
 GadgetOutput::~GadgetOutput() {
@@ -165,10 +191,12 @@ GadgetOutput::~GadgetOutput() {
   const bool there = !lost_;
   ::shutdown(link_.get(), SHUT_WR);  // the guardian's duplicate cannot keep it open
   pollfd gone{link_.get(), 0, 0};
-  if (::poll(&gone, 1, kPatience_ms) > 0) ::waitpid(keeper_, nullptr, 0);
+  const auto wait = [&] { return ::poll(&gone, 1, kPatience_ms); };
+  if (uninterrupted(wait) > 0) uninterrupted([this] { return ::waitpid(keeper_, nullptr, 0); });
   if (there) return;
   try {
-    if (const OpenedNode node = open_(); node.fd) rest_gadget(node.fd.get(), face_);
+    const OpenedNode node = open_gadget_node(GadgetFiles(), places_, function_);
+    if (node.fd) rest_gadget(node.fd.get(), face_);
   } catch (const std::exception&) {
     return;  // out of memory: what can be said is failure()
   }

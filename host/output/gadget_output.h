@@ -26,13 +26,25 @@ struct GadgetOptions {
 struct GadgetPort {
   GadgetFace face = GadgetFace::spacemouse;
   bool spnav_order = false;  ///< see SpacemouseOptions::vendor
-  std::string folder;        ///< of the nodes
+  KernelPlaces places;
+  std::string function;  ///< of the gadget, in configfs
   OpenedNode node;
-  GadgetKeeper::OpenNode open;
+  /// Program whose verb `gadget` has the keeper.
+  std::string program = "/proc/self/exe";
 };
 
 /// Throws ConfigError: not up, another face, no permission, another bridge writes to it.
 GadgetPort find_gadget(const GadgetOptions& options);
+
+/// The life of the keeper that a GadgetOutput starts (`tagwrench gadget keep`), by what it was
+/// given.
+struct GadgetInheritance {
+  GadgetFace face = GadgetFace::spacemouse;
+  KernelPlaces places;
+  std::string function;
+  std::string node;  ///< path
+};
+void keep_gadget(const GadgetInheritance& given);
 
 /// The SpaceMouse moves with every move() as SpacemouseOutput does; the wrench sensor has a report
 /// for every send(). The other computer's going, sleeping and coming back are no failures: it gets
@@ -53,12 +65,14 @@ class GadgetOutput : public Output {
   void add_to(std::vector<DeadManDevice>& devices) const;
 
  private:
-  void start_keeper(GadgetPort port);
+  void start_keeper(const GadgetPort& port);
+  void await_keeper();
   SendStatus put(std::span<const std::uint8_t> reports) noexcept;
 
   GadgetFace face_;
   bool spnav_order_;
-  GadgetKeeper::OpenNode open_;
+  KernelPlaces places_;
+  std::string function_;
   UniqueFd link_;
   pid_t keeper_ = 0;
   bool lost_ = false;  ///< the keeper

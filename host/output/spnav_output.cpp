@@ -1,21 +1,19 @@
 #include "host/output/spnav_output.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <spawn.h>
 #include <sys/wait.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <cstring>
 #include <exception>
 #include <span>
 #include <utility>
 
 #include "host/config_error.h"
+#include "host/os/spawn_daemon.h"
 #include "host/output/shown.h"
 
 namespace tagwrench {
@@ -33,13 +31,6 @@ constexpr Duration kBetweenAttempts = std::chrono::seconds(1);
 constexpr Duration kGrace = milliseconds(60);
 constexpr Duration kShortestInterval = milliseconds(8);
 constexpr Duration kSlowestInterval = milliseconds(250);
-
-// The keeper's descriptors; 0 to 2 are /dev/null.
-constexpr int kProgramsFd = 3;
-constexpr int kBridgeFd = 4;
-
-/// A descriptor that the rearrangement of low numbers leaves alone.
-UniqueFd out_of_the_way(int fd) { return UniqueFd(::fcntl(fd, F_DUPFD_CLOEXEC, kBridgeFd + 1)); }
 
 SpnavHello hello_of(const SpnavOptions& options) noexcept {
   SpnavHello hello;
@@ -61,47 +52,6 @@ std::string_view write_line(std::span<char> into, fmt::format_string<Args...> fo
     return {};
   }
 }
-
-/// What posix_spawn is told: what to do in the child before the program starts.
-class SpawnPlan {
- public:
-  SpawnPlan(int programs, int bridge) {
-    posix_spawn_file_actions_init(&actions_);
-    posix_spawn_file_actions_addopen(&actions_, 0, "/dev/null", O_RDWR, 0);
-    posix_spawn_file_actions_adddup2(&actions_, 0, 1);
-    posix_spawn_file_actions_adddup2(&actions_, 0, 2);
-    posix_spawn_file_actions_adddup2(&actions_, programs, kProgramsFd);
-    posix_spawn_file_actions_adddup2(&actions_, bridge, kBridgeFd);
-    posix_spawn_file_actions_addclosefrom_np(&actions_, kBridgeFd + 1);
-    posix_spawn_file_actions_addchdir_np(&actions_, "/");
-    posix_spawnattr_init(&attributes_);
-    sigset_t none;
-    sigset_t all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_setsigmask(&attributes_, &none);
-    posix_spawnattr_setsigdefault(&attributes_, &all);
-    posix_spawnattr_setflags(&attributes_,
-                             POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  }
-  SpawnPlan(const SpawnPlan&) = delete;
-  SpawnPlan& operator=(const SpawnPlan&) = delete;
-  ~SpawnPlan() {
-    posix_spawn_file_actions_destroy(&actions_);
-    posix_spawnattr_destroy(&attributes_);
-  }
-
-  int spawn(pid_t& pid, const std::string& program, std::vector<std::string> arguments) const {
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    return ::posix_spawn(&pid, program.c_str(), &actions_, &attributes_, argv.data(), environ);
-  }
-
- private:
-  posix_spawn_file_actions_t actions_;
-  posix_spawnattr_t attributes_;
-};
 
 }  // namespace
 
@@ -140,12 +90,11 @@ bool SpnavOutput::reach_keeper() {
 void SpnavOutput::start_keeper(const SpnavSockets& sockets) {
   if (keeper_ > 0) ::waitpid(keeper_, nullptr, WNOHANG);
   keeper_ = 0;
-  const UniqueFd programs = out_of_the_way(sockets.programs.get());
-  const UniqueFd bridge = out_of_the_way(sockets.bridge.get());
-  const SpawnPlan plan(programs.get(), bridge.get());
-  const int failed = plan.spawn(keeper_, options_.program,
-                                {"tagwrench", "spnav", "--socket", path_, "--inherited",
-                                 fmt::format("{},{}", kProgramsFd, kBridgeFd)});
+  const int inherited[] = {sockets.programs.get(), sockets.bridge.get()};
+  const int failed = spawn_daemon(keeper_, options_.program,
+                                  {"tagwrench", "spnav", "--socket", path_, "--inherited",
+                                   fmt::format("{},{}", kFirstDaemonFd, kFirstDaemonFd + 1)},
+                                  inherited, DaemonSignals::delivered);
   if (failed == 0) return;
   sockets.remove();
   throw ConfigError(

@@ -66,6 +66,7 @@ std::string run_command_of(const std::string& name) {
 
 GadgetCommand::GadgetCommand(CLI::App& app)
     : verb_(app.add_subcommand("gadget", "be a USB device of another computer")),
+      keep_(verb_->add_subcommand("keep")->group("")),
       up_(verb_->add_subcommand("up", "make the device and offer it at the USB device port")),
       down_(verb_->add_subcommand("down", "take it away; done if it is not there")) {
   verb_->require_subcommand(1);
@@ -80,12 +81,21 @@ GadgetCommand::GadgetCommand(CLI::App& app)
       ->capture_default_str();
   up_->add_option("--id", id_, "VENDOR:PRODUCT; without it 256f:c62e, and of the wrench 1209:7a6e");
   up_->add_option("--udc", udc_, "USB device controller; without it the first free one");
+  keep_->add_option("--face", face_)->check(CLI::IsMember({"spacemouse", "wrench"}));
+  keep_->add_option("--sysfs", inherited_.places.sysfs);
+  keep_->add_option("--devices", inherited_.places.devices);
+  keep_->add_option("--function", inherited_.function)->required();
+  keep_->add_option("--node", inherited_.node)->required();
   up_->add_flag("--self-powered", self_powered_,
                 "the board has a supply of its own; without it up to 500 mA are asked for");
 }
 
 int GadgetCommand::run() const {
-  if (up_->parsed()) {
+  if (keep_->parsed()) {
+    GadgetInheritance given = inherited_;
+    given.face = face_of(face_).value();
+    keep_gadget(given);
+  } else if (up_->parsed()) {
     up();
   } else if (down_->parsed()) {
     down();

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "host/output/gadget_kernel.h"
+#include "host/output/gadget_output.h"
 #include "host/output/gadget_tree.h"
 
 namespace tagwrench {
@@ -24,9 +25,11 @@ class GadgetCommand {
   void status() const;
 
   CLI::App* verb_;
+  CLI::App* keep_;
   CLI::App* up_;
   CLI::App* down_;
   KernelPlaces places_;
+  GadgetInheritance inherited_;  ///< of `keep`
   std::string name_ = "sensor";
   std::string face_ = "spacemouse";
   std::string id_;
