@@ -15,6 +15,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/os/unique_fd.h"
@@ -30,12 +31,24 @@ struct Outcome {
   std::string err;
 };
 
-/// A running bridge; read its streams, signal it, wait for it.
+/// What a program is started with beside its arguments.
+struct Surroundings {
+  std::string input = "/dev/null";            ///< path of its standard input
+  std::vector<std::string> environment = {};  ///< NAME=VALUE, beside what this program has
+  std::vector<int> ignored = {};              ///< signals, as in a shell's background job
+  std::vector<int> blocked = {};              ///< signals
+};
+
+/// A running bridge; read its streams, signal it, wait for it. However this program was started, it
+/// has the default actions of the signals that end programs, and none of them blocked.
 class Bridge {
  public:
   /// `input` is the path of its standard input.
   explicit Bridge(const std::vector<std::string>& arguments, const std::string& input = "/dev/null",
-                  const std::string& program = TAGWRENCH_PROGRAM) {
+                  const std::string& program = TAGWRENCH_PROGRAM)
+      : Bridge(arguments, Surroundings{.input = input}, program) {}
+  Bridge(const std::vector<std::string>& arguments, const Surroundings& surroundings,
+         const std::string& program = TAGWRENCH_PROGRAM) {
     int out[2];
     int err[2];
     if (::pipe2(out, O_CLOEXEC) != 0 || ::pipe2(err, O_CLOEXEC) != 0)
@@ -47,13 +60,32 @@ class Bridge {
     std::vector<char*> argv;
     for (std::string& a : all) argv.push_back(a.data());
     argv.push_back(nullptr);
+    std::vector<std::string> own = surroundings.environment;
+    std::vector<char*> environment;  // the first of a name counts
+    for (std::string& variable : own) environment.push_back(variable.data());
+    for (char** variable = environ; *variable != nullptr; ++variable)
+      environment.push_back(*variable);
+    environment.push_back(nullptr);
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, 0, input.c_str(), O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, 0, surroundings.input.c_str(), O_RDONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, out[1], 1);
     posix_spawn_file_actions_adddup2(&actions, err[1], 2);
-    const int failed =
-        ::posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
+    sigset_t blocked = set_of(surroundings.blocked);
+    sigset_t defaults = set_of({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
+    for (const int number : surroundings.ignored) sigdelset(&defaults, number);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setsigmask(&attributes, &blocked);
+    posix_spawnattr_setsigdefault(&attributes, &defaults);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    std::vector<std::pair<int, sighandler_t>> before;
+    for (const int number : surroundings.ignored)
+      before.emplace_back(number, std::signal(number, SIG_IGN));
+    const int failed = ::posix_spawn(&pid_, program.c_str(), &actions, &attributes, argv.data(),
+                                     environment.data());
+    for (const auto& [number, action] : before) std::signal(number, action);
+    posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     ::close(out[1]);
     ::close(err[1]);
@@ -93,6 +125,19 @@ class Bridge {
   void close_stdout() { out_.reset(); }
   void close_stderr() { err_.reset(); }
   void signal(int number) { ::kill(pid_, number); }
+  pid_t pid() const { return pid_; }
+  /// Its threads whose name this is; all, without a name.
+  std::vector<pid_t> threads(const std::string& name = "") const {
+    std::vector<pid_t> found;
+    const std::filesystem::path tasks = "/proc/" + std::to_string(pid_) + "/task";
+    for (const auto& task : std::filesystem::directory_iterator(tasks)) {
+      std::string its;
+      std::getline(std::ifstream(task.path() / "comm"), its);
+      if (name.empty() || its == name) found.push_back(std::stoi(task.path().filename()));
+    }
+    return found;
+  }
+  void signal_thread(pid_t thread, int number) { ::tgkill(pid_, thread, number); }
 
   /// Reads a small pipe once every 150 ms, much longer than a frame may take, so that the program
   /// must wait.
@@ -117,6 +162,12 @@ class Bridge {
   }
 
  private:
+  static sigset_t set_of(const std::vector<int>& signals) {
+    sigset_t set;
+    sigemptyset(&set);
+    for (const int number : signals) sigaddset(&set, number);
+    return set;
+  }
   /// Reads what is there; false when both streams have ended.
   bool pump() {
     pollfd fds[2] = {{out_.get(), POLLIN, 0}, {err_.get(), POLLIN, 0}};

@@ -9,10 +9,13 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <string>
+#include <thread>
 
 namespace tagwrench {
 namespace {
@@ -216,6 +219,38 @@ TEST(DeadMan, SignalsOfTheTerminalDoNotReachTheGuardian) {
   EXPECT_NE(getsid(bridge.guardian()), getsid(0));
   bridge.kill(SIGKILL);
   EXPECT_EQ(take_all(hid.read.get()), "ND");
+}
+
+/// A process that libraries have filled with threads and fork handlers, as far as it must be
+/// feared.
+bool comes_up_beside_a_busy_library() {
+  ::pthread_atfork(nullptr, nullptr, [] { _exit(3); });  // as if it waited for a lock for ever
+  std::atomic<bool> over{false};
+  std::thread library([&over] {
+    for (std::size_t size = 1; !over; size = size % 100'000 + 997) std::free(std::malloc(size));
+  });
+  bool up = true;
+  Pipe hid;
+  for (int i = 0; i < 50 && up; ++i) {
+    DeadMan dead_man({device(hid)});
+    dead_man.expect_by(steady_clock::now());
+    up = take(hid.read.get(), 1) == "N";
+  }
+  over = true;
+  library.join();
+  return up;
+}
+
+TEST(DeadMan, TheGuardianComesUpWhateverLocksTheThreadsOfLibrariesHold) {
+  const pid_t process = fork();
+  if (process == 0) {
+    ::alarm(60);
+    _exit(comes_up_beside_a_busy_library() ? 7 : 1);
+  }
+  int status = 0;
+  waitpid(process, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 7);
 }
 
 TEST(DeadMan, TheGuardianHoldsTheDevicesAndNothingElse) {

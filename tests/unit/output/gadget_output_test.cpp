@@ -12,8 +12,10 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "gadget_rig.h"
 #include "host/config_error.h"
 #include "host/output/gadget_reports.h"
 #include "host/output/hid_report.h"
@@ -113,12 +115,15 @@ class OtherComputer {
     GadgetPort port;
     port.face = face;
     port.spnav_order = spnav_order;
-    port.folder = testing::TempDir();
+    port.places.devices = testing::TempDir();
     port.node.fd = std::move(node_);
     port.node.path = "/dev/hidg-of-this-test";
-    port.open = [] { return OpenedNode(); };
+    port.function = "/no/such/gadget";
+    port.program = TAGWRENCH_PROGRAM;
     return port;
   }
+  /// For a keeper in this program.
+  OpenedNode node(const std::string& path) { return {std::move(node_), path}; }
 
   /// The next report; empty once everybody at the other end has gone.
   Report take() {
@@ -313,30 +318,100 @@ class SecondNode {
   UniqueFd server_;
 };
 
-TEST(GadgetSpacemouse, ANodeThatGoesIsLeftAtRestAndTheNextOneIsToldHowThingsAre) {
-  std::string pattern = testing::TempDir() + "tagwrench-nodes-XXXXXX";
-  const std::string folder = ::mkdtemp(pattern.data());
-  const SecondNode second(folder + ".socket");
+/// A keeper in a thread, with a bridge by hand: what it opens by itself is no real node.
+class KeeperByHand {
+ public:
+  KeeperByHand(const std::string& folder, OpenedNode node, GadgetKeeper::OpenNode open) {
+    int ends[2];
+    EXPECT_EQ(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends), 0);
+    bridge_.reset(ends[0]);
+    thread_ = std::thread([link = ends[1], folder, node = std::move(node), open]() mutable {
+      GadgetKeeper(GadgetFace::spacemouse, UniqueFd(link), watch_nodes(folder), std::move(node),
+                   open)
+          .run();
+    });
+  }
+  ~KeeperByHand() {
+    bridge_.reset();
+    thread_.join();
+  }
+  void put(const Report& report) {
+    EXPECT_EQ(send(bridge_.get(), report.data(), report.size(), 0),
+              static_cast<ssize_t>(report.size()));
+  }
+  GadgetNews news() {
+    GadgetNews news{};
+    pollfd waiting{bridge_.get(), POLLIN, 0};
+    if (poll(&waiting, 1, kGadgetPatience_ms) != 1) return {};
+    EXPECT_EQ(recv(bridge_.get(), &news, sizeof news, 0), 1);
+    return news;
+  }
+
+ private:
+  UniqueFd bridge_;
+  std::thread thread_;
+};
+
+TEST(GadgetKeeper, ANodeThatGoesIsLeftAtRestAndTheNextOneIsToldHowThingsAre) {
+  const test::TemporaryTree folder;
+  const SecondNode second(folder / "socket");
   OtherComputer first;
-  GadgetPort port = first.port(GadgetFace::spacemouse);
-  port.folder = folder;
-  port.node.path = folder + "/hidg0";
-  std::ofstream(port.node.path) << "";
-  port.open = second.opener();
-  GadgetOutput output(std::move(port));
-  EXPECT_EQ(news_of(output), "gadget: the other computer takes reports");
-  Sample pressed = test::moving(1);
-  pressed.buttons = 1;
-  output.move(pressed);
+  std::ofstream(folder / "hidg0") << "";
+  KeeperByHand keeper(folder.path(), first.node(folder / "hidg0"), second.opener());
+  EXPECT_EQ(keeper.news(), GadgetNews::ready);
+  EXPECT_EQ(keeper.news(), GadgetNews::taken);
+  keeper.put(both({350}, 1));
   EXPECT_TRUE(first.take_until(button_report(1)));
-  ::unlink((folder + "/hidg0").c_str());
+  ::unlink((folder / "hidg0").c_str());
   EXPECT_TRUE(first.take_until(button_report(0)));
-  EXPECT_NE(news_of(output).find("taken down"), std::string::npos);
-  std::ofstream(folder + "/hidg1") << "";
+  EXPECT_EQ(keeper.news(), GadgetNews::gone);
+  std::ofstream(folder / "hidg1") << "";
   EXPECT_EQ(second.take_buttons(), button_report(1));  // told to the first one only, until now
-  EXPECT_EQ(news_of(output), "gadget: the other computer takes reports");
-  ::unlink((folder + "/hidg1").c_str());
-  ::rmdir(folder.c_str());
+  EXPECT_EQ(keeper.news(), GadgetNews::taken);
+}
+
+/// Of this process, by its name.
+pid_t child_named(const std::string& name) {
+  std::ifstream children("/proc/self/task/" + std::to_string(::getpid()) + "/children");
+  for (pid_t child; children >> child;) {
+    std::string its;
+    std::getline(std::ifstream("/proc/" + std::to_string(child) + "/comm"), its);
+    if (its == name) return child;
+  }
+  return 0;
+}
+
+TEST(GadgetSpacemouse, NoSignalEndsItsKeeperInAnyThread) {
+#ifdef TAGWRENCH_FOREIGN_THREAD
+  ::setenv("LD_PRELOAD", TAGWRENCH_FOREIGN_THREAD, 1);  // a library's thread that takes them
+#endif
+  OtherComputer other;
+  GadgetOutput output(other.port(GadgetFace::spacemouse));
+  const pid_t keeper = child_named("tw-gadget");
+  ASSERT_GT(keeper, 0);
+  EXPECT_EQ(::getsid(keeper), keeper);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGALRM, SIGPIPE}) {
+    EXPECT_EQ(::kill(keeper, number), 0);
+    const std::string tasks = "/proc/" + std::to_string(keeper) + "/task";
+    for (const auto& task : std::filesystem::directory_iterator(tasks))
+      EXPECT_EQ(::tgkill(keeper, std::stoi(task.path().filename()), number), 0);
+  }
+  output.move(test::moving(1));
+  EXPECT_TRUE(other.take_until(motion_report({350})));
+}
+
+TEST(GadgetSpacemouse, AKeeperThatCannotBeStartedSaysSo) {
+  for (const char* program : {"/no/such/program", "/bin/true"}) {
+    OtherComputer other;
+    GadgetPort port = other.port(GadgetFace::spacemouse);
+    port.program = program;
+    try {
+      const GadgetOutput output(std::move(port));
+      FAIL() << program;
+    } catch (const ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find("process"), std::string::npos) << error.what();
+    }
+  }
 }
 
 TEST(Gadgets, ThatAreNotUpNameTheCommand) {
