@@ -145,12 +145,12 @@ class Processing {
 
 }  // namespace
 
-BandwidthCommand::BandwidthCommand(CLI::App& app)
-    : verb_(app.add_subcommand(
+BandwidthCommand::BandwidthCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
           "bandwidth",
           "measure the camera with the LED: true frame rate, latency, jitter, read-out, stale and "
           "missing frames")) {
-  verb_->footer(
+  verb_.footer(
       "With a board, its LED lights the picture: steadily for 3 s, not at all for 1 s, then in a\n"
       "pattern. Hands off, and little light from elsewhere. Without a board, --screen shows a "
       "window\n"
@@ -159,42 +159,35 @@ BandwidthCommand::BandwidthCommand(CLI::App& app)
       "a\n"
       "phone or a tablet before the camera. Without any of them:\n"
       "  tagwrench bandwidth --source sim:tests/sim/scenarios/bandwidth.yaml --port sim --fast");
-  verb_->add_option("--source", source_, "the camera: v4l2:/dev/videoN, sim or sim:SCENARIO.yaml")
-      ->required();
-  auto* port = verb_->add_option(
+  verb_.add_option("--source", source_, "the camera: v4l2:/dev/videoN, sim or sim:SCENARIO.yaml")
+      .required();
+  command_line::Option port = verb_.add_option(
       "--port", port_,
       "the board: its serial port, usb:VENDOR:PRODUCT, or sim for the simulated lamp");
   screen_option_ = verb_
-                       ->add_option("--screen", screen_,
-                                    "a screen instead of a board's LED: window (as without a "
-                                    "value), or web[:ADDRESS:PORT], a page for any browser")
-                       ->expected(0, 1)
-                       ->excludes(port);
+                       .add_option("--screen", screen_,
+                                   "a screen instead of a board's LED: window (as without a "
+                                   "value), or web[:ADDRESS:PORT], a page for any browser")
+                       .expected(0, 1)
+                       .excludes(port);
   verb_
-      ->add_option("--web-token", web_token_,
-                   "file with the token that the page needs, so that other computers may open it; "
-                   "made if it is not there")
-      ->needs(screen_option_);
-  verb_->add_option("--sensor", sensor_, "sensor.yaml of this sensor");
-  verb_->add_option("--seconds", seconds_, "length of the pattern")
-      ->check(CLI::Validator(
-          [](std::string& text) {
-            double seconds = 0;  // not CLI::Range, which lets "nan" through
-            const bool usable = CLI::detail::lexical_cast(text, seconds) && seconds >= kShortest &&
-                                seconds <= kLongest;
-            return usable ? std::string()
-                          : fmt::format("'{}' is not a number of seconds from {:g} to {:g}", text,
-                                        kShortest, kLongest);
-          },
-          "SECONDS"))
-      ->capture_default_str();
-  verb_->add_option("--json", json_,
-                    "write the report as JSON to this file too; - is standard output");
-  verb_->add_flag("--fast", fast_, "the simulated sensor runs as fast as it can");
+      .add_option("--web-token", web_token_,
+                  "file with the token that the page needs, so that other computers may open it; "
+                  "made if it is not there")
+      .needs(screen_option_);
+  verb_.add_option("--sensor", sensor_, "sensor.yaml of this sensor");
+  verb_.add_option("--seconds", seconds_, "length of the pattern")
+      .check(command_line::number(
+          kShortest, kLongest,
+          fmt::format("a number of seconds from {:g} to {:g}", kShortest, kLongest), "SECONDS"))
+      .capture_default_str();
+  verb_.add_option("--json", json_,
+                   "write the report as JSON to this file too; - is standard output");
+  verb_.add_flag("--fast", fast_, "the simulated sensor runs as fast as it can");
 }
 
 int BandwidthCommand::run() const {
-  const bool screen = screen_option_->count() > 0;
+  const bool screen = screen_option_.count() > 0;
   if (!screen && port_.empty())
     throw ConfigError(
         "bandwidth: needs a light: --port PORT for a board's LED, --port sim or --screen");

@@ -1,11 +1,11 @@
 // `tagwrench bandwidth`: its options, and from them a camera, a lamp and a report.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
 
 #include "host/bandwidth/screen_measurement.h"
+#include "host/command_line/command_line.h"
 #include "host/os/unique_fd.h"
 
 namespace tagwrench {
@@ -13,9 +13,9 @@ namespace tagwrench {
 /// Declares itself on the command line; must outlive the parsing.
 class BandwidthCommand {
  public:
-  explicit BandwidthCommand(CLI::App& app);
+  explicit BandwidthCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Measures and reports; returns the exit status. Throws ConfigError.
   int run() const;
 
@@ -27,13 +27,13 @@ class BandwidthCommand {
   int run_with_lamp() const;
   void print(const std::string& text, const std::string& json) const;
 
-  CLI::App* verb_;
+  command_line::Command verb_;
   std::string source_;
   std::string port_;
   std::string sensor_;
   std::string json_;
   double seconds_ = 10;
-  CLI::Option* screen_option_;
+  command_line::Option screen_option_;
   std::string screen_;     ///< empty: a window
   std::string web_token_;  ///< file
   bool fast_ = false;

@@ -1,9 +1,10 @@
 // What may come next on the command line, for the completion of shells.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
+
+#include "host/command_line/command_line.h"
 
 namespace tagwrench {
 
@@ -15,7 +16,7 @@ struct Completion {
 
 /// `typed`: the words behind the program's name, the last one up to the cursor, perhaps empty.
 /// `profiles`: the ready ones.
-Completion complete(const CLI::App& app, const std::vector<std::string>& typed,
+Completion complete(const command_line::Command& program, const std::vector<std::string>& typed,
                     const std::vector<std::string>& profiles);
 
 }  // namespace tagwrench

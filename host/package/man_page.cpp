@@ -65,25 +65,25 @@ std::string capital(std::string text) {
 }
 
 /// "-o, --out FILE", in bold and italics.
-std::string heading(const CLI::Option& option) {
+std::string heading(const command_line::Option& option) {
   std::string out;
   const auto add = [&out](const std::string& name) {
     out += (out.empty() ? "" : ", ") + ("\\fB" + escaped(name) + "\\fR");
   };
-  for (const std::string& name : option.get_snames()) add("-" + name);
-  for (const std::string& name : option.get_lnames()) add("--" + name);
-  if (out.empty()) return "\\fI" + escaped(option.get_name()) + "\\fR";
-  if (takes_value(option)) out += " \\fI" + escaped(value_name(option)) + "\\fR";
+  for (const std::string& name : option.short_names()) add("-" + name);
+  for (const std::string& name : option.long_names()) add("--" + name);
+  if (out.empty()) return "\\fI" + escaped(option.name()) + "\\fR";
+  if (option.takes_value()) out += " \\fI" + escaped(value_name(option)) + "\\fR";
   return out;
 }
 
-std::string options_section(const CLI::App& verb) {
+std::string options_section(const command_line::Command& verb) {
   std::string out;
-  for (const CLI::Option* option : visible_options(verb)) {
-    out += ".TP\n" + heading(*option) + "\n" + paragraph(option->get_description());
-    if (!option->get_default_str().empty())
-      out += "(by default " + escaped(option->get_default_str()) + ")\n";
-    if (option->get_required()) out += "(required)\n";
+  for (const command_line::Option& option : verb.options()) {
+    out += ".TP\n" + heading(option) + "\n" + paragraph(option.description());
+    if (!option.default_text().empty())
+      out += "(by default " + escaped(option.default_text()) + ")\n";
+    if (option.is_required()) out += "(required)\n";
   }
   return out.empty() ? out : ".SH OPTIONS\n" + out;
 }
@@ -96,56 +96,57 @@ std::string replaced(std::string text, char from, char to) {
 /// "tagwrench board flash" -> "tagwrench-board-flash".
 std::string page_name(const std::string& words) { return replaced(words, ' ', '-'); }
 
-std::string verbs_section(const CLI::App& app, const std::string& words) {
+std::string verbs_section(const command_line::Command& program, const std::string& words) {
   std::string out;
-  for (const CLI::App* verb : visible_verbs(app)) {
-    out += ".TP\n.BR " + escaped(page_name(words + " " + verb->get_name())) + " (1)\n" +
-           paragraph(verb->get_description());
+  for (const command_line::Command& verb : program.subcommands()) {
+    out += ".TP\n.BR " + escaped(page_name(words + " " + verb.name())) + " (1)\n" +
+           paragraph(verb.description());
   }
   return out.empty() ? out : ".SH VERBS\n" + out;
 }
 
-std::string synopsis(const CLI::App& verb, const std::string& words) {
+std::string synopsis(const command_line::Command& verb, const std::string& words) {
   std::string out = ".SH SYNOPSIS\n.B " + escaped(words) + "\n";
-  if (!visible_verbs(verb).empty()) out += "\\fIVERB\\fR\n";
+  if (!verb.subcommands().empty()) out += "\\fIVERB\\fR\n";
   out += "[\\fIOPTION\\fR]...\n";
-  for (const CLI::Option* option : visible_options(verb)) {
-    if (!option->get_positional()) continue;
-    const std::string name = "\\fI" + escaped(option->get_name()) + "\\fR";
-    out += (option->get_required() ? name : "[" + name + "]") + "\n";
+  for (const command_line::Option& option : verb.options()) {
+    if (!option.is_positional()) continue;
+    const std::string name = "\\fI" + escaped(option.name()) + "\\fR";
+    out += (option.is_required() ? name : "[" + name + "]") + "\n";
   }
   return out;
 }
 
 /// `words`: "tagwrench board flash".
-std::string page(const CLI::App& verb, const std::string& words, const std::string& version) {
+std::string page(const command_line::Command& verb, const std::string& words,
+                 const std::string& version) {
   const std::string name = page_name(words);
   std::string title = name;
   for (char& c : title) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  std::string summary = verb.get_description();
+  std::string summary = verb.description();
   const bool first = words == kProgram;
   const std::string own_name = words + ": ";
   if (summary.starts_with(own_name)) summary.erase(0, own_name.size());
   return ".TH " + escaped(title) + " 1 \"\" \"tagwrench " + version + "\" \"User Commands\"\n" +
          ".SH NAME\n" + escaped(name) + " \\- " + escaped(replaced(summary, '\n', ' ')) + "\n" +
          synopsis(verb, words) + ".SH DESCRIPTION\n" + paragraph(capital(summary) + ".") +
-         paragraph(verb.get_footer()) + verbs_section(verb, words) + options_section(verb) +
+         paragraph(verb.footer_text()) + verbs_section(verb, words) + options_section(verb) +
          std::string(first ? kFiles : "") + std::string(kExitStatus) +
          (first ? "" : ".SH SEE ALSO\n.BR tagwrench (1)\n");
 }
 
-void add_pages(const CLI::App& verb, const std::string& words, const std::string& version,
-               std::vector<ManPage>& pages) {
+void add_pages(const command_line::Command& verb, const std::string& words,
+               const std::string& version, std::vector<ManPage>& pages) {
   pages.push_back({page_name(words), page(verb, words, version)});
-  for (const CLI::App* below : visible_verbs(verb))
-    add_pages(*below, words + " " + below->get_name(), version, pages);
+  for (const command_line::Command& below : verb.subcommands())
+    add_pages(below, words + " " + below.name(), version, pages);
 }
 
 }  // namespace
 
-std::vector<ManPage> man_pages(const CLI::App& app, const std::string& version) {
+std::vector<ManPage> man_pages(const command_line::Command& program, const std::string& version) {
   std::vector<ManPage> pages;
-  add_pages(app, kProgram, version, pages);
+  add_pages(program, kProgram, version, pages);
   return pages;
 }
 

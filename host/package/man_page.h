@@ -1,9 +1,10 @@
 // Man pages from what the program says about its own verbs and options.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
+
+#include "host/command_line/command_line.h"
 
 namespace tagwrench {
 
@@ -12,7 +13,8 @@ struct ManPage {
   std::string text;  ///< man(7)
 };
 
-/// The page of `app` and one for each of its verbs and their verbs. `version` is shown at the foot.
-std::vector<ManPage> man_pages(const CLI::App& app, const std::string& version);
+/// The page of `program` and one for each of its verbs and their verbs. `version` is shown at the
+/// foot.
+std::vector<ManPage> man_pages(const command_line::Command& program, const std::string& version);
 
 }  // namespace tagwrench

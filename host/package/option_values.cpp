@@ -44,28 +44,18 @@ void add_from_line(std::string_view line, std::vector<std::string>& words) {
 
 }  // namespace
 
-std::vector<const CLI::App*> visible_verbs(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App* verb) { return !is_hidden(*verb); });
-}
-
-std::vector<const CLI::Option*> visible_options(const CLI::App& verb) {
-  return verb.get_options([](const CLI::Option* option) { return !is_hidden(*option); });
-}
-
-bool takes_value(const CLI::Option& option) { return option.get_expected_max() > 0; }
-
-std::string value_name(const CLI::Option& option) {
-  const std::string type = option.get_type_name();
+std::string value_name(const command_line::Option& option) {
+  const std::string type = option.value_type();
   const std::size_t set = type.find('{');
   if (set != std::string::npos) return type.substr(set, type.find('}') + 1 - set);
   return type.substr(0, type.find(':'));
 }
 
-std::vector<std::string> value_choices(const CLI::Option& option) {
+std::vector<std::string> value_choices(const command_line::Option& option) {
   std::vector<std::string> words;
   const std::string name = value_name(option);
   if (!name.empty() && name.front() == '{') return split(name.substr(1, name.size() - 2), ',');
-  for (const std::string& line : split(option.get_description(), '\n')) {
+  for (const std::string& line : split(option.description(), '\n')) {
     if (line.starts_with("  ")) add_from_line(line, words);
   }
   return words;

@@ -46,58 +46,57 @@ void check_output(const char* option, const std::filesystem::path& out, bool for
 
 }  // namespace
 
-AnalyzeCommand::AnalyzeCommand(CLI::App& app)
-    : verb_(app.add_subcommand(
+AnalyzeCommand::AnalyzeCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
           "analyze", "how well readings predict a reference: scores on data held out, per axis")) {
-  verb_->footer(
+  verb_.footer(
       "Other people's CSV files, two of them or one:\n"
       "  tagwrench analyze --readings TAGS.csv --reading-time 2 --features 3-8:m\n"
       "    --features 9-11:deg:euler:unsmooth=0.2 --reference FORCE.csv --reference-time 2\n"
       "    --load 3-5:N:counts=96.11,95.64,20.92 --load 6-8:Nm:counts=5425.36,5524.60,8103.25\n"
       "Columns count from 1, or go by the names of the header.");
-  verb_->add_option(
+  verb_.add_option(
       "files", files_,
       "FILE.data.csv as calibrations leave them, or recordings with a six-axis reference;\n"
       "of several each is held out once");
-  verb_->add_option("--json", json_,
-                    "also as JSON to FILE, a new one; - is standard output, instead of text");
-  verb_->add_flag("--series", series_, "with the held-out time series in the JSON")
-      ->needs(verb_->get_option("--json"));
-  verb_->add_flag("--force", force_, "replace files that are there");
+  command_line::Option json = verb_.add_option(
+      "--json", json_, "also as JSON to FILE, a new one; - is standard output, instead of text");
+  verb_.add_flag("--series", series_, "with the held-out time series in the JSON").needs(json);
+  verb_.add_flag("--force", force_, "replace files that are there");
   add_analysis_options();
   add_mapping_options();
 }
 
 void AnalyzeCommand::add_analysis_options() {
   study::AnalysisOptions& o = options_;
-  verb_->add_option("--folds", o.folds, "blocks in time, each held out once")
-      ->check(CLI::Range(2, 100))
-      ->capture_default_str();
+  verb_.add_option("--folds", o.folds, "blocks in time, each held out once")
+      .check(command_line::range(2, 100))
+      .capture_default_str();
   verb_
-      ->add_option("--hold-out", o.hold_out,
-                   "instead of blocks hold out this share at the end, for example 0.3")
-      ->check(CLI::Range(0.05, 0.9));
-  verb_->add_option("--guard", o.guard, "s beside what is held out that are not learned from")
-      ->check(CLI::Range(0.0, 3600.0));
-  verb_->add_option("--ridge", o.ridge, "penalty of standardised features, for example 1e-3")
-      ->check(CLI::Range(0.0, 1e3));
-  verb_->add_flag("--smooth", o.smooth,
-                  "filter all readings by [1/4 1/2 1/4], and the reference alike");
-  verb_->add_option("--drop-start", o.drop_start, "s of readings left out")
-      ->check(CLI::Range(0.0, 1e6));
-  verb_->add_option("--lag-from", o.lag_from, "s, shortest lag looked for")
-      ->check(CLI::Range(-10.0, 10.0))
-      ->capture_default_str();
-  verb_->add_option("--lag-to", o.lag_to, "s, longest")
-      ->check(CLI::Range(-10.0, 10.0))
-      ->capture_default_str();
+      .add_option("--hold-out", o.hold_out,
+                  "instead of blocks hold out this share at the end, for example 0.3")
+      .check(command_line::range(0.05, 0.9));
+  verb_.add_option("--guard", o.guard, "s beside what is held out that are not learned from")
+      .check(command_line::range(0.0, 3600.0));
+  verb_.add_option("--ridge", o.ridge, "penalty of standardised features, for example 1e-3")
+      .check(command_line::range(0.0, 1e3));
+  verb_.add_flag("--smooth", o.smooth,
+                 "filter all readings by [1/4 1/2 1/4], and the reference alike");
+  verb_.add_option("--drop-start", o.drop_start, "s of readings left out")
+      .check(command_line::range(0.0, 1e6));
+  verb_.add_option("--lag-from", o.lag_from, "s, shortest lag looked for")
+      .check(command_line::range(-10.0, 10.0))
+      .capture_default_str();
+  verb_.add_option("--lag-to", o.lag_to, "s, longest")
+      .check(command_line::range(-10.0, 10.0))
+      .capture_default_str();
 }
 
 void AnalyzeCommand::add_mapping_options() {
   study::CsvMapping& m = mapping_;
-  readings_given_ = verb_->add_option("--readings", m.readings, "CSV of what the sensor read");
+  readings_given_ = verb_.add_option("--readings", m.readings, "CSV of what the sensor read");
   const auto add = [this](const char* name, auto& value, const char* what) {
-    return verb_->add_option(name, value, what)->needs(readings_given_);
+    return verb_.add_option(name, value, what).needs(readings_given_);
   };
   add("--reference", m.reference, "CSV of the reference; without it the same file");
   add("--separator", separator_, "; , tab or auto");
@@ -136,7 +135,7 @@ study::CsvMapping AnalyzeCommand::mapping() const {
 }
 
 int AnalyzeCommand::run() const {
-  const bool mapped = readings_given_->count() > 0;
+  const bool mapped = readings_given_.count() > 0;
   if (mapped && !files_.empty())
     throw ConfigError("--readings: either that or data files, not both");
   if (!mapped && files_.empty())

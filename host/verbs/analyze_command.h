@@ -1,11 +1,11 @@
 // `tagwrench analyze`: what data with a reference say about an instrument, on what it has not seen.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "host/command_line/command_line.h"
 #include "host/study/analysis.h"
 #include "host/study/csv_mapping.h"
 
@@ -13,8 +13,8 @@ namespace tagwrench {
 
 class AnalyzeCommand {
  public:
-  explicit AnalyzeCommand(CLI::App& app);
-  bool parsed() const { return verb_->parsed(); }
+  explicit AnalyzeCommand(command_line::Command program);
+  bool parsed() const { return verb_.parsed(); }
   int run() const;
 
  private:
@@ -22,14 +22,14 @@ class AnalyzeCommand {
   void add_analysis_options();
   study::CsvMapping mapping() const;
 
-  CLI::App* verb_;
+  command_line::Command verb_;
   std::vector<std::filesystem::path> files_;
   std::string json_;
   bool force_ = false;
   bool series_ = false;
   study::AnalysisOptions options_;
 
-  CLI::Option* readings_given_ = nullptr;
+  command_line::Option readings_given_;
   study::CsvMapping mapping_;
   std::string separator_ = "auto";
   std::string time_unit_ = "s";

@@ -1,8 +1,7 @@
 // `tagwrench calibrate`: the verb, its sub-commands and their options.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
+#include "host/command_line/command_line.h"
 #include "host/verbs/calibrate_camera_command.h"
 #include "host/verbs/calibrate_target_command.h"
 #include "host/verbs/calibrate_wrench_command.h"
@@ -12,9 +11,9 @@ namespace tagwrench {
 /// Declares itself on the command line; must outlive the parsing.
 class CalibrateCommand {
  public:
-  explicit CalibrateCommand(CLI::App& app);
+  explicit CalibrateCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Runs the sub-command that was given; returns the exit status. Throws ConfigError if it cannot
   /// start or refuses what it was shown.
   int run() const;
@@ -22,10 +21,10 @@ class CalibrateCommand {
  private:
   void declare_wrench();
 
-  CLI::App* verb_;
-  CLI::App* camera_;
-  CLI::App* target_;
-  CLI::App* wrench_;
+  command_line::Command verb_;
+  command_line::Command camera_;
+  command_line::Command target_;
+  command_line::Command wrench_;
   CalibrateCameraOptions camera_options_;
   CalibrateTargetOptions target_options_;
   CalibrateWrenchOptions wrench_options_;

@@ -56,24 +56,23 @@ struct CertificateCommand::Subject {
   std::vector<fs::path> data;
 };
 
-CertificateCommand::CertificateCommand(CLI::App& app)
-    : verb_(app.add_subcommand("certificate",
-                               "one page about a calibration: HTML, PDF (A4) and JSON")) {
-  verb_->footer(
+CertificateCommand::CertificateCommand(command_line::Command program)
+    : verb_(program.add_subcommand("certificate",
+                                   "one page about a calibration: HTML, PDF (A4) and JSON")) {
+  verb_.footer(
       "Every score is of data that the fit in question has not seen. The data are those that the "
       "calibration was made of, unless others are named; several are held out in turn.");
-  verb_->add_option("--out", out_, "folder, or the beginning of the three files' names")
-      ->required();
-  CLI::Option* sensor = verb_->add_option(
+  verb_.add_option("--out", out_, "folder, or the beginning of the three files' names").required();
+  command_line::Option sensor = verb_.add_option(
       "--sensor", sensor_, "sensor.yaml: its calibration, after a check that it belongs to it");
-  verb_->add_option("--calibration", calibration_, "calibration.json")->excludes(sensor);
-  verb_->add_option(
+  verb_.add_option("--calibration", calibration_, "calibration.json").excludes(sensor);
+  verb_.add_option(
       "data", data_,
       "FILE.data.csv ... as calibrations and `analyze --data` leave them, or recordings "
       "with a six-axis reference");
-  verb_->add_option("--environment", environment_,
-                    "in place of what the calibration noted: temperature, place, who");
-  verb_->add_flag("--force", force_, "replace files that are there");
+  verb_.add_option("--environment", environment_,
+                   "in place of what the calibration noted: temperature, place, who");
+  verb_.add_flag("--force", force_, "replace files that are there");
 }
 
 CertificateCommand::Subject CertificateCommand::subject() const {

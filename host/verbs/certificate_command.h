@@ -1,21 +1,21 @@
 // `tagwrench certificate`: a calibration and the data it rests on, as one page.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "host/certificate/certificate.h"
+#include "host/command_line/command_line.h"
 
 namespace tagwrench {
 
 /// Declares itself on the command line; must outlive the parsing.
 class CertificateCommand {
  public:
-  explicit CertificateCommand(CLI::App& app);
+  explicit CertificateCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Writes the three files; returns the exit status. Throws ConfigError for what cannot be
   /// certified.
   int run() const;
@@ -27,7 +27,7 @@ class CertificateCommand {
   std::filesystem::path prefix() const;
   bool may_replace(const std::vector<std::filesystem::path>& files) const;
 
-  CLI::App* verb_;
+  command_line::Command verb_;
   std::filesystem::path out_;
   std::string sensor_;
   std::string calibration_;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <iostream>
+#include <limits>
 #include <numbers>
 
 #include "host/config_error.h"
@@ -27,13 +28,9 @@ constexpr double kShortest = 1e-9;     // of a direction
 
 Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
 
-CLI::Validator finite() {
-  return {[](std::string& text) {
-            double value = 0;
-            const bool usable = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
-            return usable ? std::string() : "'" + text + "' is not a number";
-          },
-          "NUMBER"};
+command_line::Check finite() {
+  constexpr double kMax = std::numeric_limits<double>::max();
+  return command_line::number(-kMax, kMax, "a number", "NUMBER");
 }
 
 int stopped() {
@@ -98,56 +95,59 @@ double least_change(const CheckOptions& options, const Vector6& range) {
 
 }  // namespace
 
-CheckCommand::CheckCommand(CLI::App& app)
-    : verb_(app.add_subcommand(
+CheckCommand::CheckCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
           "check", "say line by line whether a calibrated sensor still measures what it did")) {
-  verb_->add_option("--sensor", options_.sensor, "sensor.yaml of this sensor")->required();
+  verb_.add_option("--sensor", options_.sensor, "sensor.yaml of this sensor").required();
   verb_
-      ->add_option("--source", options_.source,
-                   "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
-      ->required();
-  add_events_option(*verb_, options_.events);
+      .add_option("--source", options_.source,
+                  "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
+      .required();
+  add_events_option(verb_, options_.events);
   add_load_options();
 }
 
 void CheckCommand::add_load_options() {
   const auto vector = [&](const char* name, std::vector<double>& value, const char* help) {
-    return verb_->add_option(name, value, help)->delimiter(',')->expected(3)->check(finite());
+    return verb_.add_option(name, value, help).delimiter(',').expected(3).check(finite());
   };
-  auto* mass = verb_->add_option("--mass-g", options_.mass_g, "a known mass to hang on, g")
-                   ->check(CLI::Range(0.1, 1e5));
-  auto* at = vector("--at", options_.at_mm,
-                    "x,y,z: where a load takes hold, mm, platform frame (origin between the tags, "
-                    "axes as the camera's)");
+  command_line::Option mass =
+      verb_.add_option("--mass-g", options_.mass_g, "a known mass to hang on, g")
+          .check(command_line::range(0.1, 1e5));
+  command_line::Option at =
+      vector("--at", options_.at_mm,
+             "x,y,z: where a load takes hold, mm, platform frame (origin between the tags, "
+             "axes as the camera's)");
   vector("--gravity", options_.gravity,
          "x,y,z: which way masses pull, camera axes; 0,0,-1 when the camera looks up");
   verb_
-      ->add_option("--mass-sigma-percent", options_.mass_sigma_percent,
-                   "how well the mass is known, 1 standard deviation")
-      ->check(CLI::Range(0.0, 50.0));
-  verb_->add_option("--at-sigma-mm", options_.at_sigma_mm, "how well the point is known")
-      ->check(CLI::Range(0.0, 50.0));
-  auto* board = verb_->add_option("--board", options_.board,
-                                  "a load cell of this board to push with: its port, or auto");
-  auto* direction = vector("--direction", options_.direction,
-                           "x,y,z: of the force on the platform when the cell is pushed");
+      .add_option("--mass-sigma-percent", options_.mass_sigma_percent,
+                  "how well the mass is known, 1 standard deviation")
+      .check(command_line::range(0.0, 50.0));
+  verb_.add_option("--at-sigma-mm", options_.at_sigma_mm, "how well the point is known")
+      .check(command_line::range(0.0, 50.0));
+  command_line::Option board = verb_.add_option(
+      "--board", options_.board, "a load cell of this board to push with: its port, or auto");
+  command_line::Option direction =
+      vector("--direction", options_.direction,
+             "x,y,z: of the force on the platform when the cell is pushed");
   verb_
-      ->add_option("--cells", options_.cells,
-                   "calibration file of its load cells; without it the one kept for this board")
-      ->needs(board);
-  verb_->add_option("--channel", options_.channel, "of the load cell")
-      ->check(CLI::Range(0, 3))
-      ->needs(board);
+      .add_option("--cells", options_.cells,
+                  "calibration file of its load cells; without it the one kept for this board")
+      .needs(board);
+  verb_.add_option("--channel", options_.channel, "of the load cell")
+      .check(command_line::range(0, 3))
+      .needs(board);
   verb_
-      ->add_option("--emulated-cell", options_.emulated_cell,
-                   "with --source sim and an emulated board: the pipe that the board reads its "
-                   "orders from, so that its cell feels the simulated hand")
-      ->needs(board);
-  mass->needs(at);
-  board->needs(at);
-  board->needs(direction);
-  direction->needs(board);
-  mass->excludes(board);
+      .add_option("--emulated-cell", options_.emulated_cell,
+                  "with --source sim and an emulated board: the pipe that the board reads its "
+                  "orders from, so that its cell feels the simulated hand")
+      .needs(board);
+  mass.needs(at);
+  board.needs(at);
+  board.needs(direction);
+  direction.needs(board);
+  mass.excludes(board);
 }
 
 int CheckCommand::run() const {

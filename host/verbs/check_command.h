@@ -2,13 +2,13 @@
 // stands.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "host/board/run_board.h"
+#include "host/command_line/command_line.h"
 #include "host/verbs/bench_input.h"
 #include "host/verbs/hands_off.h"
 
@@ -34,9 +34,9 @@ struct CheckOptions {
 /// Declares itself on the command line; must outlive the parsing.
 class CheckCommand {
  public:
-  explicit CheckCommand(CLI::App& app);
+  explicit CheckCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// 0: all is fine; 1: something is not, or could not be told. Throws ConfigError if it cannot
   /// start.
   int run() const;
@@ -46,7 +46,7 @@ class CheckCommand {
   bool by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off, Events& events) const;
   bool by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard& board, Output& cell) const;
 
-  CLI::App* verb_;
+  command_line::Command verb_;
   CheckOptions options_;
 };
 

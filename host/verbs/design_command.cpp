@@ -26,30 +26,25 @@ constexpr double kRidgeGap = 0.15e-3;           // between a paper's edge and th
 constexpr double kAttachment = 1.8e-3;          // of the springs, beyond the platform's origin, m
 constexpr double kShearRatio = 0.3;             // Poisson's, of steel
 
-/// A number within bounds; CLI11's own ranges let NaN pass.
-CLI::Validator within(double low, double high) {
-  return CLI::Validator(
-      [low, high](std::string& text) {
-        double value = 0;
-        const bool usable = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-        return usable ? std::string()
-                      : fmt::format("'{}' is not a number from {:g} to {:g}", text, low, high);
-      },
-      fmt::format("{:g}..{:g}", low, high));
+command_line::Check within(double low, double high) {
+  return command_line::number(low, high, fmt::format("a number from {:g} to {:g}", low, high),
+                              fmt::format("{:g}..{:g}", low, high));
 }
 
 /// "640x480". Throws ConfigError, naming the option.
 std::pair<double, double> size_px(const std::string& option, const std::string& text) {
   const std::size_t x = text.find('x');
-  double width = 0;
-  double height = 0;
-  if (x == std::string::npos || !CLI::detail::lexical_cast(text.substr(0, x), width) ||
-      !CLI::detail::lexical_cast(text.substr(x + 1), height) ||
-      !(width >= 1 && height >= 1 && width <= 1e5 && height <= 1e5)) {
+  std::optional<double> width;
+  std::optional<double> height;
+  if (x != std::string::npos) {
+    width = command_line::to_number(text.substr(0, x));
+    height = command_line::to_number(text.substr(x + 1));
+  }
+  if (!width || !height || !(*width >= 1 && *height >= 1 && *width <= 1e5 && *height <= 1e5)) {
     throw ConfigError(
         fmt::format("{}: '{}' is not WIDTHxHEIGHT in px; use 640x480 say", option, text));
   }
-  return {width, height};
+  return {*width, *height};
 }
 
 study::SeenTag seen_tag(const TargetDescription& target, const Tag& tag,
@@ -87,127 +82,126 @@ Eigen::Vector2d size_in_picture(const study::Instrument& instrument) {
 
 }  // namespace
 
-DesignCommand::DesignCommand(CLI::App& app)
-    : verb_(
-          app.add_subcommand("design",
-                             "what a choice of camera, tags and springs can measure, before it is "
-                             "built")) {
-  verb_->footer(
+DesignCommand::DesignCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
+          "design",
+          "what a choice of camera, tags and springs can measure, before it is "
+          "built")) {
+  verb_.footer(
       "Without options: the published design. Resolution, steps and force range by the published "
       "equations, and beside them the Cramer-Rao bound of a tracker that uses every edge.");
-  verb_->add_option(
-      "--sensor", sensor_,
-      "sensor.yaml: its camera, tags, rest pose and stiffness instead of those below");
-  CLI::Option* hardware =
-      verb_->add_option("--hardware", hardware_,
-                        "a file of hardware/sensors: the sensor as it will be printed, instead of "
-                        "the options below");
-  CLI::Option* check = verb_->add_option(
+  verb_.add_option("--sensor", sensor_,
+                   "sensor.yaml: its camera, tags, rest pose and stiffness instead of those below");
+  command_line::Option hardware =
+      verb_.add_option("--hardware", hardware_,
+                       "a file of hardware/sensors: the sensor as it will be printed, instead of "
+                       "the options below");
+  command_line::Option check = verb_.add_option(
       "--check", check_, "a file of hardware/sensors: only whether it can be built, and why not");
-  CLI::Option* folder =
+  command_line::Option folder =
       verb_
-          ->add_option("--export", export_,
-                       "folder for what follows from --hardware: parameters.scad for the parts, "
-                       "sensor.yaml, plan.yaml, scenario.yaml for the simulator")
-          ->needs(hardware);
+          .add_option("--export", export_,
+                      "folder for what follows from --hardware: parameters.scad for the parts, "
+                      "sensor.yaml, plan.yaml, scenario.yaml for the simulator")
+          .needs(hardware);
   verb_
-      ->add_flag("--force", force_,
-                 "what --export finds there and has been changed (calibrated, say) is replaced")
-      ->needs(folder);
-  check->excludes(hardware);
-  range_given_ = verb_->add_option("--range-n", range_n_, "wanted, +- along each axis, N")
-                     ->capture_default_str()
-                     ->check(within(1e-06, 1000));
-  verb_->add_option("--ranges", ranges_, "rows of the table, +- N")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->check(within(1e-06, 1000));
+      .add_flag("--force", force_,
+                "what --export finds there and has been changed (calibrated, say) is replaced")
+      .needs(folder);
+  check.excludes(hardware);
+  range_given_ = verb_.add_option("--range-n", range_n_, "wanted, +- along each axis, N")
+                     .capture_default_str()
+                     .check(within(1e-06, 1000));
+  verb_.add_option("--ranges", ranges_, "rows of the table, +- N")
+      .delimiter(',')
+      .capture_default_str()
+      .check(within(1e-06, 1000));
   add_picture_options();
   add_tag_options();
   add_spring_options();
-  for (CLI::Option* said : {camera_given_, distance_given_, size_given_, paper_given_,
-                            tag_px_given_, image_given_, axial_given_, lateral_given_}) {
-    hardware->excludes(said);
-    check->excludes(said);
+  for (command_line::Option said : {camera_given_, distance_given_, size_given_, paper_given_,
+                                    tag_px_given_, image_given_, axial_given_, lateral_given_}) {
+    hardware.excludes(said);
+    check.excludes(said);
   }
 }
 
 void DesignCommand::add_picture_options() {
-  camera_given_ = verb_->add_option("--camera", camera_, "px")->capture_default_str();
-  verb_->add_option("--fps", fps_, "pictures a second")
-      ->capture_default_str()
-      ->check(within(0.1, 100000));
-  distance_given_ = verb_->add_option("--lens-distance-mm", lens_distance_mm_, "from lens to tags")
-                        ->capture_default_str()
-                        ->check(within(0.1, 10000));
-  verb_->add_option("--counts-per-pixel", counts_per_px_, "of the published estimate")
-      ->capture_default_str()
-      ->check(within(0.1, 10000));
-  verb_->add_option("--blur-px", blur_px_, "standard deviation of the point spread")
-      ->capture_default_str()
-      ->check(within(0.05, 100));
-  verb_->add_option("--noise-counts", noise_counts_, "standard deviation of a pixel, grey levels")
-      ->capture_default_str()
-      ->check(within(0.01, 100));
-  verb_->add_option("--contrast-counts", contrast_counts_, "from ink to paper, grey levels")
-      ->capture_default_str()
-      ->check(within(1, 255));
+  camera_given_ = verb_.add_option("--camera", camera_, "px").capture_default_str();
+  verb_.add_option("--fps", fps_, "pictures a second")
+      .capture_default_str()
+      .check(within(0.1, 100000));
+  distance_given_ = verb_.add_option("--lens-distance-mm", lens_distance_mm_, "from lens to tags")
+                        .capture_default_str()
+                        .check(within(0.1, 10000));
+  verb_.add_option("--counts-per-pixel", counts_per_px_, "of the published estimate")
+      .capture_default_str()
+      .check(within(0.1, 10000));
+  verb_.add_option("--blur-px", blur_px_, "standard deviation of the point spread")
+      .capture_default_str()
+      .check(within(0.05, 100));
+  verb_.add_option("--noise-counts", noise_counts_, "standard deviation of a pixel, grey levels")
+      .capture_default_str()
+      .check(within(0.01, 100));
+  verb_.add_option("--contrast-counts", contrast_counts_, "from ink to paper, grey levels")
+      .capture_default_str()
+      .check(within(1, 255));
 }
 
 void DesignCommand::add_tag_options() {
-  size_given_ = verb_->add_option("--tag-mm", tag_mm_, "edge of the black square")
-                    ->capture_default_str()
-                    ->check(within(0.01, 1000));
-  paper_given_ = verb_->add_option("--tag-with-border-mm", tag_with_border_mm_, "edge of the paper")
-                     ->capture_default_str()
-                     ->check(within(0.01, 1000));
-  tag_px_given_ = verb_->add_option("--tag-px", tag_px_, "edge of the paper in the picture")
-                      ->capture_default_str()
-                      ->check(within(1, 100000));
-  image_given_ = verb_->add_option("--image-px", image_, "rectangle around all tags in the picture")
-                     ->capture_default_str();
-  verb_->add_option("--family", family_, "of the tags")->capture_default_str();
-  verb_->add_option("--ids", ids_, "of one tag (faces the lens) or two (a roof)")
-      ->delimiter(',')
-      ->capture_default_str();
+  size_given_ = verb_.add_option("--tag-mm", tag_mm_, "edge of the black square")
+                    .capture_default_str()
+                    .check(within(0.01, 1000));
+  paper_given_ = verb_.add_option("--tag-with-border-mm", tag_with_border_mm_, "edge of the paper")
+                     .capture_default_str()
+                     .check(within(0.01, 1000));
+  tag_px_given_ = verb_.add_option("--tag-px", tag_px_, "edge of the paper in the picture")
+                      .capture_default_str()
+                      .check(within(1, 100000));
+  image_given_ = verb_.add_option("--image-px", image_, "rectangle around all tags in the picture")
+                     .capture_default_str();
+  verb_.add_option("--family", family_, "of the tags").capture_default_str();
+  verb_.add_option("--ids", ids_, "of one tag (faces the lens) or two (a roof)")
+      .delimiter(',')
+      .capture_default_str();
 }
 
 void DesignCommand::add_spring_options() {
-  axial_given_ = verb_->add_option("--axial-n-per-mm", axial_n_per_mm_, "of each of four springs")
-                     ->capture_default_str()
-                     ->check(within(1e-06, 1e+06));
+  axial_given_ = verb_.add_option("--axial-n-per-mm", axial_n_per_mm_, "of each of four springs")
+                     .capture_default_str()
+                     .check(within(1e-06, 1e+06));
   lateral_given_ =
-      verb_->add_option("--lateral-n-per-mm", lateral_n_per_mm_, "of each of four springs")
-          ->capture_default_str()
-          ->check(within(1e-06, 1e+06));
-  verb_->add_option("--spring-length-mm", spring_length_mm_, "free")
-      ->capture_default_str()
-      ->check(within(0.1, 1000));
-  verb_->add_option("--spring-width-mm", spring_width_mm_, "outer")
-      ->capture_default_str()
-      ->check(within(0.1, 1000));
-  verb_->add_option("--wire-mm", wire_mm_, "diameter")
-      ->capture_default_str()
-      ->check(within(0.001, 100));
-  verb_->add_option("--coils", coils_, "in all; without it as many as the rate takes")
-      ->check(within(1, 1000));
-  verb_->add_option("--spacing-x-mm", spacing_x_mm_, "between spring axes")
-      ->capture_default_str()
-      ->check(within(0.1, 1000));
-  verb_->add_option("--spacing-y-mm", spacing_y_mm_, "between spring axes")
-      ->capture_default_str()
-      ->check(within(0.1, 1000));
-  verb_->add_option("--mass-g", mass_g_, "of the platform")
-      ->capture_default_str()
-      ->check(within(0.01, 100000));
-  verb_->add_option("--inertia-g-mm2", inertia_g_mm2_, "of the platform about x,y,z")
-      ->delimiter(',')
-      ->expected(3)
-      ->capture_default_str()
-      ->check(within(0.01, 1e+10));
-  verb_->add_option("--mass-height-mm", mass_height_mm_, "of its centre beyond the tags")
-      ->capture_default_str()
-      ->check(within(-1000, 1000));
+      verb_.add_option("--lateral-n-per-mm", lateral_n_per_mm_, "of each of four springs")
+          .capture_default_str()
+          .check(within(1e-06, 1e+06));
+  verb_.add_option("--spring-length-mm", spring_length_mm_, "free")
+      .capture_default_str()
+      .check(within(0.1, 1000));
+  verb_.add_option("--spring-width-mm", spring_width_mm_, "outer")
+      .capture_default_str()
+      .check(within(0.1, 1000));
+  verb_.add_option("--wire-mm", wire_mm_, "diameter")
+      .capture_default_str()
+      .check(within(0.001, 100));
+  verb_.add_option("--coils", coils_, "in all; without it as many as the rate takes")
+      .check(within(1, 1000));
+  verb_.add_option("--spacing-x-mm", spacing_x_mm_, "between spring axes")
+      .capture_default_str()
+      .check(within(0.1, 1000));
+  verb_.add_option("--spacing-y-mm", spacing_y_mm_, "between spring axes")
+      .capture_default_str()
+      .check(within(0.1, 1000));
+  verb_.add_option("--mass-g", mass_g_, "of the platform")
+      .capture_default_str()
+      .check(within(0.01, 100000));
+  verb_.add_option("--inertia-g-mm2", inertia_g_mm2_, "of the platform about x,y,z")
+      .delimiter(',')
+      .expected(3)
+      .capture_default_str()
+      .check(within(0.01, 1e+10));
+  verb_.add_option("--mass-height-mm", mass_height_mm_, "of its centre beyond the tags")
+      .capture_default_str()
+      .check(within(-1000, 1000));
 }
 
 void DesignCommand::place_tags(study::Instrument& instrument) const {
@@ -236,13 +230,13 @@ void DesignCommand::place_tags(study::Instrument& instrument) const {
 
 void DesignCommand::take_sensor(study::Instrument& instrument) const {
   const SensorConfig sensor = load_sensor(sensor_);
-  std::vector<const CLI::Option*> said{tag_px_given_, size_given_, paper_given_, camera_given_,
-                                       image_given_};
+  std::vector<command_line::Option> said{tag_px_given_, size_given_, paper_given_, camera_given_,
+                                         image_given_};
   if (sensor.rest.camera_T_platform) said.push_back(distance_given_);
-  for (const CLI::Option* option : said) {
-    if (option->count() > 0)
-      throw ConfigError(fmt::format("{}: {} says that already; leave one of them out",
-                                    option->get_name(), sensor_));
+  for (command_line::Option option : said) {
+    if (option.count() > 0)
+      throw ConfigError(
+          fmt::format("{}: {} says that already; leave one of them out", option.name(), sensor_));
   }
   // A calibrated matrix is symmetric but for its errors.
   instrument.stiffness = 0.5 * (sensor.wrench.K + sensor.wrench.K.transpose());
@@ -316,7 +310,7 @@ void DesignCommand::mount_springs(study::Instrument& instrument) const {
       model.centres.push_back(spring.top - Eigen::Vector3d(0, 0, 0.5 * spring.free_length));
     }
   }
-  const bool given = axial_given_->count() > 0 || lateral_given_->count() > 0;
+  const bool given = axial_given_.count() > 0 || lateral_given_.count() > 0;
   if (sensor_.empty() || given) instrument.stiffness = stiffness(model);
 }
 
@@ -331,7 +325,7 @@ study::Instrument DesignCommand::instrument() const {
   counted.counts_per_px = counts_per_px_;
   if (!hardware_.empty()) {
     take_hardware(load_buildable(hardware_), result);
-    if (range_given_->count() > 0) result.range = range_n_;
+    if (range_given_.count() > 0) result.range = range_n_;
     return result;
   }
   if (sensor_.empty()) {

@@ -1,10 +1,10 @@
 // `tagwrench design`: its options, and from them what the instrument would measure.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
+#include "host/command_line/command_line.h"
 #include "host/study/design.h"
 #include "host/tracker/target.h"
 
@@ -13,9 +13,9 @@ namespace tagwrench {
 /// Declares itself on the command line; must outlive the parsing.
 class DesignCommand {
  public:
-  explicit DesignCommand(CLI::App& app);
+  explicit DesignCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Prints the report; returns the exit status. Throws ConfigError for what cannot be built.
   int run() const;
 
@@ -31,16 +31,16 @@ class DesignCommand {
   void mount_springs(study::Instrument& instrument) const;
   study::Instrument instrument() const;
 
-  CLI::App* verb_;
-  CLI::Option* range_given_ = nullptr;
-  CLI::Option* tag_px_given_ = nullptr;
-  CLI::Option* distance_given_ = nullptr;
-  CLI::Option* size_given_ = nullptr;
-  CLI::Option* paper_given_ = nullptr;
-  CLI::Option* camera_given_ = nullptr;
-  CLI::Option* image_given_ = nullptr;
-  CLI::Option* axial_given_ = nullptr;
-  CLI::Option* lateral_given_ = nullptr;
+  command_line::Command verb_;
+  command_line::Option range_given_;
+  command_line::Option tag_px_given_;
+  command_line::Option distance_given_;
+  command_line::Option size_given_;
+  command_line::Option paper_given_;
+  command_line::Option camera_given_;
+  command_line::Option image_given_;
+  command_line::Option axial_given_;
+  command_line::Option lateral_given_;
   std::string sensor_;
   std::string hardware_;
   std::string check_;

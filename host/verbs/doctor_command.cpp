@@ -6,23 +6,23 @@
 
 namespace tagwrench {
 
-DoctorCommand::DoctorCommand(CLI::App& app, const CLI::Validator& duration)
-    : verb_(app.add_subcommand("doctor",
-                               "say line by line what works here and what to do about the rest")) {
-  auto* focus = verb_->add_flag("--focus", focus_,
-                                "instead, how sharp the tags are, live, while you turn the lens");
+DoctorCommand::DoctorCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
+          "doctor", "say line by line what works here and what to do about the rest")) {
+  command_line::Option focus = verb_.add_flag(
+      "--focus", focus_, "instead, how sharp the tags are, live, while you turn the lens");
   verb_
-      ->add_option("--source", focusing_.source,
-                   "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR; "
-                   "without it the only camera")
-      ->needs(focus);
+      .add_option("--source", focusing_.source,
+                  "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR; "
+                  "without it the only camera")
+      .needs(focus);
   verb_
-      ->add_option("--sensor", focusing_.sensor,
-                   "sensor.yaml, for its tags; nothing in it need be calibrated")
-      ->needs(focus);
-  verb_->add_option("--seconds", focusing_.seconds, "end after S seconds")
-      ->check(duration)
-      ->needs(focus);
+      .add_option("--sensor", focusing_.sensor,
+                  "sensor.yaml, for its tags; nothing in it need be calibrated")
+      .needs(focus);
+  verb_.add_option("--seconds", focusing_.seconds, "end after S seconds")
+      .check(command_line::seconds())
+      .needs(focus);
 }
 
 int DoctorCommand::run() const { return focus_ ? run_focus(focusing_) : run_doctor(std::cout); }

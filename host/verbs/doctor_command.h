@@ -1,8 +1,7 @@
 // `tagwrench doctor`: its options.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
+#include "host/command_line/command_line.h"
 #include "host/verbs/focus.h"
 
 namespace tagwrench {
@@ -10,15 +9,15 @@ namespace tagwrench {
 /// Declares itself on the command line; must outlive the parsing.
 class DoctorCommand {
  public:
-  DoctorCommand(CLI::App& app, const CLI::Validator& duration);
+  explicit DoctorCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Prints what it finds; returns the exit status. Throws ConfigError for a source or sensor that
   /// cannot be used.
   int run() const;
 
  private:
-  CLI::App* verb_;
+  command_line::Command verb_;
   bool focus_ = false;
   FocusOptions focusing_;
 };

@@ -122,17 +122,18 @@ void ExportFile::finish() {
   partial_.clear();
 }
 
-ExportCommand::ExportCommand(CLI::App& app)
-    : verb_(app.add_subcommand("export", "a recording's samples, frames and readings, in files")) {
-  verb_->add_option("recording", recording_, "what `tagwrench record --out` made")->required();
-  verb_->add_option("--csv", csv_, "its samples, in the columns of --output csv:FILE");
-  verb_->add_option("--paper", paper_,
-                    "PREFIX_arucotagData.csv and PREFIX_optoforceData.csv, in the columns of\n"
-                    "Ouyang and Howe's program (ICRA 2020)");
-  verb_->add_option("--frames", frames_, "a folder for --source images:DIR");
-  verb_->add_option("--references", references_, "readings of load cells and six-axis sensors");
-  verb_->add_option("--events", events_, "marks, notes, news of the board, as CSV");
-  verb_->add_flag("--force", force_, "files that exist are replaced");
+ExportCommand::ExportCommand(command_line::Command program)
+    : verb_(program.add_subcommand("export",
+                                   "a recording's samples, frames and readings, in files")) {
+  verb_.add_option("recording", recording_, "what `tagwrench record --out` made").required();
+  verb_.add_option("--csv", csv_, "its samples, in the columns of --output csv:FILE");
+  verb_.add_option("--paper", paper_,
+                   "PREFIX_arucotagData.csv and PREFIX_optoforceData.csv, in the columns of\n"
+                   "Ouyang and Howe's program (ICRA 2020)");
+  verb_.add_option("--frames", frames_, "a folder for --source images:DIR");
+  verb_.add_option("--references", references_, "readings of load cells and six-axis sensors");
+  verb_.add_option("--events", events_, "marks, notes, news of the board, as CSV");
+  verb_.add_flag("--force", force_, "files that exist are replaced");
 }
 
 int ExportCommand::run() const {

@@ -1,10 +1,10 @@
 // `tagwrench export`: what a recording holds, in files for other programs.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <fstream>
 #include <string>
 
+#include "host/command_line/command_line.h"
 #include "host/record/reader.h"
 
 namespace tagwrench {
@@ -12,14 +12,14 @@ namespace tagwrench {
 /// Declares itself on the command line; must outlive the parsing.
 class ExportCommand {
  public:
-  explicit ExportCommand(CLI::App& app);
+  explicit ExportCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Returns the exit status. Throws ConfigError for what cannot be exported.
   int run() const;
 
  private:
-  CLI::App* verb_;
+  command_line::Command verb_;
   std::string recording_;
   std::string csv_;
   std::string paper_;

@@ -64,40 +64,40 @@ std::string run_command_of(const std::string& name) {
 
 }  // namespace
 
-GadgetCommand::GadgetCommand(CLI::App& app)
-    : verb_(app.add_subcommand("gadget", "be a USB device of another computer")),
-      keep_(verb_->add_subcommand("keep")->group("")),
-      up_(verb_->add_subcommand("up", "make the device and offer it at the USB device port")),
-      down_(verb_->add_subcommand("down", "take it away; done if it is not there")) {
-  verb_->require_subcommand(1);
-  verb_->add_subcommand("status", "device ports of this computer, and what is on them");
-  verb_->footer("`tagwrench run --output gadget` then feeds it. Only up and down need root.");
-  for (CLI::App* command : {up_, down_}) {
-    command->add_option("--name", name_, "of the sensor, as `tagwrench run --name` has it")
-        ->capture_default_str();
+GadgetCommand::GadgetCommand(command_line::Command program)
+    : verb_(program.add_subcommand("gadget", "be a USB device of another computer")),
+      keep_(verb_.add_subcommand("keep", "").hidden()),
+      up_(verb_.add_subcommand("up", "make the device and offer it at the USB device port")),
+      down_(verb_.add_subcommand("down", "take it away; done if it is not there")) {
+  verb_.require_subcommand();
+  verb_.add_subcommand("status", "device ports of this computer, and what is on them");
+  verb_.footer("`tagwrench run --output gadget` then feeds it. Only up and down need root.");
+  for (command_line::Command command : {up_, down_}) {
+    command.add_option("--name", name_, "of the sensor, as `tagwrench run --name` has it")
+        .capture_default_str();
   }
-  up_->add_option("--face", face_, "what the other computer sees")
-      ->check(CLI::IsMember({"spacemouse", "wrench"}))
-      ->capture_default_str();
-  up_->add_option("--id", id_, "VENDOR:PRODUCT; without it 256f:c62e, and of the wrench 1209:7a6e");
-  up_->add_option("--udc", udc_, "USB device controller; without it the first free one");
-  keep_->add_option("--face", face_)->check(CLI::IsMember({"spacemouse", "wrench"}));
-  keep_->add_option("--sysfs", inherited_.places.sysfs);
-  keep_->add_option("--devices", inherited_.places.devices);
-  keep_->add_option("--function", inherited_.function)->required();
-  keep_->add_option("--node", inherited_.node)->required();
-  up_->add_flag("--self-powered", self_powered_,
-                "the board has a supply of its own; without it up to 500 mA are asked for");
+  up_.add_option("--face", face_, "what the other computer sees")
+      .check(command_line::one_of({"spacemouse", "wrench"}))
+      .capture_default_str();
+  up_.add_option("--id", id_, "VENDOR:PRODUCT; without it 256f:c62e, and of the wrench 1209:7a6e");
+  up_.add_option("--udc", udc_, "USB device controller; without it the first free one");
+  keep_.add_option("--face", face_).check(command_line::one_of({"spacemouse", "wrench"}));
+  keep_.add_option("--sysfs", inherited_.places.sysfs);
+  keep_.add_option("--devices", inherited_.places.devices);
+  keep_.add_option("--function", inherited_.function).required();
+  keep_.add_option("--node", inherited_.node).required();
+  up_.add_flag("--self-powered", self_powered_,
+               "the board has a supply of its own; without it up to 500 mA are asked for");
 }
 
 int GadgetCommand::run() const {
-  if (keep_->parsed()) {
+  if (keep_.parsed()) {
     GadgetInheritance given = inherited_;
     given.face = face_of(face_).value();
     keep_gadget(given);
-  } else if (up_->parsed()) {
+  } else if (up_.parsed()) {
     up();
-  } else if (down_->parsed()) {
+  } else if (down_.parsed()) {
     down();
   } else {
     status();

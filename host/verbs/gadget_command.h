@@ -1,9 +1,9 @@
 // `tagwrench gadget`: this computer as a USB device of another one.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
+#include "host/command_line/command_line.h"
 #include "host/output/gadget_kernel.h"
 #include "host/output/gadget_output.h"
 #include "host/output/gadget_tree.h"
@@ -13,9 +13,9 @@ namespace tagwrench {
 /// Declares itself on the command line; must outlive the parsing.
 class GadgetCommand {
  public:
-  explicit GadgetCommand(CLI::App& app);
+  explicit GadgetCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Returns the exit status. Throws ConfigError with what is missing.
   int run() const;
 
@@ -24,10 +24,10 @@ class GadgetCommand {
   void down() const;
   void status() const;
 
-  CLI::App* verb_;
-  CLI::App* keep_;
-  CLI::App* up_;
-  CLI::App* down_;
+  command_line::Command verb_;
+  command_line::Command keep_;
+  command_line::Command up_;
+  command_line::Command down_;
   KernelPlaces places_;
   GadgetInheritance inherited_;  ///< of `keep`
   std::string name_ = "sensor";

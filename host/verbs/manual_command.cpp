@@ -14,18 +14,18 @@
 
 namespace tagwrench {
 
-ManualCommand::ManualCommand(CLI::App& app)
-    : app_(app),
-      manual_(app.add_subcommand("manual", "write the man pages")),
-      complete_(app.add_subcommand("complete", "what may be typed next")) {
-  manual_->group("");
-  manual_->add_option("--out", folder_, "folder to write")->required();
-  complete_->group("");
-  complete_->add_option("typed", typed_, "the words behind the program's name, behind --");
+ManualCommand::ManualCommand(command_line::Command program)
+    : program_(program),
+      manual_(program.add_subcommand("manual", "write the man pages")),
+      complete_(program.add_subcommand("complete", "what may be typed next")) {
+  manual_.hidden();
+  manual_.add_option("--out", folder_, "folder to write").required();
+  complete_.hidden();
+  complete_.add_option("typed", typed_, "the words behind the program's name, behind --");
 }
 
 int ManualCommand::run() const {
-  if (manual_->parsed())
+  if (manual_.parsed())
     write_pages();
   else
     print_completion();
@@ -36,7 +36,7 @@ void ManualCommand::write_pages() const {
   namespace fs = std::filesystem;
   std::error_code error;
   fs::create_directories(folder_, error);
-  for (const ManPage& page : man_pages(app_, TAGWRENCH_VERSION)) {
+  for (const ManPage& page : man_pages(program_, TAGWRENCH_VERSION)) {
     const fs::path path = fs::path(folder_) / (page.name + ".1");
     std::ofstream file(path);
     file << page.text;
@@ -51,7 +51,7 @@ void ManualCommand::write_pages() const {
 void ManualCommand::print_completion() const {
   std::vector<std::string> profiles;
   for (const ReadyProfile& profile : ready_profiles()) profiles.emplace_back(profile.name);
-  const Completion found = complete(app_, typed_, profiles);
+  const Completion found = complete(program_, typed_, profiles);
   fmt::print("{} {}\n", found.files ? "files" : "none", found.before_file);
   for (const std::string& word : found.words) fmt::print("{}\n", word);
 }

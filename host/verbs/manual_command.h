@@ -2,18 +2,19 @@
 // `tagwrench complete` says what may be typed next. Not for people, so no help names them.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
+
+#include "host/command_line/command_line.h"
 
 namespace tagwrench {
 
 /// Declares itself on the command line; must outlive the parsing.
 class ManualCommand {
  public:
-  explicit ManualCommand(CLI::App& app);
+  explicit ManualCommand(command_line::Command program);
 
-  bool parsed() const { return manual_->parsed() || complete_->parsed(); }
+  bool parsed() const { return manual_.parsed() || complete_.parsed(); }
   /// Returns the exit status. Throws ConfigError if the pages cannot be written.
   int run() const;
 
@@ -21,9 +22,9 @@ class ManualCommand {
   void write_pages() const;
   void print_completion() const;
 
-  const CLI::App& app_;
-  CLI::App* manual_;
-  CLI::App* complete_;
+  command_line::Command program_;
+  command_line::Command manual_;
+  command_line::Command complete_;
   std::string folder_;
   std::vector<std::string> typed_;
 };

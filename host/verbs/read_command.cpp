@@ -6,25 +6,27 @@
 
 namespace tagwrench {
 
-ReadCommand::ReadCommand(CLI::App& app, const CLI::Validator& duration)
-    : verb_(app.add_subcommand(
+ReadCommand::ReadCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
           "read", "live values of wrench sensors and 6-DOF devices on HID, ours and others")) {
-  verb_->footer(
+  verb_.footer(
       "Forces are in N, torques in N m; pucks have counts. Rate, jitter (standard deviation and "
       "longest of the intervals), missing frames and latency (capture to arrival here, for a live "
       "sensor on this computer) come with each line and in the summary.");
-  verb_->add_option("device", options_.device,
-                    "serial, VID:PID or path; without it the only wrench sensor, or else the only "
-                    "6-DOF device");
-  auto* list = verb_->add_flag("--list", list_, "list what is plugged in, and end");
-  auto* seconds = verb_->add_option("--seconds", seconds_, "end after S seconds")->check(duration);
-  auto* wait = verb_->add_flag("--wait", options_.wait,
-                               "wait for a device that is not there, and again when it is gone");
-  auto* json = verb_->add_flag("--json", json_, "one JSON object a report");
-  auto* csv = verb_->add_flag("--csv", csv_, "one CSV row a report");
-  auto* log = verb_->add_option("--log", options_.log, "CSV file to write beside what is printed");
-  json->excludes(csv);
-  for (CLI::Option* other : {seconds, wait, json, csv, log}) list->excludes(other);
+  verb_.add_option("device", options_.device,
+                   "serial, VID:PID or path; without it the only wrench sensor, or else the only "
+                   "6-DOF device");
+  command_line::Option list = verb_.add_flag("--list", list_, "list what is plugged in, and end");
+  command_line::Option seconds =
+      verb_.add_option("--seconds", seconds_, "end after S seconds").check(command_line::seconds());
+  command_line::Option wait = verb_.add_flag(
+      "--wait", options_.wait, "wait for a device that is not there, and again when it is gone");
+  command_line::Option json = verb_.add_flag("--json", json_, "one JSON object a report");
+  command_line::Option csv = verb_.add_flag("--csv", csv_, "one CSV row a report");
+  command_line::Option log =
+      verb_.add_option("--log", options_.log, "CSV file to write beside what is printed");
+  json.excludes(csv);
+  for (command_line::Option other : {seconds, wait, json, csv, log}) list.excludes(other);
 }
 
 int ReadCommand::run() {

@@ -1,9 +1,9 @@
 // `tagwrench record`: a run that is recorded.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
+#include "host/command_line/command_line.h"
 #include "host/verbs/run_command.h"
 
 namespace tagwrench {
@@ -11,16 +11,14 @@ namespace tagwrench {
 /// Declares itself on the command line; must outlive the parsing.
 class RecordCommand {
  public:
-  /// `sources` and `outputs` explain --source and --output; `seconds` checks times.
-  RecordCommand(CLI::App& app, const std::string& sources, const std::string& outputs,
-                const CLI::Validator& seconds);
+  explicit RecordCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Returns the exit status. Throws ConfigError if it cannot start.
   int run();
 
  private:
-  CLI::App* verb_;
+  command_line::Command verb_;
   RunOptions options_;
   RecordOptions record_;
   std::string keep_ = "raw";

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "host/command_line/command_line.h"
 #include "host/verbs/recording.h"
 
 namespace tagwrench {
@@ -40,5 +41,22 @@ struct RunOptions {
 
 /// Returns the exit status. Throws ConfigError if the run cannot start.
 int run(const RunOptions& options);
+
+constexpr int kMaxRunFrames = 2'000'000'000;
+extern const char* const kSourceHelp;  ///< of --source
+extern const char* const kOutputHelp;  ///< of --output
+
+/// Declares itself on the command line; must outlive the parsing.
+class RunCommand {
+ public:
+  explicit RunCommand(command_line::Command program);
+
+  bool parsed() const { return verb_.parsed(); }
+  int run() const { return tagwrench::run(options_); }
+
+ private:
+  command_line::Command verb_;
+  RunOptions options_;
+};
 
 }  // namespace tagwrench

@@ -35,18 +35,19 @@ SpnavSockets make_sockets(const std::string& path) {
 
 }  // namespace
 
-SpnavCommand::SpnavCommand(CLI::App& app)
-    : verb_(app.add_subcommand("spnav",
-                               "hold the socket that CAD programs connect to, whatever becomes of "
-                               "`tagwrench run`")) {
-  verb_->footer(
+SpnavCommand::SpnavCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
+          "spnav",
+          "hold the socket that CAD programs connect to, whatever becomes of "
+          "`tagwrench run`")) {
+  verb_.footer(
       "`tagwrench run --output spnav[:PATH]` feeds it, and starts one by itself where there is "
       "none. "
       "Programs that use libspnav find it when started with SPNAV_SOCKET=PATH.");
-  verb_->add_option("--socket", socket_,
-                    "PATH; without it tagwrench/spnav.sock in $XDG_RUNTIME_DIR, and for root "
-                    "/var/run/spnav.sock if no spacenavd has it");
-  verb_->add_option("--inherited", inherited_)->delimiter(',')->expected(2)->group("");
+  verb_.add_option("--socket", socket_,
+                   "PATH; without it tagwrench/spnav.sock in $XDG_RUNTIME_DIR, and for root "
+                   "/var/run/spnav.sock if no spacenavd has it");
+  verb_.add_option("--inherited", inherited_).delimiter(',').expected(2).hidden();
 }
 
 int SpnavCommand::run() const {

@@ -1,25 +1,26 @@
 // `tagwrench spnav`: the keeper of the spnav socket, by hand or as a service.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "host/command_line/command_line.h"
 
 namespace tagwrench {
 
 /// Declares itself on the command line; must outlive the parsing.
 class SpnavCommand {
  public:
-  explicit SpnavCommand(CLI::App& app);
+  explicit SpnavCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Serves until a signal, or until it is idle for too long; returns the exit status. Throws
   /// ConfigError if the socket cannot be had.
   int run() const;
 
  private:
-  CLI::App* verb_;
+  command_line::Command verb_;
   std::string socket_;
   std::vector<int> inherited_;  ///< the listening sockets: of programs, of the bridge
 };

@@ -1,18 +1,19 @@
 // `tagwrench tags`: its options, and from them a sheet to print.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
+
+#include "host/command_line/command_line.h"
 
 namespace tagwrench {
 
 /// Declares itself on the command line; must outlive the parsing.
 class TagsCommand {
  public:
-  explicit TagsCommand(CLI::App& app);
+  explicit TagsCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// Writes the sheet; returns the exit status. Throws ConfigError for what cannot be printed.
   int run() const;
 
@@ -20,16 +21,16 @@ class TagsCommand {
   void add_tag_options();
   void add_board_options();
 
-  CLI::App* verb_;
-  CLI::Option* sensor_given_ = nullptr;
-  CLI::Option* hardware_given_ = nullptr;
-  CLI::Option* family_given_ = nullptr;
-  CLI::Option* ids_given_ = nullptr;
-  CLI::Option* size_given_ = nullptr;
-  CLI::Option* border_given_ = nullptr;
-  CLI::Option* copies_given_ = nullptr;
-  CLI::Option* board_given_ = nullptr;
-  CLI::Option* marker_given_ = nullptr;
+  command_line::Command verb_;
+  command_line::Option sensor_given_;
+  command_line::Option hardware_given_;
+  command_line::Option family_given_;
+  command_line::Option ids_given_;
+  command_line::Option size_given_;
+  command_line::Option border_given_;
+  command_line::Option copies_given_;
+  command_line::Option board_given_;
+  command_line::Option marker_given_;
   std::string out_;
   std::string paper_ = "a4";
   int copies_ = 0;

@@ -188,14 +188,14 @@ std::optional<std::string> TuneSession::ask(std::string_view wish) {
 
 }  // namespace
 
-TuneCommand::TuneCommand(CLI::App& app)
-    : verb_(app.add_subcommand("tune",
-                               "sliders for the profile of a sensor that runs, felt at once")) {
-  verb_->add_option("profile", profile_,
-                    "of those that the sensor has; without it the one in force");
-  verb_->add_option("--name", name_, "of the sensor, as `tagwrench run --name` has it")
-      ->capture_default_str();
-  verb_->add_option("--out", out_, "save to this new file, not where the profile is from");
+TuneCommand::TuneCommand(command_line::Command program)
+    : verb_(program.add_subcommand("tune",
+                                   "sliders for the profile of a sensor that runs, felt at once")) {
+  verb_.add_option("profile", profile_,
+                   "of those that the sensor has; without it the one in force");
+  verb_.add_option("--name", name_, "of the sensor, as `tagwrench run --name` has it")
+      .capture_default_str();
+  verb_.add_option("--out", out_, "save to this new file, not where the profile is from");
 }
 
 int TuneCommand::run() const {

@@ -62,16 +62,17 @@ std::vector<YamlEntry> without_zero(const SensorConfig& sensor) {
   return zero_entries(Vector6::Zero(), "");
 }
 
-ZeroCommand::ZeroCommand(CLI::App& app)
-    : verb_(app.add_subcommand("zero",
-                               "hands off: what the sensor reads now becomes its zero, written to "
-                               "its sensor.yaml")) {
-  verb_->add_option("--sensor", options_.sensor, "sensor.yaml of this sensor")->required();
+ZeroCommand::ZeroCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
+          "zero",
+          "hands off: what the sensor reads now becomes its zero, written to "
+          "its sensor.yaml")) {
+  verb_.add_option("--sensor", options_.sensor, "sensor.yaml of this sensor").required();
   verb_
-      ->add_option("--source", options_.source,
-                   "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
-      ->required();
-  add_events_option(*verb_, options_.events);
+      .add_option("--source", options_.source,
+                  "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
+      .required();
+  add_events_option(verb_, options_.events);
 }
 
 int ZeroCommand::run() const {

@@ -1,10 +1,10 @@
 // `tagwrench zero`: what the sensor reads with hands off becomes its zero, in sensor.yaml.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
+#include "host/command_line/command_line.h"
 #include "host/config/sensor_config.h"
 #include "host/config/sensor_edit.h"
 
@@ -23,14 +23,14 @@ std::vector<YamlEntry> without_zero(const SensorConfig& sensor);
 /// Declares itself on the command line; must outlive the parsing.
 class ZeroCommand {
  public:
-  explicit ZeroCommand(CLI::App& app);
+  explicit ZeroCommand(command_line::Command program);
 
-  bool parsed() const { return verb_->parsed(); }
+  bool parsed() const { return verb_.parsed(); }
   /// 0: written; 1: refused, nothing was written. Throws ConfigError if it cannot start.
   int run() const;
 
  private:
-  CLI::App* verb_;
+  command_line::Command verb_;
   ZeroCommandOptions options_;
 };
 
