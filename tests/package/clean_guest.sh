@@ -103,13 +103,14 @@ check "and makes no device" same "$(ls /sys/class/hidraw 2>/dev/null)" ""
 check "the socket's keeper runs beside it" at_the_seat systemctl --user is-active --quiet tagwrench-spnav
 
 install -d -o alice -g alice /home/alice/.config /home/alice/.config/tagwrench
-cp "$frames/rest/sensor.yaml" /home/alice/.config/tagwrench/
+install -o alice -g alice "$frames/rest/sensor.yaml" /home/alice/.config/tagwrench/
 printf 'OUTPUTS=--output spacemouse --output wrench\nOPTIONS=--profile cad\n' > /home/alice/.config/tagwrench/run.env
 check "it starts with options of his" at_the_seat systemctl --user restart tagwrench
 plug_camera_in
 check "it takes the camera that is plugged in, by his sensor.yaml" wait_for camera_taken
 check "it makes what he asked for" wait_for test -e /dev/hidraw1
-at_the_seat "$programs/spnav_client" > /home/alice/motion 2>&1 &
+install -m 755 "$programs/spnav_client" /tmp/ # the project may lie where only its owner can go
+at_the_seat /tmp/spnav_client > /home/alice/motion 2>&1 &
 wait_for grep -q connected /home/alice/motion
 check "the rest pose is learned" wait_for said "rest pose learned"
 echo "once push_fx" >&7
@@ -118,6 +119,7 @@ check "and its end" wait_for rests
 check "the seat gives him the wrench sensor" wait_for at_the_seat test -r /dev/hidraw0 -a -r /dev/hidraw1
 service=$(at_the_seat systemctl --user show -P MainPID tagwrench)
 check "the service can write no file of his" grep -q '^[0-9]* [0-9]* [0-9]*:[0-9]* / / ro' "/proc/$service/mountinfo"
+# shellcheck disable=SC2016  # awk's
 check "it gets no privileges, and system calls of its kind only" awk '/^NoNewPrivs:/ {n = $2} /^Seccomp:/ {s = $2} END {exit !(n == 1 && s == 2)}' "/proc/$service/status"
 kill -STOP "$feeder"
 stopped_us=$(awk '{printf "%d", $1 * 1e6}' /proc/uptime)

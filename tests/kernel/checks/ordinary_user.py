@@ -1,21 +1,10 @@
 """An ordinary user of the groups input and video, our udev rule, and a real systemd-udevd run the whole of it."""
 import os
-import shutil
 
 import rig
 from pushes import PUSHES, check_axis, six, wait_for_zero
 
 USER = "1500"  # no such account is needed
-FOLDER = "/run/ordinary"
-
-
-def copy_for_the_user(setup):
-    """The project may lie where only its owner can go."""
-    os.makedirs(FOLDER, mode=0o755)
-    for file in (setup.tagwrench, *(f"{setup.programs}/{name}" for name in ("spnav_client", "hid_client", "sdl_client"))):
-        shutil.copy(file, FOLDER)
-    shutil.copy(setup.clip("rest") + "/sensor.yaml", FOLDER)
-    setup.tagwrench, setup.programs = f"{FOLDER}/tagwrench", FOLDER
 
 
 def body(setup):
@@ -23,19 +12,17 @@ def body(setup):
     daemon = rig.start_spacenavd()
     feeder = setup.feeder(["rest", "push_fx"])
     feeder.tell("loop rest")
-    copy_for_the_user(setup)
     os.chmod("/dev/video0", 0o666)
-    sensor = f"{FOLDER}/sensor.yaml"
 
     for node, output in (("/dev/uhid", "spacemouse"), ("/dev/uhid", "wrench"), ("/dev/uinput", "joystick")):
-        refused = setup.bridge(output, sensor=sensor, user=USER)
+        refused = setup.bridge(output, user=USER)
         status = refused.wait()
         rig.check(f"without the udev rule {output} ends with status 2 and one line that names {node}",
                   status == 2 and len(refused.err) == 1 and node in refused.err[0], refused.state())
 
     os.chmod("/dev/video0", 0o600)
     rig.start_udevd(setup.project + "/host/output/70-tagwrench.rules")
-    bridge = setup.bridge("spacemouse", "wrench", "joystick", f"jsonl:/tmp/ordinary.jsonl", sensor=sensor, user=USER)
+    bridge = setup.bridge("spacemouse", "wrench", "joystick", "jsonl:/tmp/ordinary.jsonl", user=USER)
     rig.check("with the udev rule an ordinary user's bridge runs", bridge.wait_error("rest pose learned"), bridge.state())
     spnav = setup.client("spnav_client", user=USER)
     spnav.wait_line("connected")

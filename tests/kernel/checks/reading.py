@@ -17,14 +17,14 @@ PLATEAU_N = 0.9  # of the held push: readings between the ends of it
 
 
 def prepare(setup):
-    """Everything where an ordinary user can read it: the project may lie where only its owner can go."""
+    """Everything in one folder that an ordinary user can read."""
     os.makedirs(f"{FOLDER}/out", exist_ok=True)
     os.chmod(f"{FOLDER}/out", 0o777)
     client = os.path.join(os.path.dirname(setup.tagwrench), "client")
     for file in (setup.tagwrench, f"{client}/read_wrench", f"{client}/libtagwrench-hid.so.0",
                  f"{setup.project}/tests/kernel/guest/controller.py",
                  *(f"{setup.project}/host/client/examples/{name}" for name in EXAMPLES)):
-        shutil.copy(file, FOLDER)
+        rig.open_to_all(shutil.copy(file, FOLDER))
     setup.tagwrench = f"{FOLDER}/tagwrench"
 
 

@@ -193,8 +193,20 @@ def processes(part):
     return found
 
 
+def open_to_all(path):
+    """What its owner may read or execute everybody may, and everybody finds the way to it. The project may lie where only
+    its owner can go, or come from a clone under umask 077; the guest's files are an overlay, so this changes the guest alone."""
+    path = os.path.abspath(path)
+    while path != "/":
+        mode = os.stat(path).st_mode & 0o7777
+        wanted = mode | (mode & 0o500) >> 3 | (mode & 0o500) >> 6
+        if wanted != mode:
+            os.chmod(path, wanted)
+        path = os.path.dirname(path)
+
+
 class Setup:
-    """Where the check finds what the build made."""
+    """Where the check finds what the build made. An ordinary user finds it, too."""
 
     def __init__(self):
         parser = argparse.ArgumentParser()
@@ -205,6 +217,8 @@ class Setup:
         options = parser.parse_args()
         self.tagwrench, self.programs, self.frames = options.tagwrench, options.programs, options.frames
         self.project = options.source_dir
+        for file in (self.tagwrench, *glob.glob(f"{self.programs}/*_client"), *glob.glob(f"{self.frames}/*/sensor.yaml")):
+            open_to_all(file)
 
     def clip(self, name):
         return f"{self.frames}/{name}"
