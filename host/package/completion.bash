@@ -1,4 +1,5 @@
 # Completion of tagwrench in bash: the program itself knows what may come.
+# shellcheck shell=bash
 _tagwrench() {
   local cur words cword lines
   _get_comp_words_by_ref -n : cur words cword

@@ -115,7 +115,7 @@ install -m 755 "$here/rig/init_root" "$tree/init_root"
 python3 "$here/rig/extract_vmlinux.py" "$work/image/boot/vmlinuz-$release" "$work/vmlinux" 2>>"$log" ||
   unavailable "no kernel image inside vmlinuz-$release (see $log)"
 
-rm -rf "$dir/lib"
+rm -rf "${dir:?}/lib"
 mv "$work/keep/lib" "$work/vmlinux" "$work/initramfs.img" "$dir/"
 
 # Boot once: proves the rig, and tells whether KVM is worth having (nested inside some hypervisors it is far slower than

@@ -11,6 +11,7 @@ PATH=$folder:$PATH
 cd "$folder" || exit 1
 . "$framework"
 . "$2"
+# shellcheck disable=SC2317  # called by what was read in
 compopt() { :; }  # bash has it only while a user types
 failed=0
 

@@ -18,7 +18,7 @@ debootstrap --variant=minbase \
 if cp /etc/apt/sources.list.d/debian.sources "$dir/root/etc/apt/sources.list.d/" 2>> "$dir/log"; then
   : > "$dir/root/etc/apt/sources.list"
 fi
-depends=$(dpkg-deb -f "$deb" Depends | sed 's/([^)]*)//g; s/|[^,]*//g; s/,/ /g')
+mapfile -t depends < <(dpkg-deb -f "$deb" Depends | sed 's/([^)]*)//g; s/|[^,]*//g; s/,/\n/g' | tr -d ' ' | grep .)
 chroot "$dir/root" apt-get update >> "$dir/log" 2>&1
-DEBIAN_FRONTEND=noninteractive chroot "$dir/root" apt-get install -y --no-install-recommends $depends >> "$dir/log" 2>&1
+DEBIAN_FRONTEND=noninteractive chroot "$dir/root" apt-get install -y --no-install-recommends "${depends[@]}" >> "$dir/log" 2>&1
 touch "$dir/ready"

@@ -12,6 +12,7 @@ metadata=$(find "$folder/root" -name tagwrench-hid.pc -printf '%h')
 library=$(dirname "$metadata")
 export PKG_CONFIG_PATH="$metadata" LD_LIBRARY_PATH="$library"
 
+# shellcheck disable=SC2046  # options, each a word
 "$cc" "$source/host/client/examples/read_wrench.c" $(pkg-config --cflags --libs tagwrench-hid) -o "$folder/by_pkg_config"
 readelf -d "$folder/by_pkg_config" | grep -q 'libtagwrench-hid\.so\.0'
 
@@ -28,6 +29,7 @@ cmake --build "$folder/made" >/dev/null
 
 # C++ may include the header, too.
 printf '#include <tagwrench_hid.h>\nint main() { return tagwrench_missing(1, 2); }\n' > "$folder/user.cpp"
+# shellcheck disable=SC2046
 "$cc" -x c++ -Wall -Wextra -Werror "$folder/user.cpp" $(pkg-config --cflags --libs tagwrench-hid) -o "$folder/by_cpp"
 "$folder/by_cpp"
 
