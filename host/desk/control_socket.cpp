@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <string_view>
+#include <utility>
 
 #include "host/config_error.h"
 #include "host/os/runtime_folder.h"
@@ -50,6 +52,14 @@ bool is_ready(pollfd& entry) {
   return uninterrupted([&] { return ::poll(&entry, 1, kPatience_ms); }) > 0;
 }
 
+/// What stands before the separator and what behind; all and nothing where there is none.
+std::pair<std::string_view, std::string_view> split_at(std::string_view text,
+                                                       char separator) noexcept {
+  const auto end = std::find(text.begin(), text.end(), separator);
+  const auto before = static_cast<std::size_t>(end - text.begin());
+  return {text.substr(0, before), end == text.end() ? std::string_view() : text.substr(before + 1)};
+}
+
 bool somebody_listens(const sockaddr_un& address) {
   const UniqueFd probe = datagram_socket();
   return ::connect(probe.get(), generic(address), sizeof address) == 0;
@@ -62,12 +72,9 @@ bool listens(const std::string& path) { return somebody_listens(address_of(path)
 ControlWish parse_wish(std::string_view bytes) noexcept {
   using Kind = ControlWish::Kind;
   const std::string_view wish = trimmed(bytes);
-  const std::size_t line_end = std::min(wish.find('\n'), wish.size());
-  const std::string_view line = wish.substr(0, line_end);
-  const std::string_view text = wish.substr(std::min(line_end + 1, wish.size()));
-  const std::size_t word_end = std::min(line.find(' '), line.size());
-  const std::string_view word = line.substr(0, word_end);
-  const std::string_view name = trimmed(line.substr(word_end));
+  const auto [line, text] = split_at(wish, '\n');
+  const auto [word, behind] = split_at(line, ' ');
+  const std::string_view name = trimmed(behind);
   if (word == "try" && !name.empty()) return {Kind::attempt, name, text};
   if (!text.empty()) return {Kind::unknown, word};
   if (word == "profile" && !name.empty()) return {Kind::profile, name};

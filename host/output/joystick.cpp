@@ -1,6 +1,7 @@
 #include "host/output/joystick.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <linux/uinput.h>
 #include <sys/ioctl.h>
 
@@ -104,8 +105,8 @@ SendStatus JoystickOutput::move(const Sample& sample) noexcept {
 }
 
 std::string JoystickOutput::failure() const {
-  return std::string(kPath) + ": the kernel no longer takes events: " + std::strerror(error_) +
-         "; start again";
+  return fmt::format("{}: the kernel no longer takes events: {}; start again", kPath,
+                     std::strerror(error_));
 }
 
 void JoystickOutput::add_to(std::vector<DeadManDevice>& devices) const {

@@ -163,7 +163,8 @@ TEST_F(RunBoard, TheCameraLatencyPutsTheCellsAtTheTimeOfTheExposure) {
                   "--output", "reference:" + file, "--frames", "30"});
   EXPECT_EQ(run.status, 0) << run.err;
   const auto rows = rows_of(file);
-  ASSERT_GE(rows.size(), 30U);  // more where a busy machine was late with a frame, and a row says so
+  ASSERT_GE(rows.size(),
+            30U);  // more where a busy machine was late with a frame, and a row says so
   EXPECT_NE(rows.back().at("cell0_counts"), "");
   EXPECT_NE(rows[25].at("cell1_counts"), "");
 }
