@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "host/bandwidth/command.h"
+#include "host/blas_threads.h"
 #include "host/board/command.h"
 #include "host/command_line/command_line.h"
 #include "host/config_error.h"
@@ -94,6 +95,7 @@ void open_standard_streams() {
 int main(int argc, char** argv) {
   using namespace tagwrench;
   open_standard_streams();
+  end_blas_threads();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes becomes an error code
   cv::setNumThreads(1);           // one thread, one poll loop
   try {

@@ -310,8 +310,9 @@ int run_with_pages(Session& session) {
 }  // namespace
 
 int run(const RunOptions& given) {
-  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes an error code
-  output_specs(given);            // refused before anything is opened or lit
+  std::signal(SIGPIPE, SIG_IGN);             // a closed pipe becomes an error code
+  const UniqueFd caught = termination_fd();  // what comes while it is set up ends it in order, too
+  output_specs(given);                       // refused before anything is opened or lit
   check_name(given.name);
   const bool pages = has_web(given);
   Session session{with_own_sensor(given)};
