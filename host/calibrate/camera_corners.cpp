@@ -1,12 +1,12 @@
 #include "host/calibrate/camera_corners.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
+
+#include "host/algebra/decompositions.h"
 
 namespace tagwrench {
 namespace {
@@ -58,9 +58,9 @@ std::optional<LocalGrid> local_grid(const std::vector<BoardCorner>& corners, std
       if (terms == 6) design.row(i).tail<3>() << d.x() * d.x(), d.x() * d.y(), d.y() * d.y();
       pixels.row(i) = neighbour.pixel.transpose();
     }
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
-    if (qr.rank() < terms) continue;
-    const Eigen::MatrixX2d fit = qr.solve(pixels);
+    const LeastSquares solution = least_squares(design, pixels);
+    if (solution.rank < terms) continue;
+    const Eigen::MatrixXd& fit = solution.x;
     LocalGrid grid{fit.row(0).transpose(), fit.middleRows<2>(1).transpose(), 0};
     grid.tolerance_px = (terms == 6 ? kOffCurvedGrid : kOffPlaneGrid) * grid.spacing_px();
     if (std::abs(grid.axes.determinant()) > 1) return grid;
@@ -187,7 +187,7 @@ std::optional<Fit> fit_corner(const std::vector<Pixel>& pixels, const Eigen::Vec
     normal += row * row.transpose();
     right += row * pixel.level;
   }
-  p.tail<4>() = normal.ldlt().solve(right);
+  p.tail<4>() = Ldlt<Eigen::Dynamic>(normal).solve(right);
 
   double cost = sum_of_squares(pixels, p, print);
   double damping = 1e-3;
@@ -201,7 +201,7 @@ std::optional<Fit> fit_corner(const std::vector<Pixel>& pixels, const Eigen::Vec
     }
     const Parameters diagonal = h.diagonal();
     h.diagonal() += damping * diagonal + Parameters::Constant(1e-9);
-    const Parameters step = h.selfadjointView<Eigen::Lower>().ldlt().solve(g);
+    const Parameters step = Ldlt<Eigen::Dynamic>(h).solve(g);
     const double tried = sum_of_squares(pixels, p + step, print);
     if (!(tried < cost)) {
       damping *= 10;

@@ -1,10 +1,10 @@
 #include "host/calibrate/target_adjust.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "host/algebra/decompositions.h"
 #include "host/calibrate/target_derivatives.h"
 #include "host/calibrate/target_normal.h"
 #include "host/calibrate/target_print.h"
@@ -351,8 +351,7 @@ TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
   const Eigen::Index all = normal.shared_count() - 1;  // without the focal length
   const auto tags = static_cast<Eigen::Index>(6 * state.camera_T_tag.size());
   const auto inverse = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
-    return information.ldlt().solve(
-        Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+    return Ldlt<Eigen::Dynamic>(information).inverse();
   };
   const Eigen::MatrixXd covariance = inverse(normal.information().topLeftCorner(all, all));
   estimate.covariance = covariance.topLeftCorner(tags, tags);

@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "host/algebra/decompositions.h"
+
 namespace tagwrench {
 namespace {
 
@@ -114,9 +116,8 @@ Eigen::MatrixXd TargetNormal::information() const {
 
 Eigen::VectorXd TargetNormal::shared_step(bool free_focal) const {
   const Eigen::Index count = free_focal ? shared_ : shared_ - 1;
-  const Eigen::LDLT<Eigen::MatrixXd> factor(reduced_.topLeftCorner(count, count));
-  if (factor.info() != Eigen::Success || !factor.isPositive() || !(factor.rcond() > 1e-14))
-    return {};
+  const Ldlt<Eigen::Dynamic> factor(reduced_.topLeftCorner(count, count));
+  if (!factor.positive(1e-14)) return {};
   Eigen::VectorXd step = Eigen::VectorXd::Zero(shared_);
   step.head(count) = factor.solve(reduced_right_.head(count));
   step.array() *= units_.tail(shared_).array();

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "host/algebra/decompositions.h"
 #include "host/config_error.h"
 #include "host/tracker/rotation.h"
 
@@ -179,10 +179,9 @@ std::vector<Vector6> platform_sigmas(const Eigen::MatrixXd& covariance) {
 }
 
 int better_known(const TargetEstimate& estimate, double part) {
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(
-      estimate.covariance, estimate.covariance_at_rest, Eigen::EigenvaluesOnly);
-  if (solver.info() != Eigen::Success) return 0;
-  return static_cast<int>((solver.eigenvalues().array() < part * part).count());
+  const Eigen::VectorXd shares =
+      generalized_eigenvalues(estimate.covariance, estimate.covariance_at_rest);
+  return static_cast<int>((shares.array() < part * part).count());
 }
 
 bool readout_is_clear(const TargetEstimate& estimate) {

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <cmath>
+
+#include "host/algebra/decompositions.h"
 
 namespace tagwrench {
 namespace {
@@ -59,19 +61,19 @@ void WrenchCoverage::add_movement(const Matrix6& second_moment) {
                   (kMovementSigma * kMovementSigma);
 }
 
-Matrix6 WrenchCoverage::posterior() const { return information_.inverse(); }
+Matrix6 WrenchCoverage::posterior() const { return inverse(information_); }
 
 Vector6 WrenchCoverage::sigma() const { return posterior().diagonal().cwiseSqrt(); }
 
 Vector6 WrenchCoverage::covered() const { return (1 - sigma().array() / kPrior).max(0).matrix(); }
 
 std::vector<std::string> WrenchCoverage::missing() const {
-  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(information_);
+  const EigenSystem<6> eigen = symmetric_eigen(information_);
   const auto open = static_cast<int>(
-      (solver.eigenvalues().array() < 1 / (kCovered * kCovered)).count());  // they come first
+      (eigen.values.array() < 1 / (kCovered * kCovered)).count());  // they come first
   // Directions of equal information mix at will; the axes that lie among them wholly are named
   // alone.
-  Eigen::Matrix<double, 6, Eigen::Dynamic> span = solver.eigenvectors().leftCols(open);
+  Eigen::Matrix<double, 6, Eigen::Dynamic> span = eigen.vectors.leftCols(open);
   std::vector<std::string> out;
   for (int axis = 0; axis < 6; ++axis) {
     if (span.row(axis).norm() < 0.9) continue;
@@ -80,8 +82,8 @@ std::vector<std::string> WrenchCoverage::missing() const {
   }
   const int rest = open - static_cast<int>(out.size());
   if (rest <= 0) return out;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(span, Eigen::ComputeThinU);
-  for (int i = 0; i < rest; ++i) out.push_back(complaint(svd.matrixU().col(i)));
+  const Eigen::MatrixXd directions = left_singular_vectors(span);
+  for (int i = 0; i < rest; ++i) out.push_back(complaint(directions.col(i)));
   return out;
 }
 

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 
+#include "host/algebra/decompositions.h"
 #include "host/calibrate/wrench_baseline.h"
 #include "host/calibrate/wrench_load.h"
 #include "host/config_error.h"
@@ -215,7 +215,7 @@ class Collector {
       V.row(i) = s.value.transpose();
     }
     for (Eigen::Index c = 0; c < 6; ++c) X.col(c) /= std::max(X.col(c).norm(), 1e-12);
-    return X * X.colPivHouseholderQr().solve(V);
+    return X * least_squares(X, V).x;
   }
 
   void set_load(int step, const Vector6& value, const Vector6& noise, const Vector6& displacement,

@@ -1,8 +1,9 @@
 #include "host/check/in_situ.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "host/algebra/decompositions.h"
 
 namespace tagwrench {
 namespace {
@@ -194,7 +195,7 @@ std::vector<InSituFinding> judge(const AtRest& rest, const InSituLimits& limits)
 
 InSituFinding judge(const ProofLoad& load, const InSituLimits& limits) {
   InSituFinding finding{.subject = Subject::scale};
-  const Eigen::LDLT<Matrix6> covariance(load.known_covariance + load.measured_covariance);
+  const Ldlt<6> covariance(load.known_covariance + load.measured_covariance);
   const Vector6 weighted = covariance.solve(load.known);
   const double information = load.known.dot(weighted);
   finding.amount = weighted.dot(load.measured) / information;

@@ -1,12 +1,12 @@
 #include "host/hardware/geometry.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
+#include "host/algebra/decompositions.h"
 #include "host/hardware/stops.h"
 #include "host/study/design.h"
 #include "host/wrench/spring_model.h"
@@ -266,7 +266,7 @@ Matrix6 stiffness(const Parameters& p, const Geometry& g) {
 }
 
 Vector6 range(const Parameters& p, const Geometry& g) {
-  const Matrix6 compliance = stiffness(p, g).inverse();
+  const Matrix6 compliance = inverse(stiffness(p, g));
   Vector6 out;
   for (int i = 0; i < 6; ++i) out[i] = 1 / share_of_travel(p, g, compliance.col(i));
   return out;
@@ -288,7 +288,7 @@ std::vector<Vector6> travel_corners(const Parameters& p, const Geometry& g) {
     for (const double way : {-angle, angle}) out.push_back(way * Vector6::Unit(axis));
   }
   // A push tilts as it shifts: the tags go further than the stops, which are lower.
-  const Matrix6 compliance = stiffness(p, g).inverse();
+  const Matrix6 compliance = inverse(stiffness(p, g));
   const Vector6 most = range(p, g);
   for (int axis = 0; axis < 6; ++axis) {
     const Vector6 pushed = most[axis] * compliance.col(axis);

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
+
+#include "host/algebra/decompositions.h"
 
 namespace tagwrench::study {
 namespace {
@@ -77,7 +79,7 @@ std::optional<double> force_to_solid(const Instrument& instrument, const Vector6
 
 DesignRow row(const Instrument& instrument, const Design& design, double range, double scale) {
   const Matrix6 stiffness = scale * instrument.stiffness;
-  const Matrix6 compliance = stiffness.inverse();
+  const Matrix6 compliance = inverse(stiffness);
   DesignRow row;
   row.range = range;
   row.scale = scale;
@@ -181,12 +183,11 @@ std::array<double, 6> natural_frequencies(const Matrix6& stiffness, const Platfo
   mass << platform.mass * Eigen::Matrix3d::Identity(), -platform.mass * cross,
       platform.mass * cross,
       Eigen::Matrix3d(platform.principal_inertia.asDiagonal()) - platform.mass * cross * cross;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6> modes(stiffness, mass,
-                                                                Eigen::EigenvaluesOnly);
+  const Eigen::VectorXd squares = generalized_eigenvalues(stiffness, mass);
   std::array<double, 6> frequencies{};
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < squares.size(); ++i) {
     frequencies[static_cast<std::size_t>(i)] =
-        std::sqrt(std::max(0.0, modes.eigenvalues()[i])) / (2 * std::numbers::pi);
+        std::sqrt(std::max(0.0, squares[i])) / (2 * std::numbers::pi);
   }
   return frequencies;
 }
@@ -196,7 +197,7 @@ double alias(double frequency, double rate) {
 }
 
 std::array<Reach, 3> reach(const Instrument& instrument, double most) {
-  const Matrix6 compliance = instrument.stiffness.inverse();
+  const Matrix6 compliance = inverse(instrument.stiffness);
   std::array<Reach, 3> result;
   for (int axis = 0; axis < 3; ++axis) {
     result[static_cast<std::size_t>(axis)] = {

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "host/algebra/decompositions.h"
 #include "host/study/regression.h"
 
 namespace tagwrench::study {
@@ -227,10 +227,10 @@ void find_weakest(const Eigen::MatrixXd& felt, const std::vector<std::size_t>& a
     z.col(static_cast<Eigen::Index>(i)) =
         (column.array() - column.mean()) / standard_deviation(column);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(z.transpose() * z /
-                                                             static_cast<double>(z.rows()));
-  analysis.weakest = combination(eigen.eigenvectors().col(0), axes);
-  analysis.weakest_share = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]));
+  const EigenSystem<Eigen::Dynamic> eigen =
+      symmetric_eigen(Eigen::MatrixXd(z.transpose() * z / static_cast<double>(z.rows())));
+  analysis.weakest = combination(eigen.vectors.col(0), axes);
+  analysis.weakest_share = std::sqrt(std::max(0.0, eigen.values[0]));
 }
 
 /// Slopes of each axis' error over all loads; NaN where loads went together too much to tell.

@@ -1,9 +1,10 @@
 #include "host/study/regression.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "host/algebra/decompositions.h"
 
 namespace tagwrench::study {
 namespace {
@@ -50,8 +51,8 @@ LinearModel fit_linear(const Eigen::MatrixXd& features, const Eigen::MatrixXd& v
   model.offset = values.colwise().mean();
   const Eigen::MatrixXd y = values.rowwise() - model.offset.transpose();
 
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(z.transpose() * z / n);
-  const Eigen::VectorXd& lambda = eigen.eigenvalues();
+  const EigenSystem<Eigen::Dynamic> eigen = symmetric_eigen(Eigen::MatrixXd(z.transpose() * z / n));
+  const Eigen::VectorXd& lambda = eigen.values;
   const double largest = lambda.size() > 0 ? lambda[lambda.size() - 1] : 0;
   Eigen::VectorXd inverse = Eigen::VectorXd::Zero(lambda.size());
   double freedom = 1;
@@ -66,7 +67,7 @@ LinearModel fit_linear(const Eigen::MatrixXd& features, const Eigen::MatrixXd& v
   const bool full = (inverse.array() > 0).count() == changing;
   model.condition = full && changing > 0 ? std::sqrt(largest / smallest)
                                          : std::numeric_limits<double>::infinity();
-  model.inverse = eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
+  model.inverse = eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
   model.weights = model.inverse * (z.transpose() * y);
   model.variance = (y - z * model.weights).colwise().squaredNorm() / std::max(1.0, n - freedom);
   return model;

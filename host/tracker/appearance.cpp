@@ -1,9 +1,9 @@
 #include "host/tracker/appearance.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "host/algebra/decompositions.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -110,14 +110,13 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
       const double px = tag.empty() ? 1.0 : tag.front().px_per_m * kSpreadScale / kSpreadPrior_px;
       normal(6 + t, 6 + t) += px * px * 1e-3;
     }
-    const Eigen::LDLT<Eigen::MatrixXd> ldlt(normal);
-    if (ldlt.info() != Eigen::Success || !ldlt.isPositive() || !(ldlt.rcond() > 1e-12))
-      return false;
+    const Ldlt<Eigen::Dynamic> ldlt(normal);
+    if (!ldlt.positive(1e-12)) return false;
     const Eigen::VectorXd step = ldlt.solve(right).cwiseProduct(units);
     if (!step.allFinite()) return false;
     camera_T_platform = moved(camera_T_platform, step.head<6>());
     const auto parameters = static_cast<double>(6 + tags);
-    const Eigen::MatrixXd inverse = ldlt.solve(Eigen::MatrixXd::Identity(6 + tags, 6 + tags));
+    const Eigen::MatrixXd inverse = ldlt.inverse();
     const double few = clusters > parameters ? clusters / (clusters - parameters) : 10.0;
     covariance = few * (units.asDiagonal() * (inverse * meat * inverse) * units.asDiagonal())
                            .topLeftCorner<6, 6>();

@@ -1,8 +1,8 @@
 #include "host/tracker/corner_pose.h"
 
-#include <Eigen/Cholesky>
 #include <limits>
 
+#include "host/algebra/decompositions.h"
 #include "host/tracker/projection.h"
 #include "host/tracker/rotation.h"
 
@@ -45,7 +45,7 @@ std::optional<CornerFit> fit_corners(const CameraModel& camera,
     }
     rms_px = std::sqrt(squares / (2.0 * static_cast<double>(pairs.size())));
     if (i == kIterations) break;
-    const Vector6 step = normal.ldlt().solve(right);
+    const Vector6 step = Ldlt<6>(normal).solve(right);
     if (!step.allFinite()) return std::nullopt;
     pose = moved(pose, step);
   }

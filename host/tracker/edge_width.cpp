@@ -1,6 +1,5 @@
 #include "host/tracker/edge_width.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -8,6 +7,8 @@
 #include <numbers>
 #include <utility>
 #include <vector>
+
+#include "host/algebra/decompositions.h"
 
 namespace tagwrench {
 namespace {
@@ -203,7 +204,7 @@ Unknowns step(const Sums& sums, double damping, int first) {
   normal.diagonal() *= 1 + damping;
   normal.diagonal().array() += 1e-9 * normal.diagonal().maxCoeff();
   Unknowns out = Unknowns::Zero();
-  out.tail(count) = normal.ldlt().solve(sums.slope.tail(count));
+  out.tail(count) = Ldlt<Eigen::Dynamic>(normal).solve(sums.slope.tail(count));
   return out;
 }
 

@@ -1,8 +1,8 @@
 #include "host/tracker/geometry_uncertainty.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "host/algebra/decompositions.h"
 #include "host/tracker/projection.h"
 #include "host/tracker/rotation.h"
 
@@ -51,10 +51,10 @@ void GeometryUncertainty::set(PhotometricAligner& aligner,
       unit << Eigen::Vector3d::Constant(kTagTry), Eigen::Vector3d::Constant(kTagTryAngle);
       const Matrix6 scaled =
           unit.cwiseInverse().asDiagonal() * tag_covariance[t] * unit.cwiseInverse().asDiagonal();
-      const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(scaled);
+      const EigenSystem<6> eigen = symmetric_eigen(scaled);
       for (int k = 0; k < 6; ++k) {
-        const Vector6 error = unit.cwiseProduct(eigen.eigenvectors().col(k));
-        const double size = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+        const Vector6 error = unit.cwiseProduct(eigen.vectors.col(k));
+        const double size = std::sqrt(std::max(0.0, eigen.values[k]));
         const Eigen::Matrix3d turn = rotation_from_vector(error.tail<3>());
         const Eigen::Vector3d origin_error =
             origin_follows ? Eigen::Vector3d(error.head<3>() / tags) : Eigen::Vector3d::Zero();

@@ -1,11 +1,11 @@
 #include "host/tracker/photometric.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "host/algebra/decompositions.h"
 #include "host/tracker/projection.h"
 #include "host/tracker/rotation.h"
 
@@ -176,7 +176,7 @@ bool PhotometricAligner::factorise() noexcept {
     TagSystem& tag = tag_systems_[t];
     LightMatrix light = all.bottomRightCorner<kLightParameters, kLightParameters>();
     light.diagonal() += light_prior();
-    tag.light_inverse = light.ldlt().solve(LightMatrix::Identity());
+    tag.light_inverse = Ldlt<kLightParameters>(light).inverse();
     tag.coupling = all.topRightCorner<kSharedParameters, kLightParameters>();
     tag.eliminate = tag.coupling * tag.light_inverse;
     shared += all.topLeftCorner<kSharedParameters, kSharedParameters>() -
@@ -185,9 +185,9 @@ bool PhotometricAligner::factorise() noexcept {
   SharedVector unit;  // metres and radians to like size
   unit << 1e-3, 1e-3, 1e-3, 0.05, 0.05, 0.05, 1, 1;
   const SharedMatrix scaled = unit.asDiagonal() * shared * unit.asDiagonal();
-  const Eigen::LDLT<SharedMatrix> ldlt(scaled);
-  if (ldlt.info() != Eigen::Success || !ldlt.isPositive() || !(ldlt.rcond() > 1e-12)) return false;
-  inverse_ = unit.asDiagonal() * ldlt.solve(SharedMatrix::Identity()) * unit.asDiagonal();
+  const Ldlt<kSharedParameters> ldlt(scaled);
+  if (!ldlt.positive(1e-12)) return false;
+  inverse_ = unit.asDiagonal() * ldlt.inverse() * unit.asDiagonal();
   return inverse_.allFinite();
 }
 
@@ -296,7 +296,7 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
   const double variance = std::max(1.0, squared(fit.residual)) * (1.0 + 1.0 / template_.frames);
   // inverse_ is of the weighted equations.
   const Matrix6 white = variance * kVarianceFactor * kMeanWeight * inverse_.topLeftCorner<6, 6>();
-  const Matrix6 information = white.inverse();
+  const Matrix6 information = inverse(white);
   // An edge runs through a row or a column of patches, and with it what is wrong with it.
   struct Groups {
     std::array<std::array<Vector6, kPatchesPerSide>, kMaxTags> pull;
@@ -379,7 +379,7 @@ Vector6 PhotometricAligner::motion_of(const Eigen::Isometry3d& pose,
   Vector6 unit;
   unit << 1e-3, 1e-3, 1e-3, 0.05, 0.05, 0.05;
   const Matrix6 scaled = unit.asDiagonal() * normal * unit.asDiagonal();
-  return unit.asDiagonal() * scaled.ldlt().solve(unit.asDiagonal() * right);
+  return unit.asDiagonal() * Ldlt<6>(scaled).solve(unit.asDiagonal() * right);
 }
 
 }  // namespace tagwrench

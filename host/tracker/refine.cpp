@@ -1,10 +1,10 @@
 #include "host/tracker/refine.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "host/algebra/decompositions.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -174,8 +174,8 @@ Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
   // All points share one gain: a single profile's is noisy.
   const double gain = std::clamp(gains / weights, 0.3, 1.3);
   const Matrix6 full = normal.selfadjointView<Eigen::Lower>();
-  const Eigen::LDLT<Matrix6> ldlt(full);
-  if (ldlt.info() != Eigen::Success || !ldlt.isPositive() || !(ldlt.rcond() > 1e-12)) return {};
+  const Ldlt<6> ldlt(full);
+  if (!ldlt.positive(1e-12)) return {};
   const Vector6 delta = (ldlt.solve(right) / gain).cwiseProduct(units);
   if (!delta.allFinite()) return {};
 
@@ -193,8 +193,7 @@ Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
   fit.camera_T_platform = next;
   const double variance_px2 = residual_px2 / std::max(1.0, weights - 6.0);
   fit.residual_px = std::sqrt(residual_px2 / weights);
-  fit.covariance =
-      variance_px2 * (units.asDiagonal() * ldlt.solve(Matrix6::Identity()) * units.asDiagonal());
+  fit.covariance = variance_px2 * (units.asDiagonal() * ldlt.inverse() * units.asDiagonal());
   return {true, std::sqrt(moved_px2 / weights)};
 }
 

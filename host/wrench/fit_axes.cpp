@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "host/algebra/decompositions.h"
 
 namespace tagwrench::fit {
 namespace {
@@ -38,7 +39,7 @@ std::array<AxisKnowledge, 6> axis_knowledge(const Problem& problem, const Matrix
   const Matrix6 A = answer_variance(problem, covariance);
   const Matrix6 weighed = K.transpose() * per_scale.asDiagonal();
   const Matrix6 unit = problem.motion_scale.asDiagonal();
-  const Eigen::LDLT<Matrix6> least(unit * (weighed * K + A) * unit + 1e-12 * Matrix6::Identity());
+  const Ldlt<6> least(unit * (weighed * K + A) * unit + 1e-12 * Matrix6::Identity());
   std::array<AxisKnowledge, 6> out;
   for (int axis = 0; axis < 6; ++axis) {
     const Vector6 load = problem.scale[axis] * Vector6::Unit(axis);

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "host/algebra/decompositions.h"
 #include "host/config_error.h"
 
 namespace tagwrench::fit {
@@ -33,8 +33,7 @@ bool is_covariance(const Matrix6& c) {
   const Vector6 unit = c.diagonal().cwiseMax(1e-30 * size).cwiseSqrt().cwiseInverse();
   const Matrix6 scaled = unit.asDiagonal() * c * unit.asDiagonal();
   if (!(scaled - scaled.transpose()).isZero(1e-6)) return false;
-  return Eigen::SelfAdjointEigenSolver<Matrix6>(scaled, Eigen::EigenvaluesOnly).eigenvalues()[0] >
-         -1e-6;
+  return symmetric_eigen(scaled).values[0] > -1e-6;
 }
 
 void check(const Observation& o, std::size_t index) {

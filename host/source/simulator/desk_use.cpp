@@ -1,10 +1,11 @@
 #include "host/source/simulator/desk_use.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "host/algebra/decompositions.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/random.h"
 
@@ -91,7 +92,7 @@ DeskUse::DeskUse(const Scenario& scenario)
     for (int i = 0; i < 6; ++i) way[i] = random.uniform(-1, 1) * range_[i];
     way *= settings_.wander * (minutes < 15 ? 0.15 : 0.35);
     wander_.push_back(
-        {1 / (60 * minutes), random.uniform(0, 2 * pi), stiffness_matrix.ldlt().solve(way)});
+        {1 / (60 * minutes), random.uniform(0, 2 * pi), Ldlt<6>(stiffness_matrix).solve(way)});
   }
 }
 

@@ -1,8 +1,10 @@
 #include "host/source/simulator/mechanics.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+
+#include "host/algebra/decompositions.h"
 
 namespace tagwrench::sim {
 namespace {
@@ -16,9 +18,9 @@ Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
 }
 
 Matrix6 symmetric_function(const Matrix6& m, double (*f)(double)) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(m);
-  const Vector6 values = solver.eigenvalues().unaryExpr(f);
-  return solver.eigenvectors() * values.asDiagonal() * solver.eigenvectors().transpose();
+  const EigenSystem<6> eigen = symmetric_eigen(m);
+  const Vector6 values = eigen.values.unaryExpr(f);
+  return eigen.vectors * values.asDiagonal() * eigen.vectors.transpose();
 }
 
 }  // namespace
@@ -84,7 +86,7 @@ PlatformMotion::PlatformMotion(const Mechanics& mechanics, const TrajectoryPlaye
       stiffness_(stiffness(mechanics)),
       inertia_(inertia(mechanics)),
       damping_(damping(mechanics)),
-      inverse_inertia_(inertia_.inverse()),
+      inverse_inertia_(inverse(inertia_)),
       ring_(static_cast<std::size_t>(std::ceil(memory / kStep)) + 4),
       start_time_(start_time),
       load_(load_at(start_time, Vector6::Zero())),
@@ -156,7 +158,7 @@ void PlatformMotion::restart(double time) noexcept {
   newest_ = static_cast<long long>((time - start_time_) / kStep);
   oldest_ = newest_;
   const double instant = start_time_ + static_cast<double>(newest_) * kStep;
-  const Eigen::LDLT<Matrix6> springs(stiffness_);
+  const Ldlt<6> springs(stiffness_);
   Vector6 displacement = springs.solve(load_at(instant, Vector6::Zero()));
   if (applied_) displacement = springs.solve(load_at(instant, displacement));
   load_ = load_at(instant, displacement);
