@@ -48,8 +48,10 @@ cv::Point2d ray(const Lens& lens, cv::Point2d pixel) {
     const double radial = 1 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3));
     const double nx = (xd - 2 * lens.p1 * x * y - lens.p2 * (r2 + 2 * x * x)) / radial;
     const double ny = (yd - lens.p1 * (r2 + 2 * y * y) - 2 * lens.p2 * x * y) / radial;
+    const bool found = std::abs(nx - x) + std::abs(ny - y) < 1e-13;
     x = nx;
     y = ny;
+    if (found) break;
   }
   return {x, y};
 }

@@ -24,18 +24,18 @@ Eigen::Matrix3d turn(const Eigen::Vector3d& r) {
 
 bool is_ink(const PrintedTag& tag, double x, double y) {
   const double cell = tag.size / static_cast<double>(tag.rows.size());
+  const auto n = static_cast<double>(tag.rows.size());
+  const auto black = [&](double sx, double sy) {
+    const double column = std::floor((x + sx + tag.size / 2) / cell);
+    const double row = std::floor((y + sy + tag.size / 2) / cell);
+    if (column < 0 || row < 0 || column >= n || row >= n) return false;
+    return tag.rows[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] == '#';
+  };
   // Black grown by the spread: any point within it of black, along the axes.
-  for (const double sx : {-tag.ink_spread, tag.ink_spread}) {
-    for (const double sy : {-tag.ink_spread, tag.ink_spread}) {
-      const double column = std::floor((x + sx + tag.size / 2) / cell);
-      const double row = std::floor((y + sy + tag.size / 2) / cell);
-      const auto n = static_cast<double>(tag.rows.size());
-      if (column < 0 || row < 0 || column >= n || row >= n) continue;
-      if (tag.rows[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] == '#')
-        return true;
-    }
-  }
-  return false;
+  const double spread = tag.ink_spread;
+  if (spread == 0) return black(0, 0);
+  return black(-spread, -spread) || black(-spread, spread) || black(spread, -spread) ||
+         black(spread, spread);
 }
 
 /// Grey level along the ray through normalised coordinates; false where the plane's paper is not
@@ -58,7 +58,10 @@ bool near_paper(const std::vector<Plane>& planes, const Eigen::Vector3d& ray) {
     const double slope = plane.axes.col(2).dot(ray);
     if (slope <= 1e-9) return false;
     const Eigen::Vector3d hit = ray * (plane.axes.col(2).dot(plane.origin) / slope) - plane.origin;
-    return hit.norm() < plane.tag->size;
+    // A pixel reaches much less than a tenth of a tag beyond its middle.
+    const double reach = 0.6 * plane.tag->size + plane.tag->border;
+    return std::abs(plane.axes.col(0).dot(hit)) < reach &&
+           std::abs(plane.axes.col(1).dot(hit)) < reach;
   });
 }
 
@@ -70,8 +73,10 @@ Eigen::Vector3d ray_of(const Scene& scene, double u, double v) {
   double y = yd;
   for (int i = 0; scene.k1 != 0 && i < 12; ++i) {
     const double stretch = 1 + scene.k1 * (x * x + y * y);
+    const bool found = std::abs(xd - x * stretch) + std::abs(yd - y * stretch) < 1e-12;
     x = xd / stretch;
     y = yd / stretch;
+    if (found) break;
   }
   return {x, y, 1};
 }
@@ -85,21 +90,29 @@ void blur(std::vector<float>& image, int width, int height, double sigma_px) {
     kernel.push_back(static_cast<float>(std::exp(-0.5 * i * i / (sigma_px * sigma_px))));
     sum += kernel.back();
   }
+  const auto w = static_cast<std::size_t>(width);
+  const auto add = [w](float* to, const float* from, float weight) {
+    for (std::size_t x = 0; x < w; ++x) to[x] += weight * from[x];
+  };
   std::vector<float> other(image.size());
-  for (int pass = 0; pass < 2; ++pass) {
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {
-        float value = 0;
-        for (int i = -reach; i <= reach; ++i) {
-          const int at_x = pass == 0 ? std::clamp(x + i, 0, width - 1) : x;
-          const int at_y = pass == 0 ? y : std::clamp(y + i, 0, height - 1);
-          value += kernel[static_cast<std::size_t>(i + reach)] *
-                   image[static_cast<std::size_t>(at_y * width + at_x)];
-        }
-        other[static_cast<std::size_t>(y * width + x)] = value / sum;
-      }
+  std::vector<float> padded(w + 2 * static_cast<std::size_t>(reach));
+  for (int y = 0; y < height; ++y) {
+    const float* row = &image[static_cast<std::size_t>(y) * w];
+    for (int x = -reach; x < width + reach; ++x)
+      padded[static_cast<std::size_t>(x + reach)] = row[std::clamp(x, 0, width - 1)];
+    float* to = &other[static_cast<std::size_t>(y) * w];
+    for (std::size_t i = 0; i < kernel.size(); ++i) add(to, &padded[i], kernel[i]);
+    for (std::size_t x = 0; x < w; ++x) to[x] /= sum;
+  }
+  std::fill(image.begin(), image.end(), 0.0F);
+  for (int y = 0; y < height; ++y) {
+    float* to = &image[static_cast<std::size_t>(y) * w];
+    for (int i = -reach; i <= reach; ++i) {
+      const int from = std::clamp(y + i, 0, height - 1);
+      add(to, &other[static_cast<std::size_t>(from) * w],
+          kernel[static_cast<std::size_t>(i + reach)]);
     }
-    image.swap(other);
+    for (std::size_t x = 0; x < w; ++x) to[x] /= sum;
   }
 }
 
