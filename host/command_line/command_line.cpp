@@ -32,6 +32,17 @@ std::string usage_error(const CLI::App& program, const CLI::ParseError& error) {
                      commands);
 }
 
+/// False: help or version was asked for and has been printed.
+bool read(CLI::App& program, int argc, const char* const* argv) {
+  try {
+    program.parse(argc, argv);
+    return true;
+  } catch (const CLI::Success& help_or_version) {
+    program.exit(help_or_version);
+    return false;
+  }
+}
+
 }  // namespace
 
 Check range(int least, int most) { return check_of(CLI::Range(least, most)); }
@@ -149,6 +160,11 @@ Option Command::add_option(const std::string& name, std::optional<double>& value
   return Option(app_->add_option(name, value, description));
 }
 
+Option Command::add_option(const std::string& name, std::optional<std::uint8_t>& value,
+                           const std::string& description) {
+  return Option(app_->add_option(name, value, description));
+}
+
 Option Command::add_option(const std::string& name, std::vector<std::string>& value,
                            const std::string& description) {
   return Option(app_->add_option(name, value, description));
@@ -223,13 +239,17 @@ Program::~Program() = default;
 
 bool Program::parse(int argc, const char* const* argv) {
   try {
-    app_->parse(argc, argv);
-    return true;
-  } catch (const CLI::Success& help_or_version) {
-    app_->exit(help_or_version);
-    return false;
+    return read(*app_, argc, argv);
   } catch (const CLI::ParseError& error) {
     throw ConfigError(usage_error(*app_, error));
+  }
+}
+
+bool Program::parse(int argc, const char* const* argv, const std::string& advice) {
+  try {
+    return read(*app_, argc, argv);
+  } catch (const CLI::ParseError& error) {
+    throw ConfigError(error.what() + advice);
   }
 }
 

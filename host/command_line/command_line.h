@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
@@ -101,6 +102,8 @@ class Command {
                     const std::string& description = "");
   Option add_option(const std::string& name, std::optional<double>& value,
                     const std::string& description = "");
+  Option add_option(const std::string& name, std::optional<std::uint8_t>& value,
+                    const std::string& description = "");
   Option add_option(const std::string& name, std::vector<std::string>& value,
                     const std::string& description = "");
   Option add_option(const std::string& name, std::vector<std::filesystem::path>& value,
@@ -151,6 +154,8 @@ class Program : public Command {
 
   /// False: help or version was asked for and has been printed. Throws ConfigError for wrong usage.
   bool parse(int argc, const char* const* argv);
+  /// The same for a program without commands: of what is wrong the bare words, then `advice`.
+  bool parse(int argc, const char* const* argv, const std::string& advice);
 
  private:
   explicit Program(std::unique_ptr<CLI::App> app);

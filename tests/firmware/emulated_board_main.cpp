@@ -9,12 +9,16 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "host/command_line/command_line.h"
 #include "host/config_error.h"
 #include "host/os/termination.h"
 #include "tests/firmware/board_orders.h"
@@ -215,8 +219,9 @@ class RealTimeBoard {
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app("tagwrench's board, emulated: the flashable image on a pseudo terminal");
-  app.add_option("--elf", options.elf, "image")->capture_default_str();
+  command_line::Program app(
+      "tagwrench's board, emulated: the flashable image on a pseudo terminal");
+  app.add_option("--elf", options.elf, "image").capture_default_str();
   app.add_option("--port", options.port, "name to give the terminal, a symbolic link");
   std::vector<std::string> cells;
   app.add_option(
@@ -234,13 +239,7 @@ int run(int argc, char** argv) {
                  "the version of the protocol that it says it speaks");
   app.add_flag("--quiet", options.quiet, "no lines for the light");
   app.footer(help_on_orders());
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    throw ConfigError(error.what() + std::string("; --help shows what there is"));
-  }
+  if (!app.parse(argc, argv, "; --help shows what there is")) return 0;
   for (const std::string& text : cells) {
     const auto cell = board::parse_cell(text);
     if (!cell) throw ConfigError("--cell " + text + " is none of " + board::kCellForms);

@@ -1,5 +1,4 @@
 // tagwrench_board_pc: the firmware's application as a process on a pseudo-terminal.
-#include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
 #include <string>
@@ -7,6 +6,8 @@
 
 #include "firmware/app/app.h"
 #include "firmware/board/pc/pc_board.h"
+#include "host/command_line/command_line.h"
+#include "host/config_error.h"
 
 namespace {
 
@@ -16,18 +17,17 @@ volatile std::sig_atomic_t stopped = 0;
 
 int main(int argc, char** argv) {
   using tagwrench::board::kCellForms;
-  CLI::App options{"The board's firmware as a process, on a pseudo-terminal"};
+  tagwrench::command_line::Program options(
+      "The board's firmware as a process, on a pseudo-terminal");
   std::string port;
   std::vector<std::string> cells;
   for (unsigned i = 0; i < tagwrench::link::kMostCells; ++i)
     tagwrench::board::wire_cell(i, tagwrench::board::slow_sine(i));
-  options.add_option("--port", port, "symbolic link to make to the pseudo-terminal")->required();
+  options.add_option("--port", port, "symbolic link to make to the pseudo-terminal").required();
   options.add_option("--cell", cells, std::string(kCellForms) + "; cells that are not named: sine");
   try {
-    options.parse(argc, argv);
-  } catch (const CLI::Success& help) {
-    return options.exit(help);
-  } catch (const CLI::ParseError& error) {
+    if (!options.parse(argc, argv, "")) return 0;
+  } catch (const tagwrench::ConfigError& error) {
     std::fprintf(stderr, "tagwrench_board_pc: %s\n", error.what());
     return 2;
   }
