@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <array>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "host/config_error.h"
+#include "host/web/server/ask.h"
 
 namespace tagwrench {
 namespace {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "host/web/server/web_server.h"
+#include "host/web/server/web_options.h"
 
 namespace tagwrench {
 

@@ -23,6 +23,7 @@
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
+#include "host/web/server/ask.h"
 #include "host/web/server/live_feed.h"
 #include "host/wrench/estimate.h"
 #include "tests/bench/hid_figures.h"

@@ -24,6 +24,7 @@
 #include "host/web/bridge/run_control.h"
 #include "host/web/bridge/run_facts.h"
 #include "host/web/bridge/web_output.h"
+#include "host/web/server/ask.h"
 #include "host/web/server/web_server.h"
 
 namespace tagwrench {

@@ -6,8 +6,17 @@
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/write.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/web/server/page_request.h"
 
 namespace tagwrench {
 namespace {
@@ -39,16 +48,53 @@ std::string_view telling_part(Refusal refusal, const WebRequest& request) {
   return {};
 }
 
-}  // namespace
+class BeastConnection final : public HttpConnection,
+                              public std::enable_shared_from_this<BeastConnection> {
+ public:
+  BeastConnection(asio::ip::tcp::socket socket, ConnectionKeeper& keeper, Duration patience);
 
-HttpConnection::HttpConnection(asio::ip::tcp::socket socket, ConnectionKeeper& keeper,
-                               Duration patience)
+  void serve() override;
+  void turn_away(Refusal refusal) override;
+  void check(TimePoint now) override;
+  void drop() noexcept override;
+  bool is_turned_away() const noexcept override { return turned_away_; }
+
+ private:
+  using Parser = http::request_parser<http::empty_body>;
+
+  void handle(const error_code& error);
+  void handle_request();
+  void failed(const error_code& error);
+  void respond(WebAnswer answer, bool with_body);
+  void send(std::size_t size);
+  void send_file();
+  void sent(const error_code& error);
+  void linger();
+  void discard();
+  void end();
+
+  asio::ip::tcp::socket socket_;
+  ConnectionKeeper& keeper_;
+  Duration patience_;
+  boost::beast::flat_buffer incoming_;
+  std::optional<Parser> parser_;
+  std::vector<char> outgoing_;
+  OpenedFile file_;  ///< of the answer; what is left of it
+  std::uint64_t file_left_ = 0;
+  bool keep_ = false;  ///< for the next request
+  bool turned_away_ = false;
+  bool ended_ = false;
+  TimePoint deadline_{};
+};
+
+BeastConnection::BeastConnection(asio::ip::tcp::socket socket, ConnectionKeeper& keeper,
+                                 Duration patience)
     : socket_(std::move(socket)),
       keeper_(keeper),
       patience_(patience),
       incoming_(kLongestHeader + 1024) {}
 
-void HttpConnection::serve() {
+void BeastConnection::serve() {
   deadline_ = std::chrono::steady_clock::now() + patience_;
   parser_.emplace();
   parser_->header_limit(kLongestHeader);
@@ -58,19 +104,19 @@ void HttpConnection::serve() {
                    });
 }
 
-void HttpConnection::turn_away(Refusal refusal) {
+void BeastConnection::turn_away(Refusal refusal) {
   turned_away_ = true;
   respond(plain_answer(refusal_status(refusal), refusal_text(refusal), refusal), true);
 }
 
-void HttpConnection::handle(const error_code& error) {
+void BeastConnection::handle(const error_code& error) {
   if (ended_ || error == http::error::end_of_stream || error == asio::error::operation_aborted)
     return end();
   if (error) return failed(error);
   handle_request();
 }
 
-void HttpConnection::failed(const error_code& error) {
+void BeastConnection::failed(const error_code& error) {
   if (error.category() != http::make_error_code(http::error::end_of_stream).category())
     return end();
   const bool long_header =
@@ -85,7 +131,7 @@ void HttpConnection::failed(const error_code& error) {
     respond(plain_answer(400, refusal_text(Refusal::nonsense), Refusal::nonsense), true);
 }
 
-void HttpConnection::handle_request() {
+void BeastConnection::handle_request() {
   const WebRequest request = request_of(parser_->get());
   keep_ = parser_->get().keep_alive();
   if (request.target != "/ws") {
@@ -100,11 +146,11 @@ void HttpConnection::handle_request() {
     return respond(plain_answer(refusal_status(refusal), refusal_text(refusal)), true);
   }
   if (!request.upgrade) return respond(plain_answer(426, "Only a WebSocket is here."), true);
-  keeper_.becomes_page(std::move(socket_), parser_->release());
+  keeper_.becomes_page({std::move(socket_), parser_->release()});
   end();
 }
 
-void HttpConnection::respond(WebAnswer answer, bool with_body) {
+void BeastConnection::respond(WebAnswer answer, bool with_body) {
   const bool from_file = static_cast<bool>(answer.file.fd);
   const std::uint64_t length = from_file ? answer.file.size : answer.text.size();
   std::string head =
@@ -120,7 +166,7 @@ void HttpConnection::respond(WebAnswer answer, bool with_body) {
   send(outgoing_.size());
 }
 
-void HttpConnection::send(std::size_t size) {
+void BeastConnection::send(std::size_t size) {
   deadline_ = std::chrono::steady_clock::now() + patience_;
   asio::async_write(socket_, asio::buffer(outgoing_.data(), size),
                     [self = shared_from_this()](const error_code& error, std::size_t /*sent*/) {
@@ -129,7 +175,7 @@ void HttpConnection::send(std::size_t size) {
 }
 
 /// A file that has grown shorter meanwhile ends the connection: its length is promised.
-void HttpConnection::send_file() {
+void BeastConnection::send_file() {
   outgoing_.resize(kPiece);
   const std::size_t wanted = std::min<std::uint64_t>(file_left_, kPiece);
   const ssize_t got = ::read(file_.fd.get(), outgoing_.data(), wanted);
@@ -138,7 +184,7 @@ void HttpConnection::send_file() {
   send(static_cast<std::size_t>(got));
 }
 
-void HttpConnection::sent(const error_code& error) {
+void BeastConnection::sent(const error_code& error) {
   if (error || ended_) return end();
   if (file_left_ > 0) return send_file();
   file_ = {};
@@ -148,7 +194,7 @@ void HttpConnection::sent(const error_code& error) {
 }
 
 /// Closed at once, what it is still sending would make the kernel throw away the answer.
-void HttpConnection::linger() {
+void BeastConnection::linger() {
   deadline_ = std::chrono::steady_clock::now() + kLinger;
   error_code ignored;
   socket_.shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
@@ -156,7 +202,7 @@ void HttpConnection::linger() {
   discard();
 }
 
-void HttpConnection::discard() {
+void BeastConnection::discard() {
   socket_.async_read_some(
       asio::buffer(outgoing_),
       [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
@@ -164,19 +210,26 @@ void HttpConnection::discard() {
       });
 }
 
-void HttpConnection::check(TimePoint now) {
+void BeastConnection::check(TimePoint now) {
   if (now > deadline_) drop();
 }
 
-void HttpConnection::drop() noexcept {
+void BeastConnection::drop() noexcept {
   error_code ignored;
   socket_.close(ignored);  // whatever waits for it ends with an error
 }
 
-void HttpConnection::end() {
+void BeastConnection::end() {
   if (std::exchange(ended_, true)) return;
   drop();
   keeper_.closed(*this);
+}
+
+}  // namespace
+
+std::shared_ptr<HttpConnection> HttpConnection::make(asio::ip::tcp::socket socket,
+                                                     ConnectionKeeper& keeper, Duration patience) {
+  return std::make_shared<BeastConnection>(std::move(socket), keeper, patience);
 }
 
 }  // namespace tagwrench

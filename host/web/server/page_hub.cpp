@@ -1,14 +1,19 @@
 #include "host/web/server/page_hub.h"
 
-#include <boost/beast/websocket/rfc6455.hpp>
+#include <nlohmann/json.hpp>
 #include <utility>
-#include <vector>
+
+#include "host/web/server/ask.h"
+#include "host/web/server/ask_message.h"
 
 namespace tagwrench {
 namespace {
 
-using boost::beast::websocket::close_code;
 using nlohmann::json;
+
+// Of RFC 6455, section 7.4.1.
+constexpr std::uint16_t kGoingAway = 1001;
+constexpr std::uint16_t kPolicyError = 1008;
 
 std::shared_ptr<const std::string> shared_text(const json& message) {
   return std::make_shared<const std::string>(
@@ -30,11 +35,11 @@ void PageHub::each(Work work) {
   for (const auto& page : all) work(*page);
 }
 
-void PageHub::add(boost::asio::ip::tcp::socket socket, WebSocketRequest request) {
+void PageHub::add(PageRequest&& request) {
   const std::uint64_t id = next_page_++;
-  const auto page = std::make_shared<PageSocket>(std::move(socket), id, *this, patience_);
+  const auto page = PageSocket::make(std::move(request), id, *this, patience_);
   pages_.emplace(id, page);
-  page->open(std::move(request));
+  page->open();
 }
 
 void PageHub::opened(PageSocket& page) {
@@ -61,23 +66,23 @@ void PageHub::said(PageSocket& page, std::string_view text) {
   AskMessage message = parse_ask(text);
   if (!message.id) {
     misbehaved(Refusal::nonsense);
-    return page.close(close_code::policy_error, message.fault);
+    return page.close(kPolicyError, message.fault);
   }
   if (!message.fault.empty())
-    return answer(page.id(), *message.id, false, std::string(message.fault), nullptr);
+    return answer(page.id(), *message.id, false, std::string(message.fault));
   if (message.what != "pictures") return pass_on(page, std::move(message));
   const auto on = message.arguments.find("on");
   const bool valid = on != message.arguments.end() && on->is_boolean();
   if (valid) page.wants_pictures = on->get<bool>();
   want_pictures();
-  answer(page.id(), *message.id, valid, valid ? "" : "pictures: \"on\" is true or false", nullptr);
+  answer(page.id(), *message.id, valid, valid ? "" : "pictures: \"on\" is true or false");
 }
 
 void PageHub::pass_on(PageSocket& page, AskMessage message) {
   try {
     handler_->ask({page.id(), *message.id, std::move(message.what), std::move(message.arguments)});
   } catch (const std::exception& error) {
-    answer(page.id(), *message.id, false, error.what(), nullptr);
+    answer(page.id(), *message.id, false, error.what());
   }
 }
 
@@ -92,10 +97,7 @@ std::shared_ptr<const std::string> PageHub::samples(PageSocket& page) {
 void PageHub::tick() {
   ticking_ = !pages_.empty();
   if (!ticking_) return;
-  timer_.expires_after(kTick);
-  timer_.async_wait([this](const boost::system::error_code& error) {
-    if (!error) tick();
-  });
+  timer_.after(kTick, [this] { tick(); });
   stream_.pull();
   take_picture();
   each([](PageSocket& page) { page.samples_due(); });
@@ -124,7 +126,7 @@ void PageHub::check(TimePoint now) {
 }
 
 void PageHub::close_all() {
-  each([](PageSocket& page) { page.close(close_code::going_away, "the program ends"); });
+  each([](PageSocket& page) { page.close(kGoingAway, "the program ends"); });
 }
 
 void PageHub::deliver(PageSocket& page, std::string_view type, const Text& text) {
@@ -134,9 +136,14 @@ void PageHub::deliver(PageSocket& page, std::string_view type, const Text& text)
     page.replace(type, text);
 }
 
-void PageHub::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text, json data) {
+void PageHub::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text) {
+  answer(page, id, ok, std::move(text), nullptr);
+}
+
+void PageHub::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text,
+                     const json& data) {
   json message{{"type", "answer"}, {"id", id}, {"ok", ok}, {"text", std::move(text)}};
-  if (!data.is_null()) message["data"] = std::move(data);
+  if (!data.is_null()) message["data"] = data;
   send(page, message);
 }
 

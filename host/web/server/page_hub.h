@@ -2,20 +2,26 @@
 #pragma once
 
 #include <atomic>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/steady_timer.hpp>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
+#include <vector>
 
-#include "host/web/server/ask_message.h"
+#include "host/types.h"
+#include "host/web/server/live_feed.h"
 #include "host/web/server/page_socket.h"
 #include "host/web/server/picture_message.h"
 #include "host/web/server/sample_stream.h"
+#include "host/web/server/server_timer.h"
 #include "host/web/server/web_server.h"
 
 namespace tagwrench {
+
+struct AskMessage;
 
 class PageHub final : public PageKeeper {
  public:
@@ -30,11 +36,14 @@ class PageHub final : public PageKeeper {
   LiveFeed& feed() noexcept { return feed_; }
   bool has_room() const noexcept { return pages_.size() < WebServer::kMostPages; }
   std::size_t pages() const noexcept { return pages_.size(); }
-  void add(boost::asio::ip::tcp::socket socket, WebSocketRequest request);
+  /// What `request` holds is moved from.
+  void add(PageRequest&& request);
   void check(TimePoint now);
   void close_all();
 
-  void answer(std::uint64_t page, std::int64_t id, bool ok, std::string text, nlohmann::json data);
+  void answer(std::uint64_t page, std::int64_t id, bool ok, std::string text);
+  void answer(std::uint64_t page, std::int64_t id, bool ok, std::string text,
+              const nlohmann::json& data);
   void send_all(const nlohmann::json& message);
   void send(std::uint64_t page, const nlohmann::json& message);
   void send_picture(std::shared_ptr<const std::vector<std::uint8_t>> message);
@@ -66,7 +75,7 @@ class PageHub final : public PageKeeper {
   LiveFeed feed_;
   SampleStream stream_{feed_};
   PictureMaker maker_;
-  boost::asio::steady_timer timer_;
+  ServerTimer timer_;
   WebPatience patience_;
   bool ticking_ = false;
   AskHandler* handler_ = nullptr;

@@ -1,7 +1,15 @@
 #include "host/web/server/page_socket.h"
 
 #include <boost/asio/buffer.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
+#include <utility>
+
+#include "host/web/server/message_rate.h"
+#include "host/web/server/outbox.h"
+#include "host/web/server/page_request.h"
+#include "host/web/server/web_server.h"
 
 namespace tagwrench {
 namespace {
@@ -14,14 +22,59 @@ constexpr int kSendBuffer = 128 * 1024;  // the kernel's; what waits longer is r
 
 TimePoint page_clock() { return std::chrono::steady_clock::now(); }
 
-}  // namespace
+class WebSocketPage final : public PageSocket, public std::enable_shared_from_this<WebSocketPage> {
+ public:
+  WebSocketPage(PageRequest&& request, std::uint64_t id, PageKeeper& keeper,
+                const WebPatience& patience);
 
-PageSocket::PageSocket(asio::ip::tcp::socket socket, std::uint64_t id, PageKeeper& keeper,
-                       const WebPatience& patience)
-    : stream_(std::move(socket)),
+  void open() override;
+  void keep(std::shared_ptr<const std::string> text) override;
+  void replace(std::string_view type, std::shared_ptr<const std::string> text) override;
+  void show(std::shared_ptr<const std::vector<std::uint8_t>> picture) override;
+  void samples_due() override;
+  void check(TimePoint now) override;
+  void close(std::uint16_t code, std::string_view reason) override;
+
+  std::uint64_t id() const noexcept override { return id_; }
+  bool was_open() const noexcept override { return open_; }
+
+ private:
+  bool is_open() const noexcept { return open_ && !closing_; }
+  void read();
+  void take(const error_code& error);
+  void pump();
+  void write(std::shared_ptr<const void> owner, const void* bytes, std::size_t size, bool text);
+  void ping();
+  void finished(const error_code& error);
+  void drop() noexcept;
+  void end();
+
+  websocket::stream<asio::ip::tcp::socket, false> stream_;
+  std::uint64_t id_;
+  PageKeeper& keeper_;
+  WebPatience patience_;
+  WebSocketRequest request_;
+  boost::beast::flat_buffer incoming_;
+  Outbox outbox_;
+  MessageRate<WebServer::kMostAsksASecond> rate_;
+  bool open_ = false;
+  bool closing_ = false;
+  bool ended_ = false;
+  bool busy_ = false;  ///< writing
+  bool ping_due_ = false;
+  bool samples_due_ = false;
+  TimePoint busy_since_{};
+  TimePoint heard_{};
+  TimePoint pinged_{};
+};
+
+WebSocketPage::WebSocketPage(PageRequest&& request, std::uint64_t id, PageKeeper& keeper,
+                             const WebPatience& patience)
+    : stream_(std::move(request.socket)),
       id_(id),
       keeper_(keeper),
       patience_(patience),
+      request_(std::move(request.request)),
       incoming_(WebServer::kLongestAsk + 1) {
   error_code ignored;
   stream_.next_layer().set_option(asio::ip::tcp::no_delay(true), ignored);
@@ -37,9 +90,8 @@ PageSocket::PageSocket(asio::ip::tcp::socket socket, std::uint64_t id, PageKeepe
   }));
 }
 
-void PageSocket::open(WebSocketRequest request) {
+void WebSocketPage::open() {
   heard_ = pinged_ = page_clock();
-  request_ = std::move(request);
   stream_.control_callback([this](websocket::frame_type, boost::beast::string_view) {
     heard_ = page_clock();
     if (!rate_.count(heard_)) drop();
@@ -54,14 +106,14 @@ void PageSocket::open(WebSocketRequest request) {
   });
 }
 
-void PageSocket::read() {
+void WebSocketPage::read() {
   stream_.async_read(incoming_,
                      [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
                        self->take(error);
                      });
 }
 
-void PageSocket::take(const error_code& error) {
+void WebSocketPage::take(const error_code& error) {
   if (error == websocket::error::message_too_big) keeper_.misbehaved(Refusal::flood);
   if (error) return end();
   heard_ = page_clock();
@@ -79,31 +131,31 @@ void PageSocket::take(const error_code& error) {
   read();
 }
 
-void PageSocket::keep(std::shared_ptr<const std::string> text) {
+void WebSocketPage::keep(std::shared_ptr<const std::string> text) {
   if (!is_open()) return;
   if (!outbox_.keep(std::move(text)))
     return close(websocket::close_code::try_again_later, "too slow");
   pump();
 }
 
-void PageSocket::replace(std::string_view type, std::shared_ptr<const std::string> text) {
+void WebSocketPage::replace(std::string_view type, std::shared_ptr<const std::string> text) {
   if (!is_open()) return;
   outbox_.replace(type, std::move(text));
   pump();
 }
 
-void PageSocket::show(std::shared_ptr<const std::vector<std::uint8_t>> picture) {
+void WebSocketPage::show(std::shared_ptr<const std::vector<std::uint8_t>> picture) {
   if (!is_open() || !wants_pictures) return;
   outbox_.replace_picture(std::move(picture));
   pump();
 }
 
-void PageSocket::samples_due() {
+void WebSocketPage::samples_due() {
   samples_due_ = true;
   pump();
 }
 
-void PageSocket::check(TimePoint now) {
+void WebSocketPage::check(TimePoint now) {
   const bool deaf = now - heard_ > patience_.silence;
   const bool stuck = busy_ && now - busy_since_ > patience_.unread;
   const bool stays = closing_ && now - pinged_ > kGoodBye;
@@ -114,7 +166,7 @@ void PageSocket::check(TimePoint now) {
   pump();
 }
 
-void PageSocket::pump() {
+void WebSocketPage::pump() {
   if (busy_ || !is_open()) return;
   if (ping_due_) return ping();
   if (auto text = outbox_.next_text()) return write(text, text->data(), text->size(), true);
@@ -124,8 +176,8 @@ void PageSocket::pump() {
     write(picture, picture->data(), picture->size(), false);
 }
 
-void PageSocket::write(std::shared_ptr<const void> owner, const void* bytes, std::size_t size,
-                       bool text) {
+void WebSocketPage::write(std::shared_ptr<const void> owner, const void* bytes, std::size_t size,
+                          bool text) {
   busy_ = true;
   busy_since_ = page_clock();
   stream_.text(text);
@@ -135,7 +187,7 @@ void PageSocket::write(std::shared_ptr<const void> owner, const void* bytes, std
           const error_code& error, std::size_t /*sent*/) { self->finished(error); });
 }
 
-void PageSocket::ping() {
+void WebSocketPage::ping() {
   ping_due_ = false;
   busy_ = true;
   busy_since_ = page_clock();
@@ -143,13 +195,13 @@ void PageSocket::ping() {
       {}, [self = shared_from_this()](const error_code& error) { self->finished(error); });
 }
 
-void PageSocket::finished(const error_code& error) {
+void WebSocketPage::finished(const error_code& error) {
   busy_ = false;
   if (error) return end();
   pump();
 }
 
-void PageSocket::close(std::uint16_t code, std::string_view reason) {
+void WebSocketPage::close(std::uint16_t code, std::string_view reason) {
   if (closing_ || ended_) return;
   if (!open_) return drop();
   closing_ = true;
@@ -159,16 +211,23 @@ void PageSocket::close(std::uint16_t code, std::string_view reason) {
   stream_.async_close(why, [self = shared_from_this()](const error_code&) { self->end(); });
 }
 
-void PageSocket::drop() noexcept {
+void WebSocketPage::drop() noexcept {
   error_code ignored;
   stream_.next_layer().close(ignored);  // whatever waits for it ends with an error
 }
 
-void PageSocket::end() {
+void WebSocketPage::end() {
   if (std::exchange(ended_, true)) return;
   closing_ = true;
   drop();
   keeper_.gone(id_);
+}
+
+}  // namespace
+
+std::shared_ptr<PageSocket> PageSocket::make(PageRequest&& request, std::uint64_t id,
+                                             PageKeeper& keeper, const WebPatience& patience) {
+  return std::make_shared<WebSocketPage>(std::move(request), id, keeper, patience);
 }
 
 }  // namespace tagwrench

@@ -14,6 +14,7 @@
 #include <csignal>
 #include <map>
 #include <thread>
+#include <utility>
 
 #include "host/config_error.h"
 #include "host/tell.h"
@@ -121,9 +122,7 @@ class WebServer::Site final : public ConnectionKeeper {
     return hub.has_room() ? Refusal::none : Refusal::crowd;
   }
 
-  void becomes_page(tcp::socket socket, WebSocketRequest request) override {
-    hub.add(std::move(socket), std::move(request));
-  }
+  void becomes_page(PageRequest&& request) override { hub.add(std::move(request)); }
 
   void refused(Refusal refusal, std::string_view detail) override {
     const std::string line = log_.line(refusal, detail, std::chrono::steady_clock::now());
@@ -177,7 +176,7 @@ class WebServer::Site final : public ConnectionKeeper {
     const bool room = connections_.size() - turned_away + hub.pages() < kMostConnections;
     if (!room) refused(Refusal::crowd, {});
     if (!room && turned_away >= kMostTurnedAway) return;
-    const auto connection = std::make_shared<HttpConnection>(std::move(socket), *this, patience_);
+    const auto connection = HttpConnection::make(std::move(socket), *this, patience_);
     connections_.emplace(connection.get(), connection);
     if (room)
       connection->serve();
@@ -244,9 +243,13 @@ std::string WebServer::url_with_token() const {
 void WebServer::post(std::function<void()> work) { asio::post(site_->context, std::move(work)); }
 bool WebServer::pictures_wanted() const noexcept { return site_->hub.pictures_wanted(); }
 
+void WebServer::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text) {
+  site_->hub.answer(page, id, ok, std::move(text));
+}
+
 void WebServer::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text,
-                       nlohmann::json data) {
-  site_->hub.answer(page, id, ok, std::move(text), std::move(data));
+                       const nlohmann::json& data) {
+  site_->hub.answer(page, id, ok, std::move(text), data);
 }
 
 void WebServer::send_all(const nlohmann::json& message) { site_->hub.send_all(message); }
@@ -259,7 +262,7 @@ void WebServer::send_picture(std::shared_ptr<const std::vector<std::uint8_t>> me
   site_->hub.send_picture(std::move(message));
 }
 
-void WebServer::set_hello(nlohmann::json hello) { site_->hub.set_hello(hello); }
+void WebServer::set_hello(const nlohmann::json& hello) { site_->hub.set_hello(hello); }
 std::size_t WebServer::pages() const noexcept { return site_->hub.pages(); }
 LiveFigures WebServer::figures() const { return site_->hub.figures(); }
 

@@ -8,11 +8,13 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "host/types.h"
 #include "host/web/server/live_figures.h"
+#include "host/web/server/web_options.h"
 
 namespace boost::asio {
 class io_context;
@@ -21,15 +23,7 @@ class io_context;
 namespace tagwrench {
 
 class LiveFeed;
-
-/// A page's wish, as far as any page's wish is checked: `what` is a word of lower-case letters and
-/// underscores, `arguments` an object without "id" and "ask", nested no deeper than eight.
-struct Ask {
-  std::uint64_t page = 0;
-  std::int64_t id = 0;
-  std::string what;
-  nlohmann::json arguments;
-};
+struct Ask;
 
 /// Called by the server's thread. Whoever is asked owes exactly one WebServer::answer(), now or
 /// later; an exception is answered with its text.
@@ -44,24 +38,6 @@ class AskHandler {
   /// Has got its hello and will hear send_all().
   virtual void page_came(std::uint64_t /*page*/) {}
   virtual void page_gone(std::uint64_t /*page*/) {}
-};
-
-/// How long is waited for what a page, or whoever connects, owes.
-struct WebPatience {
-  Duration request = std::chrono::seconds(10);  ///< for a request, and for a piece of an answer to
-                                                ///< be taken
-  Duration unread = std::chrono::seconds(10);   ///< for a page's message to be taken
-  Duration ping = std::chrono::seconds(5);      ///< from one ping to the next
-  Duration silence = std::chrono::seconds(15);  ///< for anything to be heard from a page
-};
-
-struct WebOptions {
-  std::string address = "127.0.0.1";    ///< a number, or "localhost"
-  std::uint16_t port = 8137;            ///< 0: any that is free
-  std::string token{};                  ///< empty: none, which a loopback address alone allows
-  std::filesystem::path pages{};        ///< holds dashboard/, sensor/ and flip/, as far as built
-  std::string option = "--output web";  ///< that said so, for complaints
-  WebPatience patience{};
 };
 
 class WebServer {
@@ -105,8 +81,9 @@ class WebServer {
   // From here on: before start(), or in the server's thread.
 
   /// To the page, if it is still there.
+  void answer(std::uint64_t page, std::int64_t id, bool ok, std::string text);
   void answer(std::uint64_t page, std::int64_t id, bool ok, std::string text,
-              nlohmann::json data = nullptr);
+              const nlohmann::json& data);
   /// An object with a "type". Where a page is slow, the latest of a type replaces the one before;
   /// but "say" is kept, up to 64 of them and answers, beyond which the page is closed.
   void send_all(const nlohmann::json& message);
@@ -117,7 +94,7 @@ class WebServer {
   void send_picture(std::shared_ptr<const std::vector<std::uint8_t>> message);
   /// What every page gets first. Sent to all at once, too. Before there is one, a page hears
   /// nothing but answers.
-  void set_hello(nlohmann::json hello);
+  void set_hello(const nlohmann::json& hello);
   std::size_t pages() const noexcept;
 
   /// Rate, latency and so on of the last second, as read from the feed; zeros while no page is

@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "host/web/server/ask.h"
 #include "host/web/server/live_feed.h"
 #include "host/web/server/web_server.h"
 
