@@ -16,6 +16,7 @@
 #include "host/tell.h"
 #include "host/verbs/recording.h"
 #include "host/verbs/web_place.h"
+#include "host/web/bridge/recording_folder.h"
 #include "host/web/server/token_file.h"
 
 namespace tagwrench {

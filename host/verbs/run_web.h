@@ -6,6 +6,7 @@
 
 #include "host/board/run_board.h"
 #include "host/input.h"
+#include "host/os/unique_fd.h"
 #include "host/verbs/run_command.h"
 #include "host/web/bridge/web_bridge.h"
 

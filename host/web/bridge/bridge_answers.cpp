@@ -8,7 +8,7 @@
 
 #include "host/config/plan_config.h"
 #include "host/web/bridge/profile_saving.h"
-#include "host/web/bridge/web_bridge.h"
+#include "host/web/bridge/web_bridge_impl.h"
 
 namespace tagwrench {
 namespace {
@@ -57,34 +57,34 @@ record::Keep keep_of(const std::string& word) {
 
 }  // namespace
 
-WebBridge::Answer WebBridge::answer_to(std::string_view what) {
+WebBridge::Impl::Answer WebBridge::Impl::answer_to(std::string_view what) {
   static const std::map<std::string_view, Answer> answers = {
-      {"zero", &WebBridge::zero},
-      {"profile", &WebBridge::choose_profile},
-      {"next_profile", &WebBridge::next_profile},
-      {"show", &WebBridge::show_profile},
-      {"try", &WebBridge::try_profile},
-      {"keep", &WebBridge::keep_profile},
-      {"revert", &WebBridge::revert_profile},
-      {"save_profile", &WebBridge::save_profile},
-      {"record_start", &WebBridge::start_recording},
-      {"record_stop", &WebBridge::stop_recording},
-      {"recordings", &WebBridge::list_recordings},
-      {"camera_set", &WebBridge::set_camera},
-      {"led", &WebBridge::set_led},
-      {"tare", &WebBridge::tare},
-      {"job_start", &WebBridge::start_job},
-      {"job_key", &WebBridge::press_key},
-      {"job_close", &WebBridge::close_job},
-      {"plans", &WebBridge::list_plans},
-      {"retry", &WebBridge::retry},
+      {"zero", &Impl::zero},
+      {"profile", &Impl::choose_profile},
+      {"next_profile", &Impl::next_profile},
+      {"show", &Impl::show_profile},
+      {"try", &Impl::try_profile},
+      {"keep", &Impl::keep_profile},
+      {"revert", &Impl::revert_profile},
+      {"save_profile", &Impl::save_profile},
+      {"record_start", &Impl::start_recording},
+      {"record_stop", &Impl::stop_recording},
+      {"recordings", &Impl::list_recordings},
+      {"camera_set", &Impl::set_camera},
+      {"led", &Impl::set_led},
+      {"tare", &Impl::tare},
+      {"job_start", &Impl::start_job},
+      {"job_key", &Impl::press_key},
+      {"job_close", &Impl::close_job},
+      {"plans", &Impl::list_plans},
+      {"retry", &Impl::retry},
   };
   const auto found = answers.find(what);
   return found == answers.end() ? nullptr : found->second;
 }
 
 /// What is thrown is the answer.
-void WebBridge::ask(Ask ask) {
+void WebBridge::Impl::ask(Ask ask) {
   if (!jobs_) throw WishRefused("the bridge is about to end; nothing was done");
   const Answer does = answer_to(ask.what);
   if (does == nullptr)
@@ -92,11 +92,11 @@ void WebBridge::ask(Ask ask) {
   (this->*does)(ask);
 }
 
-void WebBridge::answer(const Ask& ask, bool ok, std::string text, json data) {
+void WebBridge::Impl::answer(const Ask& ask, bool ok, std::string text, json data) {
   server_.answer(ask.page, ask.id, ok, std::move(text), std::move(data));
 }
 
-DeskLink& WebBridge::desk() {
+DeskLink& WebBridge::Impl::desk() {
   if (!running_) throw WishRefused(kNoRun);
   if (desk_ && desk_->waiting() >= kMostWaiting)
     throw WishRefused("too many wishes wait for the desk; send fewer");
@@ -105,7 +105,8 @@ DeskLink& WebBridge::desk() {
       "another bridge of this name has the desk; stop it, or give this one another --name");
 }
 
-void WebBridge::ask_desk(const Ask& ask, std::string wish, std::function<void(DeskAnswer)> then) {
+void WebBridge::Impl::ask_desk(const Ask& ask, std::string wish,
+                               std::function<void(DeskAnswer)> then) {
   if (wish.size() > ControlSocket::kLongestWish)
     throw WishRefused(fmt::format("text: is longer than {} bytes", ControlSocket::kLongestWish));
   desk().ask(std::move(wish), [this, ask, then = std::move(then)](DeskAnswer said) {
@@ -114,17 +115,17 @@ void WebBridge::ask_desk(const Ask& ask, std::string wish, std::function<void(De
   });
 }
 
-void WebBridge::zero(const Ask& ask) { ask_desk(ask, "zero"); }
+void WebBridge::Impl::zero(const Ask& ask) { ask_desk(ask, "zero"); }
 
-void WebBridge::choose_profile(const Ask& ask) {
+void WebBridge::Impl::choose_profile(const Ask& ask) {
   ask_desk(ask, "profile " + line_of(ask, "name"), [this](const DeskAnswer&) { read_profile(); });
 }
 
-void WebBridge::next_profile(const Ask& ask) {
+void WebBridge::Impl::next_profile(const Ask& ask) {
   ask_desk(ask, "next", [this](const DeskAnswer&) { read_profile(); });
 }
 
-void WebBridge::show_profile(const Ask& ask) {
+void WebBridge::Impl::show_profile(const Ask& ask) {
   desk().ask("show " + line_of(ask, "name", false), [this, ask](const DeskAnswer& shown) {
     const std::size_t line_end = shown.text.find('\n');
     if (!shown.ok || line_end == std::string::npos) return answer(ask, false, shown.text);
@@ -132,7 +133,7 @@ void WebBridge::show_profile(const Ask& ask) {
   });
 }
 
-void WebBridge::try_profile(const Ask& ask) {
+void WebBridge::Impl::try_profile(const Ask& ask) {
   const std::string name = line_of(ask, "name");
   const std::string text = text_of(ask, "text");
   const std::optional<Trial>& first = trial_ ? trial_ : trying_;
@@ -154,7 +155,7 @@ void WebBridge::try_profile(const Ask& ask) {
   ++trying_->unanswered;
 }
 
-void WebBridge::keep_profile(const Ask& ask) {
+void WebBridge::Impl::keep_profile(const Ask& ask) {
   ask_desk(ask, "keep", [this](const DeskAnswer& said) {
     if (!said.ok) return;
     trial_.reset();
@@ -162,14 +163,14 @@ void WebBridge::keep_profile(const Ask& ask) {
   });
 }
 
-void WebBridge::revert_profile(const Ask& ask) {
+void WebBridge::Impl::revert_profile(const Ask& ask) {
   ask_desk(ask, "revert", [this](const DeskAnswer&) {
     trial_.reset();
     read_profile();
   });
 }
 
-void WebBridge::save_profile(const Ask& ask) {
+void WebBridge::Impl::save_profile(const Ask& ask) {
   const std::string of = line_of(ask, "name");
   const std::string text = text_of(ask, "text");
   const std::string given = line_of(ask, "as", false);
@@ -197,7 +198,7 @@ void WebBridge::save_profile(const Ask& ask) {
   });
 }
 
-void WebBridge::start_recording(const Ask& ask) {
+void WebBridge::Impl::start_recording(const Ask& ask) {
   const std::string name = line_of(ask, "name");
   const record::Keep keep = keep_of(line_of(ask, "keep", false));
   if (!running_) throw WishRefused(kNoRun);
@@ -221,7 +222,7 @@ void WebBridge::start_recording(const Ask& ask) {
   });
 }
 
-void WebBridge::stop_recording(const Ask& ask) {
+void WebBridge::Impl::stop_recording(const Ask& ask) {
   if (!recording_ || ending_recording_) throw WishRefused("recording: none runs");
   ending_recording_ = true;
   control_.wish([this, ask](WebOutput* run) {
@@ -238,11 +239,11 @@ void WebBridge::stop_recording(const Ask& ask) {
   });
 }
 
-void WebBridge::list_recordings(const Ask& ask) {
+void WebBridge::Impl::list_recordings(const Ask& ask) {
   answer(ask, true, recordings_.path().string(), recordings_.list());
 }
 
-void WebBridge::set_camera(const Ask& ask) {
+void WebBridge::Impl::set_camera(const Ask& ask) {
   const auto id = static_cast<std::uint32_t>(number_of(ask, "control", 0, 4294967295.0));
   const auto value =
       static_cast<std::int64_t>(number_of(ask, "value", -2147483648.0, 2147483647.0));
@@ -265,7 +266,7 @@ void WebBridge::set_camera(const Ask& ask) {
   throw WishRefused("control: this camera has no such setting, or it cannot be changed now");
 }
 
-void WebBridge::set_led(const Ask& ask) {
+void WebBridge::Impl::set_led(const Ask& ask) {
   const auto level = ask.arguments.find("level");
   const bool settled = level != ask.arguments.end() && *level == "auto";
   const double part = settled ? 0 : number_of(ask, "level", 0, 1);
@@ -284,7 +285,7 @@ void WebBridge::set_led(const Ask& ask) {
   });
 }
 
-void WebBridge::tare(const Ask& ask) {
+void WebBridge::Impl::tare(const Ask& ask) {
   const auto channel = static_cast<std::size_t>(number_of(ask, "channel", 0, 3));
   control_.wish([this, ask, channel](WebOutput* run) {
     BoardControl* board = run == nullptr ? nullptr : run->board();
@@ -299,7 +300,7 @@ void WebBridge::tare(const Ask& ask) {
   });
 }
 
-void WebBridge::start_job(const Ask& ask) {
+void WebBridge::Impl::start_job(const Ask& ask) {
   const std::string verb = line_of(ask, "verb");
   if (!facts_) throw WishRefused(kNoRun);
   const auto options = ask.arguments.find("options");
@@ -311,17 +312,17 @@ void WebBridge::start_job(const Ask& ask) {
   answer(ask, true, "begun");
 }
 
-void WebBridge::press_key(const Ask& ask) {
+void WebBridge::Impl::press_key(const Ask& ask) {
   jobs_->press(line_of(ask, "key"));
   answer(ask, true, "pressed");
 }
 
-void WebBridge::close_job(const Ask& ask) {
+void WebBridge::Impl::close_job(const Ask& ask) {
   jobs_->close();
   answer(ask, true, "closed");
 }
 
-void WebBridge::list_plans(const Ask& ask) {
+void WebBridge::Impl::list_plans(const Ask& ask) {
   json plans = json::array();
   for (const ReadyPlan& ready : ready_plans()) {
     const WrenchPlan plan = parse_plan(ready.text, ready.name);
@@ -333,7 +334,7 @@ void WebBridge::list_plans(const Ask& ask) {
   answer(ask, true, {}, std::move(plans));
 }
 
-void WebBridge::retry(const Ask& ask) {
+void WebBridge::Impl::retry(const Ask& ask) {
   if (running_) throw WishRefused("retry: the sensor runs");
   if (jobs_->holds_camera()) throw WishRefused("retry: a job has the camera; stop it first");
   if (!camera_free_) throw WishRefused("retry: the sensor is being set up already");

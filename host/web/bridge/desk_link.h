@@ -3,9 +3,8 @@
 #pragma once
 
 #include <array>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/local/datagram_protocol.hpp>
-#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -13,6 +12,11 @@
 #include <string_view>
 
 #include "host/desk/control_socket.h"
+#include "host/web/server/server_timer.h"
+
+namespace boost::asio {
+class io_context;
+}
 
 namespace tagwrench {
 
@@ -32,6 +36,7 @@ class DeskLink {
   /// `path` of the desk's socket, where somebody may or may not listen. Throws ConfigError if the
   /// system has no more descriptors.
   DeskLink(boost::asio::io_context& context, std::string path);
+  ~DeskLink();
 
   /// `done` is called exactly once, later; one wish after the other.
   void ask(std::string wish, Done done);
@@ -47,8 +52,9 @@ class DeskLink {
   void finish(DeskAnswer answer);
 
   std::string path_;
-  boost::asio::local::datagram_protocol::socket socket_;
-  boost::asio::steady_timer patience_;
+  struct Socket;
+  std::unique_ptr<Socket> socket_;
+  ServerTimer patience_;
   std::deque<Wish> wishes_;
   std::array<char, ControlSocket::kLongestAnswer> answer_{};
   std::uint64_t number_ = 0;  ///< of the wish at the front

@@ -7,6 +7,8 @@
 #include <exception>
 #include <utility>
 
+#include "host/web/bridge/job_process.h"
+
 namespace tagwrench {
 namespace {
 
@@ -126,9 +128,7 @@ void Jobs::close() {
 
 void Jobs::tell_soon() {
   if (std::exchange(will_tell_, true)) return;
-  telling_.expires_after(kTellEvery);
-  telling_.async_wait([this](boost::system::error_code error) {
-    if (error) return;
+  telling_.after(kTellEvery, [this] {
     will_tell_ = false;
     if (report_) hooks_.tell(report_->to_json());
   });

@@ -2,8 +2,6 @@
 // are told of it. In the server's thread.
 #pragma once
 
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,10 +9,16 @@
 #include <string>
 
 #include "host/web/bridge/job_command.h"
-#include "host/web/bridge/job_process.h"
 #include "host/web/bridge/job_report.h"
+#include "host/web/server/server_timer.h"
+
+namespace boost::asio {
+class io_context;
+}
 
 namespace tagwrench {
+
+class JobProcess;
 
 class Jobs {
  public:
@@ -61,7 +65,7 @@ class Jobs {
   JobCommand command_;
   std::optional<JobReport> report_;
   std::shared_ptr<JobProcess> process_;
-  boost::asio::steady_timer telling_;
+  ServerTimer telling_;
   bool will_tell_ = false;
 };
 

@@ -10,6 +10,7 @@
 #include "host/desk/control_socket.h"
 #include "host/hint_text.h"
 #include "host/tell.h"
+#include "host/web/bridge/web_bridge_impl.h"
 #include "host/web/server/picture_message.h"
 
 namespace tagwrench {
@@ -24,7 +25,7 @@ constexpr std::string_view kProfileNews = "profile";
 
 }  // namespace
 
-WebBridge::WebBridge(const WebBridgeOptions& options, int stop)
+WebBridge::Impl::Impl(const WebBridgeOptions& options, int stop)
     : own_profiles_(options.own_profiles),
       recordings_(options.recordings),
       server_(options.server),
@@ -46,7 +47,7 @@ WebBridge::WebBridge(const WebBridgeOptions& options, int stop)
   });
 }
 
-WebBridge::~WebBridge() {
+WebBridge::Impl::~Impl() {
   if (started_) {
     in_server([this] {  // all that belongs to its thread
       ticker_.reset();
@@ -58,7 +59,7 @@ WebBridge::~WebBridge() {
   if (ender_.joinable()) ender_.join();
 }
 
-void WebBridge::start() {
+void WebBridge::Impl::start() {
   server_.start(*this);
   started_ = true;
   in_server([this] {
@@ -67,7 +68,7 @@ void WebBridge::start() {
   });
 }
 
-void WebBridge::in_server(std::function<void()> work) {
+void WebBridge::Impl::in_server(std::function<void()> work) {
   std::promise<void> done;
   server_.post([&] {
     try {
@@ -80,7 +81,8 @@ void WebBridge::in_server(std::function<void()> work) {
   done.get_future().get();
 }
 
-std::unique_ptr<WebOutput> WebBridge::begin_run(const RunFacts& facts, WebOutput::Parts parts) {
+std::unique_ptr<WebOutput> WebBridge::Impl::begin_run(const RunFacts& facts,
+                                                      WebOutput::Parts parts) {
   const json hello = hello_of(facts, recordings_.path().string());
   // Before anybody knows of the run: what is wished of it from then on waits for its loop.
   clear_event(resume_);
@@ -123,7 +125,7 @@ std::unique_ptr<WebOutput> WebBridge::begin_run(const RunFacts& facts, WebOutput
   return std::make_unique<WebOutput>(std::move(parts));
 }
 
-void WebBridge::end_run() {
+void WebBridge::Impl::end_run() {
   control_.close();
   in_server([this] {
     running_ = false;
@@ -133,7 +135,7 @@ void WebBridge::end_run() {
   });
 }
 
-bool WebBridge::wait_to_resume(Beside beside) {
+bool WebBridge::Impl::wait_to_resume(Beside beside) {
   std::vector<pollfd> fds = {{resume_.get(), POLLIN, 0}, {stop_, POLLIN, 0}};
   for (const std::unique_ptr<Output>& output : beside)
     fds.push_back({output->poll_fd(), POLLIN, 0});
@@ -149,7 +151,7 @@ bool WebBridge::wait_to_resume(Beside beside) {
   }
 }
 
-bool WebBridge::lend_camera(Beside beside) {
+bool WebBridge::Impl::lend_camera(Beside beside) {
   clear_event(resume_);
   in_server([this] {
     camera_free_ = true;
@@ -159,7 +161,7 @@ bool WebBridge::lend_camera(Beside beside) {
   return wait_to_resume(beside);
 }
 
-bool WebBridge::wait_after(const std::string& failure, Beside beside) {
+bool WebBridge::Impl::wait_after(const std::string& failure, Beside beside) {
   control_.close();
   clear_event(resume_);
   in_server([&] {
@@ -174,26 +176,26 @@ bool WebBridge::wait_after(const std::string& failure, Beside beside) {
   return wait_to_resume(beside);
 }
 
-void WebBridge::give_back_camera() {
+void WebBridge::Impl::give_back_camera() {
   camera_free_ = false;
   raise_event(resume_);
 }
 
-void WebBridge::page_came(std::uint64_t page) {
+void WebBridge::Impl::page_came(std::uint64_t page) {
   pages_.insert(page);
   if (!jobs_) return;  // about to end
   server_.send(page, state());
   look_around();
 }
 
-void WebBridge::page_gone(std::uint64_t page) {
+void WebBridge::Impl::page_gone(std::uint64_t page) {
   pages_.erase(page);
   if (!trial_ || trial_->page != page) return;
   trial_.reset();
   if (desk_) desk_->ask("revert", [this](const DeskAnswer&) { read_profile(); });
 }
 
-void WebBridge::heard(std::string line, std::vector<std::string> programs) {
+void WebBridge::Impl::heard(std::string line, std::vector<std::string> programs) {
   const bool changed = programs != programs_;
   programs_ = std::move(programs);
   if (!line.empty()) say(line);
@@ -201,11 +203,11 @@ void WebBridge::heard(std::string line, std::vector<std::string> programs) {
   if (changed) send_state();
 }
 
-void WebBridge::say(const std::string& line) {
+void WebBridge::Impl::say(const std::string& line) {
   server_.send_all({{"type", "say"}, {"line", line}});
 }
 
-void WebBridge::show(const JobPicture& picture) {
+void WebBridge::Impl::show(const JobPicture& picture) {
   const json header = {{"seq", 0},
                        {"t_ns", 0},
                        {"width", picture.width},
@@ -216,7 +218,7 @@ void WebBridge::show(const JobPicture& picture) {
 }
 
 /// What the desk has in force, as pages see it.
-void WebBridge::read_profile() {
+void WebBridge::Impl::read_profile() {
   if (!desk_) return;
   desk_->ask("status", [this](const DeskAnswer& status) {
     constexpr std::string_view kHead = "profile ";
@@ -242,7 +244,7 @@ void WebBridge::read_profile() {
 }
 
 /// A trial lasts as long as who tries goes on asking.
-void WebBridge::keep_trial() {
+void WebBridge::Impl::keep_trial() {
   if (!trial_ || !desk_) return;
   desk_->ask("live", [this](const DeskAnswer& live) {
     if (!trial_ || (live.ok && live.text.ends_with(" 1"))) return;
@@ -251,7 +253,7 @@ void WebBridge::keep_trial() {
   });
 }
 
-void WebBridge::end_recording(std::function<void(RunRecording::Ending)> then) {
+void WebBridge::Impl::end_recording(std::function<void(RunRecording::Ending)> then) {
   ending_recording_ = true;
   if (ender_.joinable()) ender_.join();
   ender_ = std::thread([this, then = std::move(then),
@@ -270,11 +272,8 @@ void WebBridge::end_recording(std::function<void(RunRecording::Ending)> then) {
   send_state();
 }
 
-void WebBridge::tick() {
-  ticker_->expires_after(kTick);
-  ticker_->async_wait([this](boost::system::error_code error) {
-    if (!error) tick();
-  });
+void WebBridge::Impl::tick() {
+  ticker_->after(kTick, [this] { tick(); });
   const std::uint64_t samples = server_.feed().written();
   fresh_ = samples != std::exchange(seen_, samples);
   ++ticks_;
@@ -295,17 +294,17 @@ void WebBridge::tick() {
   send_state();
 }
 
-void WebBridge::look_around() {
+void WebBridge::Impl::look_around() {
   if (!facts_ || server_.pages() == 0) return;
   readers_ = device_readers("tagwrench-" + facts_->name);
   if (camera_ && running_) controls_ = settings_json(camera_->all());
 }
 
-void WebBridge::send_state() {
+void WebBridge::Impl::send_state() {
   if (jobs_ && server_.pages() > 0) server_.send_all(state());
 }
 
-std::string WebBridge::words(const SeenNow& seen, bool fresh) const {
+std::string WebBridge::Impl::words(const SeenNow& seen, bool fresh) const {
   if (!failure_.empty()) return failure_;
   if (!running_ && jobs_->holds_camera()) return "the camera is lent to what is being done";
   if (!running_) return "the sensor is being set up";
@@ -327,14 +326,14 @@ std::string WebBridge::words(const SeenNow& seen, bool fresh) const {
   return {};
 }
 
-json WebBridge::image() const {
+json WebBridge::Impl::image() const {
   if (!figures_ || !figures_->figures().is_object()) return nullptr;
   json image = figures_->figures();
   image["residual_part"] = views_.seen.get().residual_part;
   return image;
 }
 
-json WebBridge::state() const {
+json WebBridge::Impl::state() const {
   const LiveFigures figures = server_.figures();
   const SeenNow seen = views_.seen.get();
   json clients = json::array();
@@ -374,6 +373,27 @@ json WebBridge::state() const {
           {"board", board},
           {"camera_controls", running_ ? controls_ : json::array()},
           {"job", jobs_->to_json()}};
+}
+
+WebBridge::WebBridge(const WebBridgeOptions& options, int stop)
+    : impl_(std::make_unique<Impl>(options, stop)) {}
+
+WebBridge::~WebBridge() = default;
+
+void WebBridge::start() { impl_->start(); }
+std::string WebBridge::url() const { return impl_->url(); }
+std::string WebBridge::url_with_token() const { return impl_->url_with_token(); }
+
+std::unique_ptr<WebOutput> WebBridge::begin_run(const RunFacts& facts, WebOutput::Parts parts) {
+  return impl_->begin_run(facts, std::move(parts));
+}
+
+int WebBridge::end_fd() const noexcept { return impl_->end_fd(); }
+void WebBridge::end_run() { impl_->end_run(); }
+bool WebBridge::lend_camera(Beside beside) { return impl_->lend_camera(beside); }
+
+bool WebBridge::wait_after(const std::string& failure, Beside beside) {
+  return impl_->wait_after(failure, beside);
 }
 
 }  // namespace tagwrench

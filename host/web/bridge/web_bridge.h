@@ -2,30 +2,15 @@
 // a job that needs the camera ends one, and another is built when the job is over.
 #pragma once
 
-#include <boost/asio/steady_timer.hpp>
 #include <filesystem>
-#include <functional>
 #include <memory>
-#include <optional>
-#include <set>
 #include <span>
 #include <string>
-#include <string_view>
-#include <thread>
-#include <vector>
 
-#include "host/os/unique_fd.h"
-#include "host/web/bridge/camera_settings.h"
-#include "host/web/bridge/desk_link.h"
-#include "host/web/bridge/device_readers.h"
-#include "host/web/bridge/jobs.h"
-#include "host/web/bridge/picture_figures.h"
-#include "host/web/bridge/recording_folder.h"
-#include "host/web/bridge/run_control.h"
+#include "host/output/output.h"
 #include "host/web/bridge/run_facts.h"
 #include "host/web/bridge/web_output.h"
-#include "host/web/server/ask.h"
-#include "host/web/server/web_server.h"
+#include "host/web/server/web_options.h"
 
 namespace tagwrench {
 
@@ -36,22 +21,24 @@ struct WebBridgeOptions {
   std::string program = "/proc/self/exe";
 };
 
-class WebBridge final : private AskHandler {
+class WebBridge {
  public:
   /// Binds; `stop` becomes readable when a signal has come. Throws ConfigError.
   WebBridge(const WebBridgeOptions& options, int stop);
-  ~WebBridge() override;
+  ~WebBridge();
+  WebBridge(const WebBridge&) = delete;
+  WebBridge& operator=(const WebBridge&) = delete;
 
   // The thread that builds runs.
 
   void start();
   /// Fit for logs; and to be opened in a browser.
-  std::string url() const { return server_.url(); }
-  std::string url_with_token() const { return server_.url_with_token(); }
+  std::string url() const;
+  std::string url_with_token() const;
   /// `parts`: those of the run; the bridge adds its own.
   std::unique_ptr<WebOutput> begin_run(const RunFacts& facts, WebOutput::Parts parts);
   /// Readable when the run shall end: a signal, or a job wants the camera.
-  int end_fd() const noexcept { return control_.end_fd(); }
+  int end_fd() const noexcept;
   /// The loop of the run is over.
   void end_run();
   using Beside = std::span<const std::unique_ptr<Output>>;
@@ -62,91 +49,8 @@ class WebBridge final : private AskHandler {
   bool wait_after(const std::string& failure, Beside beside);
 
  private:
-  using Answer = void (WebBridge::*)(const Ask&);
-  struct Trial {
-    std::uint64_t page = 0;
-    std::string name;
-    int unanswered = 0;  ///< wishes that the desk has still to answer
-  };
-
-  // The server's thread.
-  void ask(Ask ask) override;
-  void page_came(std::uint64_t page) override;
-  void page_gone(std::uint64_t page) override;
-  static Answer answer_to(std::string_view what);
-  void zero(const Ask& ask);
-  void choose_profile(const Ask& ask);
-  void next_profile(const Ask& ask);
-  void show_profile(const Ask& ask);
-  void try_profile(const Ask& ask);
-  void keep_profile(const Ask& ask);
-  void revert_profile(const Ask& ask);
-  void save_profile(const Ask& ask);
-  void start_recording(const Ask& ask);
-  void stop_recording(const Ask& ask);
-  void list_recordings(const Ask& ask);
-  void set_camera(const Ask& ask);
-  void set_led(const Ask& ask);
-  void tare(const Ask& ask);
-  void start_job(const Ask& ask);
-  void press_key(const Ask& ask);
-  void close_job(const Ask& ask);
-  void list_plans(const Ask& ask);
-  void retry(const Ask& ask);
-
-  void answer(const Ask& ask, bool ok, std::string text, nlohmann::json data = nullptr);
-  void ask_desk(const Ask& ask, std::string wish, std::function<void(DeskAnswer)> then = {});
-  DeskLink& desk();
-  void read_profile();
-  void keep_trial();
-  void end_recording(std::function<void(RunRecording::Ending)> then);
-  void heard(std::string line, std::vector<std::string> programs);
-  void say(const std::string& line);
-  void show(const JobPicture& picture);
-  void tick();
-  void send_state();
-  nlohmann::json state() const;
-  nlohmann::json image() const;
-  std::string words(const SeenNow& seen, bool fresh) const;
-  void look_around();
-  void give_back_camera();
-
-  /// Runs it in the server's thread, and waits.
-  void in_server(std::function<void()> work);
-  bool wait_to_resume(Beside beside);
-
-  std::filesystem::path own_profiles_;
-  RecordingFolder recordings_;
-  WebServer server_;
-  RunControl control_;
-  RunViews views_;
-  int stop_;
-  UniqueFd resume_;
-  bool started_ = false;
-
-  // The server's thread alone.
-  std::optional<boost::asio::steady_timer> ticker_;
-  std::optional<Jobs> jobs_;
-  std::optional<RunFacts> facts_;  ///< of the last run
-  bool running_ = false;
-  bool camera_free_ = false;  ///< there is no run, and none is being built
-  std::string failure_;       ///< why there is no run
-  std::optional<DeskLink> desk_;
-  std::optional<CameraSettings> camera_;
-  std::optional<PictureFigures> figures_;
-  std::set<std::uint64_t> pages_;  ///< that are there
-  std::optional<Trial> trial_;     ///< in force
-  std::optional<Trial> trying_;    ///< asked of the desk; other pages wait
-  nlohmann::json profile_ = nullptr;
-  std::vector<std::string> programs_;  ///< that read the spnav socket
-  std::vector<DeviceReader> readers_;
-  nlohmann::json controls_ = nlohmann::json::array();
-  std::unique_ptr<RunRecording> recording_;
-  bool ending_recording_ = false;
-  std::thread ender_;  ///< of the last recording
-  unsigned ticks_ = 0;
-  std::uint64_t seen_ = 0;  ///< samples at the last tick
-  bool fresh_ = false;      ///< some have come since then
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace tagwrench
