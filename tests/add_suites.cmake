@@ -1,40 +1,56 @@
 # cmake -D PROGRAM=path -D SUITES=[*-filter] -D STUDY=filter -D LABEL=label -D PROPERTIES=list -D OUT=file -P add_suites.cmake
-# Writes what ctest reads: one test for each suite of a gtest program, and each test of STUDY with that label too.
-# Filters are gtest's, and may be empty: nothing. That of SUITES names what is not in them.
+# Writes what ctest reads: one test for each suite of a gtest program, and the tests of STUDY with that label too, a suite's
+# together where suites are. Filters are gtest's, and may be empty: nothing. That of SUITES names what is not in them.
 set(text "")
 string(REPLACE ";" " " properties "${PROPERTIES}")
 
-function(list_tests FILTER OUT_VARIABLE)
+macro(add_entry NAME FILTER LABELS)
+  # A test that is skipped would pass unseen among others: it fails there, and belongs to what stands apart.
+  set(on_skip SKIP_REGULAR_EXPRESSION)
+  if(SUITES)
+    set(on_skip FAIL_REGULAR_EXPRESSION)
+  endif()
+  string(APPEND text "add_test([=[${NAME}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${FILTER}]=])\n"
+                     "set_tests_properties([=[${NAME}]=] PROPERTIES LABELS [=[${LABELS}]=] ${properties} ${on_skip} [=[\\[  SKIPPED \\]]=])\n")
+endmacro()
+
+# find_tests(FILTER): `suites`, and of each the `tests_of_SUITE`
+macro(find_tests FILTER)
+  set(suites "")
   set(listed "")
-  if(FILTER)
+  if(NOT "${FILTER}" STREQUAL "")
     execute_process(COMMAND ${PROGRAM} --gtest_list_tests --gtest_filter=${FILTER} OUTPUT_VARIABLE listed RESULT_VARIABLE status TIMEOUT 60)
     if(NOT status EQUAL 0)
       message(FATAL_ERROR "${PROGRAM} --gtest_list_tests: ${status}")
     endif()
   endif()
-  string(REPLACE "\n" ";" lines "${listed}")
-  set(${OUT_VARIABLE} "${lines}" PARENT_SCOPE)
-endfunction()
+  string(REPLACE "\n" ";" listed "${listed}")
+  foreach(line IN LISTS listed)
+    if(line MATCHES "^([^ ]+)\\.( +#.*)?$")
+      set(suite ${CMAKE_MATCH_1})
+      list(APPEND suites ${suite})
+      set(tests_of_${suite} "")
+    elseif(line MATCHES "^  ([^ ]+)")
+      list(APPEND tests_of_${suite} ${suite}.${CMAKE_MATCH_1})
+    endif()
+  endforeach()
+endmacro()
 
-# A test that is skipped would pass unseen within its suite: it fails there, and belongs to what stands apart.
-list_tests("${SUITES}" lines)
+find_tests("${SUITES}")
 string(REPLACE "*-" "-" without "${SUITES}")
-foreach(line IN LISTS lines)
-  if(line MATCHES "^([^ ]+)\\.( +#.*)?$")
-    set(suite ${CMAKE_MATCH_1})
-    string(APPEND text "add_test([=[${suite}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${suite}.*${without}]=])\n"
-                       "set_tests_properties([=[${suite}]=] PROPERTIES LABELS ${LABEL} ${properties} FAIL_REGULAR_EXPRESSION [=[\\[  SKIPPED \\]]=])\n")
-  endif()
+foreach(suite IN LISTS suites)
+  add_entry(${suite} "${suite}.*${without}" ${LABEL})
 endforeach()
 
-list_tests("${STUDY}" lines)
-foreach(line IN LISTS lines)
-  if(line MATCHES "^([^ ]+\\.)( +#.*)?$")
-    set(suite ${CMAKE_MATCH_1})
-  elseif(line MATCHES "^  ([^ ]+)")
-    set(test ${suite}${CMAKE_MATCH_1})
-    string(APPEND text "add_test([=[${test}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${test}]=])\n"
-                       "set_tests_properties([=[${test}]=] PROPERTIES LABELS [=[${LABEL};study]=] ${properties} SKIP_REGULAR_EXPRESSION [=[\\[  SKIPPED \\]]=])\n")
+find_tests("${STUDY}")
+foreach(suite IN LISTS suites)
+  if(SUITES)
+    list(JOIN tests_of_${suite} ":" filter)
+    add_entry(${suite}.Study ${filter} "${LABEL};study")
+  else()
+    foreach(test IN LISTS tests_of_${suite})
+      add_entry(${test} ${test} "${LABEL};study")
+    endforeach()
   endif()
 endforeach()
 file(WRITE ${OUT} "${text}")
