@@ -11,30 +11,29 @@
 #include <string>
 #include <vector>
 
-#include "host/bandwidth/command.h"
-#include "host/blas_threads.h"
-#include "host/board/command.h"
-#include "host/command_line/command_line.h"
-#include "host/config_error.h"
-#include "host/tell.h"
-#include "host/verbs/analyze_command.h"
-#include "host/verbs/calibrate_command.h"
-#include "host/verbs/certificate_command.h"
-#include "host/verbs/check_command.h"
-#include "host/verbs/control_command.h"
-#include "host/verbs/design_command.h"
-#include "host/verbs/doctor_command.h"
-#include "host/verbs/export_command.h"
-#include "host/verbs/gadget_command.h"
-#include "host/verbs/manual_command.h"
-#include "host/verbs/read_command.h"
-#include "host/verbs/record_command.h"
-#include "host/verbs/run_command.h"
-#include "host/verbs/sim_command.h"
-#include "host/verbs/spnav_command.h"
-#include "host/verbs/tags_command.h"
-#include "host/verbs/tune_command.h"
-#include "host/verbs/zero_command.h"
+#include "host/commands/analyze_command.h"
+#include "host/commands/bandwidth_command.h"
+#include "host/commands/board/command.h"
+#include "host/commands/calibrate_command.h"
+#include "host/commands/certificate_command.h"
+#include "host/commands/check_command.h"
+#include "host/commands/control_command.h"
+#include "host/commands/design_command.h"
+#include "host/commands/doctor_command.h"
+#include "host/commands/export_command.h"
+#include "host/commands/gadget_command.h"
+#include "host/commands/manual_command.h"
+#include "host/commands/read_command.h"
+#include "host/commands/record_command.h"
+#include "host/commands/run_command.h"
+#include "host/commands/sim_command.h"
+#include "host/commands/spnav_command.h"
+#include "host/commands/tags_command.h"
+#include "host/commands/zero_command.h"
+#include "host/core/command_line/command_line.h"
+#include "host/core/config_error.h"
+#include "host/core/os/blas_threads.h"
+#include "host/core/tell.h"
 
 namespace tagwrench {
 namespace {
@@ -64,8 +63,8 @@ constexpr Declared (*kCommands[])(command_line::Command) = {
     declare<AnalyzeCommand>, declare<BandwidthCommand>, declare<CheckCommand>, declare<ZeroCommand>,
     declare<CertificateCommand>, declare<DesignCommand>,
     // at the desk
-    declare<ControlCommand>, declare<TuneCommand>, declare<SpnavCommand>, declare<GadgetCommand>,
-    declare<DoctorCommand>, declare<ManualCommand>};
+    declare<ControlCommand>, declare<SpnavCommand>, declare<GadgetCommand>, declare<DoctorCommand>,
+    declare<ManualCommand>};
 
 int dispatch(int argc, char** argv) {
   command_line::Program program(
@@ -97,6 +96,7 @@ int main(int argc, char** argv) {
   open_standard_streams();
   end_blas_threads();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes becomes an error code
+  std::signal(SIGPIPE, SIG_IGN);  // and so does a reader that has gone
   cv::setNumThreads(1);           // one thread, one poll loop
   try {
     return dispatch(argc, argv);

@@ -15,8 +15,8 @@
 #include <cstring>
 #include <string>
 
-#include "host/config_error.h"
-#include "host/os/close_files.h"
+#include "host/core/config_error.h"
+#include "host/core/os/close_files.h"
 
 namespace tagwrench {
 

@@ -17,8 +17,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/os/unique_fd.h"
-#include "host/types.h"
+#include "host/core/os/unique_fd.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

@@ -16,8 +16,8 @@
 #include <string_view>
 #include <utility>
 
-#include "host/config_error.h"
-#include "host/os/uninterrupted.h"
+#include "host/core/config_error.h"
+#include "host/core/os/uninterrupted.h"
 #include "host/output/hid_report.h"
 
 namespace tagwrench {

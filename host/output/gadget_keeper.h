@@ -17,7 +17,7 @@
 #include <functional>
 #include <string>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/gadget_kernel.h"
 #include "host/output/gadget_reports.h"
 

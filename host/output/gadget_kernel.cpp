@@ -18,7 +18,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/gadget_tree.h"
 
 namespace tagwrench {

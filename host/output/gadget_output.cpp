@@ -16,10 +16,10 @@
 #include <exception>
 #include <utility>
 
-#include "host/config_error.h"
-#include "host/os/spawn_daemon.h"
-#include "host/os/termination.h"
-#include "host/os/uninterrupted.h"
+#include "host/core/config_error.h"
+#include "host/core/os/spawn_daemon.h"
+#include "host/core/os/termination.h"
+#include "host/core/os/uninterrupted.h"
 #include "host/output/hid_report.h"
 #include "host/output/shown.h"
 

@@ -14,8 +14,8 @@
 #include <filesystem>
 #include <utility>
 
-#include "host/config_error.h"
-#include "host/os/unique_fd.h"
+#include "host/core/config_error.h"
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
 namespace {

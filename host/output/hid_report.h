@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

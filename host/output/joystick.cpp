@@ -9,8 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "host/config_error.h"
-#include "host/os/uninterrupted.h"
+#include "host/core/config_error.h"
+#include "host/core/os/uninterrupted.h"
 #include "host/output/shown.h"
 #include "host/output/uhid_device.h"
 

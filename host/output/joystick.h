@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/dead_man.h"
 #include "host/output/hid_report.h"
 #include "host/output/output.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

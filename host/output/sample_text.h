@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench {
 namespace {

@@ -1,7 +1,7 @@
 // What an output may show of a sample: one rule for all of them.
 #pragma once
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

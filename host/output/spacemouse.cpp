@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/output/shown.h"
 
 namespace tagwrench {

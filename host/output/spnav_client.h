@@ -8,10 +8,10 @@
 #include <span>
 #include <string_view>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
+#include "host/core/types.h"
 #include "host/output/spnav_link.h"
 #include "host/output/spnav_protocol.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -8,10 +8,10 @@
 #include <optional>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
+#include "host/core/types.h"
 #include "host/output/spnav_client.h"
 #include "host/output/spnav_link.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -11,8 +11,8 @@
 #include <cerrno>
 #include <filesystem>
 
-#include "host/config_error.h"
-#include "host/os/runtime_folder.h"
+#include "host/core/config_error.h"
+#include "host/core/os/runtime_folder.h"
 
 namespace tagwrench {
 namespace {

@@ -18,7 +18,7 @@
 #include <string>
 #include <type_traits>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/spnav_protocol.h"
 
 namespace tagwrench {

@@ -12,8 +12,8 @@
 #include <span>
 #include <utility>
 
-#include "host/config_error.h"
-#include "host/os/spawn_daemon.h"
+#include "host/core/config_error.h"
+#include "host/core/os/spawn_daemon.h"
 #include "host/output/shown.h"
 
 namespace tagwrench {

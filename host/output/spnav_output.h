@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/output.h"
 #include "host/output/spnav_link.h"
 

@@ -13,8 +13,8 @@
 #include <span>
 #include <string_view>
 
+#include "host/core/types.h"
 #include "host/output/hid_report.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "host/core/axis_names.h"
 #include "host/output/shown.h"
 #include "host/output/terminal.h"
 
@@ -22,13 +23,11 @@ struct Axis {
   double scale;  ///< from SI to unit
 };
 
-constexpr const char* kNames[] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
-
 /// All torques have one unit, that of the largest full scale.
 Axis axis(int i, const Vector6& full_scale) {
-  if (i < 3) return {kNames[i], "N", 1};
+  if (i < 3) return {kWrenchAxes[i], "N", 1};
   const bool milli = full_scale.tail<3>().maxCoeff() < kMilliBelow;
-  return {kNames[i], milli ? "mN m" : "N m", milli ? 1e3 : 1};
+  return {kWrenchAxes[i], milli ? "mN m" : "N m", milli ? 1e3 : 1};
 }
 
 const char* in_words(Status status) {

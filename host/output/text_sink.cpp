@@ -11,9 +11,9 @@
 #include <cstring>
 #include <utility>
 
-#include "host/config_error.h"
-#include "host/os/termination.h"
-#include "host/os/uninterrupted.h"
+#include "host/core/config_error.h"
+#include "host/core/os/termination.h"
+#include "host/core/os/uninterrupted.h"
 
 namespace tagwrench {
 namespace {

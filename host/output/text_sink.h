@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/output.h"
 
 namespace tagwrench {

@@ -9,8 +9,8 @@
 #include <cstddef>
 #include <cstring>
 
-#include "host/config_error.h"
-#include "host/os/uninterrupted.h"
+#include "host/core/config_error.h"
+#include "host/core/os/uninterrupted.h"
 
 namespace tagwrench {
 namespace {

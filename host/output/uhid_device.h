@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/dead_man.h"
 #include "host/output/output.h"
 

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/source/jpeg_luma.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -4,8 +4,8 @@
 
 #include <string>
 
+#include "host/core/types.h"
 #include "host/source/camera_light.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

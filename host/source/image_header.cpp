@@ -2,8 +2,8 @@
 
 #include <cstddef>
 
+#include "host/core/png/png.h"
 #include "host/source/pgm.h"
-#include "host/source/png.h"
 
 namespace tagwrench {
 namespace {

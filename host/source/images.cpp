@@ -12,7 +12,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/source/frame_times.h"
 #include "host/source/image_header.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/source/frame_source.h"
 #include "host/source/raw_decoder.h"
 

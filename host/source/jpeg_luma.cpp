@@ -11,7 +11,7 @@
 #include <csetjmp>
 #include <type_traits>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/source/jpeg_restart.h"
 
 namespace tagwrench {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
+#include "host/core/png/png.h"
 #include "host/source/decode.h"
 #include "host/source/image_header.h"
 #include "host/source/pgm.h"
-#include "host/source/png.h"
 
 namespace tagwrench {
 

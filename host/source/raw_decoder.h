@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

@@ -7,7 +7,7 @@
 #include <exception>
 #include <utility>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "host/os/unique_fd.h"
-#include "host/record/reader.h"
+#include "host/core/os/unique_fd.h"
+#include "host/recording/reader.h"
 #include "host/source/frame_source.h"
 #include "host/source/raw_decoder.h"
 

@@ -12,8 +12,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "host/config_error.h"
-#include "host/os/uninterrupted.h"
+#include "host/core/config_error.h"
+#include "host/core/os/uninterrupted.h"
 #include "host/source/v4l2_controls.h"
 #include "host/source/v4l2_nodes.h"
 

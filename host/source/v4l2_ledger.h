@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

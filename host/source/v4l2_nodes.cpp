@@ -11,7 +11,7 @@
 #include <fstream>
 #include <optional>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/source/v4l2_device.h"
 
 namespace tagwrench {

@@ -12,7 +12,7 @@
 #include <exception>
 #include <limits>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/source/v4l2_nodes.h"
 
 namespace tagwrench {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/source/camera_light.h"
 #include "host/source/frame_source.h"
 #include "host/source/v4l2_controls.h"

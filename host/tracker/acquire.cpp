@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/tracker/flipped.h"
 #include "host/tracker/square_pose.h"
 #include "host/tracker/tag_patterns.h"

@@ -4,11 +4,11 @@
 
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/edges.h"
 #include "host/tracker/square_finder.h"
 #include "host/tracker/target.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/algebra/decompositions.h"
+#include "host/core/algebra/decompositions.h"
+#include "host/core/robust_statistics.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -19,7 +20,6 @@ constexpr double kLargestOffset_px = 2.0;
 constexpr float kLeastContrastPart = 0.3F;  // of the tag's median
 constexpr double kLeastPart = 0.5;          // of a tag's points
 constexpr double kTukey = 4.685;
-constexpr double kMadToSigma = 1.4826;
 constexpr double kLeastScale_px = 0.05;
 constexpr double kLengthScale = 5e-3;    // m per unit of translation in the normal equations
 constexpr double kSpreadScale = 1e-4;    // m
@@ -35,13 +35,6 @@ Measurements measure_all(const EdgeMeter& meter, const PixelView<float>& image,
     meter.measure(image, tag, pose, kPoseHalf_px, false, all.back());
   }
   return all;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double robust_cut(const Measurements& all) {

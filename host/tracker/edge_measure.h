@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/edges.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

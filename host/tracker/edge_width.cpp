@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/algebra/decompositions.h"
+#include "host/core/algebra/decompositions.h"
 
 namespace tagwrench {
 namespace {

@@ -6,8 +6,8 @@
 #include <array>
 #include <optional>
 
+#include "host/core/types.h"
 #include "host/tracker/edges.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "host/algebra/decompositions.h"
+#include "host/core/algebra/decompositions.h"
 #include "host/tracker/projection.h"
 #include "host/tracker/rotation.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "host/algebra/decompositions.h"
+#include "host/core/algebra/decompositions.h"
 #include "host/tracker/projection.h"
 #include "host/tracker/rotation.h"
 

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

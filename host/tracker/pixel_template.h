@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/edge_measure.h"
 #include "host/tracker/edges.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "host/algebra/decompositions.h"
+#include "host/core/algebra/decompositions.h"
+#include "host/core/robust_statistics.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -24,7 +25,6 @@ constexpr double kFineLeastScale_px = 0.04;
 
 /// Tukey's biweight at 95 % efficiency for normal errors (Holland and Welsch 1977).
 constexpr double kTukey = 4.685;
-constexpr double kMadToSigma = 1.4826;
 
 constexpr int kLeastPoints = 24;
 constexpr double kLeastInlierPart = 0.5;    ///< of a tag's points, for the tag to be held

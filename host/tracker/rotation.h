@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

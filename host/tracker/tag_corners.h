@@ -4,9 +4,9 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/target.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

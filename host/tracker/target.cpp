@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "host/grid_tags.h"
+#include "host/core/grid_tags.h"
 
 namespace tagwrench {
 namespace {

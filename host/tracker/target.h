@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 
@@ -30,7 +30,7 @@ constexpr int kTagFamilies = 22;
 constexpr int kMaxTags = 8;
 
 /// The family's name as sensor.yaml writes it: "aruco_original", "aruco_4x4_50", "apriltag_36h11",
-/// "grid_10x10" (host/grid_tags.h).
+/// "grid_10x10" (host/core/grid_tags.h).
 std::string_view name(TagFamily family);
 
 /// The inverse of name(); empty for a name that is not in the table.

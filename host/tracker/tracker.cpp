@@ -4,7 +4,7 @@
 #include <exception>
 #include <optional>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/corner_pose.h"
 #include "host/tracker/diagnosis.h"

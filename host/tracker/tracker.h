@@ -8,9 +8,9 @@
 
 #include <memory>
 
+#include "host/core/types.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/target.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "host/types.h"
+#include "host/core/types.h"
 #include "host/wrench/features.h"
 
 namespace tagwrench {

@@ -6,7 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/config_error.h"
+#include "host/core/axis_names.h"
+#include "host/core/config_error.h"
 #include "host/wrench/fit_axes.h"
 #include "host/wrench/fit_consistency.h"
 #include "host/wrench/fit_errors.h"
@@ -231,7 +232,7 @@ void refuse_gross_errors(const Problem& problem, const WrenchFit& fitted) {
         "calibration: the steps contradict each other by {:.0f} % of full load in {}, whichever "
         "few are left out; check masses, points and directions of the plan, then take the steps "
         "again",
-        100 * off, fit::kAxisNames[i]));
+        100 * off, kWrenchAxes[i]));
   }
 }
 
@@ -240,7 +241,7 @@ void require_all(const WrenchFit& fitted) {
   for (std::size_t i = 0; i < 6; ++i) {
     if (fitted.axis[i].state != AxisState::calibrated)
       lacking.push_back(
-          fmt::format("{} is not calibrated ({})", fit::kAxisNames[i], fitted.axis[i].reason));
+          fmt::format("{} is not calibrated ({})", kWrenchAxes[i], fitted.axis[i].reason));
   }
   if (lacking.empty()) return;
   throw ConfigError(

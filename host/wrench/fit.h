@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 #include "host/wrench/estimate.h"
 #include "host/wrench/features.h"
 

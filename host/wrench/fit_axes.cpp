@@ -7,7 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/algebra/decompositions.h"
+#include "host/core/algebra/decompositions.h"
+#include "host/core/axis_names.h"
 
 namespace tagwrench::fit {
 namespace {
@@ -83,7 +84,7 @@ std::string missing_name(const Vector6& combination) {
   std::vector<std::string> names;
   for (int i = 0; i < 6; ++i) {
     if (std::abs(combination[i]) > kTakesPart)
-      names.emplace_back(kAxisNames[static_cast<std::size_t>(i)]);
+      names.emplace_back(kWrenchAxes[static_cast<std::size_t>(i)]);
   }
   return names.size() == 1 ? names[0]
                            : fmt::format("{} apart from each other", fmt::join(names, " and "));
@@ -109,7 +110,7 @@ std::string missing_reason(int axis, const std::vector<Vector6>& missing, double
     std::vector<std::string> others;
     for (int i = 0; i < 6; ++i) {
       if (std::abs((*where)[i]) > kTakesPart)
-        others.emplace_back(kAxisNames[static_cast<std::size_t>(i)]);
+        others.emplace_back(kWrenchAxes[static_cast<std::size_t>(i)]);
     }
     return fmt::format("{} were only applied together", fmt::join(others, " and "));
   }

@@ -5,11 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "host/core/axis_names.h"
 #include "host/wrench/fit_solve.h"
 
 namespace tagwrench::fit {
-
-inline constexpr std::array<const char*, 6> kAxisNames{"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 
 struct AxisKnowledge {
   bool reached = false;   ///< the answer to a load along this axis is known

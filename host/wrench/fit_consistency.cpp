@@ -8,7 +8,8 @@
 #include <cmath>
 #include <limits>
 
-#include "host/config_error.h"
+#include "host/core/axis_names.h"
+#include "host/core/config_error.h"
 #include "host/wrench/fit_axes.h"
 
 namespace tagwrench::fit {
@@ -185,7 +186,7 @@ Judged judge_explained(Problem& problem, const Explanation& explanation,
   Judged judged = judge(problem, explanation.left_out);
   const Asymmetry asymmetry = asymmetry_of(reciprocity, judged, false);
   const std::string pair =
-      fmt::format("{} and {}", kAxisNames[asymmetry.one], kAxisNames[asymmetry.other]);
+      fmt::format("{} and {}", kWrenchAxes[asymmetry.one], kWrenchAxes[asymmetry.other]);
   const std::string suspects = left_out_steps(problem, explanation.left_out);
   if (!explanation.found || !suspects.empty() || asymmetry.relative > kGrossAsymmetry) {
     throw ConfigError(fmt::format(

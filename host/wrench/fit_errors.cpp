@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/core/robust_statistics.h"
+
 namespace tagwrench::fit {
 namespace {
 
@@ -20,12 +22,6 @@ double largest_error(const Problem& problem, const std::vector<Prediction>& bloc
   Vector6 squares = Vector6::Zero();
   for (const Prediction& p : block) squares += p.error.cwiseQuotient(problem.scale).cwiseAbs2();
   return std::sqrt(squares.maxCoeff() / static_cast<double>(block.size()));
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// One number for all axes, that outliers do not move: the error model of that size makes the

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <map>
 
-#include "host/algebra/decompositions.h"
-#include "host/config_error.h"
+#include "host/core/algebra/decompositions.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench::fit {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench::fit {
 namespace {

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

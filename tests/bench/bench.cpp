@@ -13,16 +13,16 @@
 #include <opencv2/core/utility.hpp>
 #include <vector>
 
-#include "host/config/sensor_config.h"
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
+#include "host/motion/shaping.h"
 #include "host/output/hid_report.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/decode.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
-#include "host/wrench/shaping.h"
 #include "tests/support/heap_count.h"
 
 namespace tagwrench {

@@ -10,8 +10,8 @@
 #include <opencv2/core/utility.hpp>
 #include <vector>
 
-#include "host/config/hardware_config.h"
-#include "host/config_error.h"
+#include "host/core/config_error.h"
+#include "host/tools/design/hardware_config.h"
 #include "tests/bench/hardware_variant.h"
 #include "tests/bench/table.h"
 

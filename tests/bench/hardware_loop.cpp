@@ -2,7 +2,7 @@
 
 #include <Eigen/Dense>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/rigid_pose.h"
 #include "host/tracker/rotation.h"

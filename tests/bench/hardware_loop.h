@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/source/simulator/scenario.h"
-#include "host/types.h"
 
 namespace tagwrench::bench {
 

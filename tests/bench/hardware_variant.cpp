@@ -8,11 +8,11 @@
 #include <sstream>
 #include <vector>
 
-#include "host/config/hardware_config.h"
-#include "host/hardware/geometry.h"
+#include "host/commands/hardware_instrument.h"
 #include "host/source/simulator/mechanics.h"
-#include "host/study/design.h"
-#include "host/verbs/hardware_instrument.h"
+#include "host/tools/design/design.h"
+#include "host/tools/design/geometry.h"
+#include "host/tools/design/hardware_config.h"
 #include "tests/bench/hardware_loop.h"
 #include "tests/bench/tracker_bound.h"
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "host/hardware/parameters.h"
-#include "host/types.h"
+#include "host/core/types.h"
+#include "host/tools/design/parameters.h"
 
 namespace tagwrench::bench {
 

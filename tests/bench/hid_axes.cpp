@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "host/config/profile_config.h"
-#include "host/config/sensor_config.h"
+#include "host/motion/profile_config.h"
+#include "host/motion/shaping.h"
+#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
-#include "host/wrench/shaping.h"
 #include "tests/bench/hid_desk.h"
 #include "tests/bench/hid_device.h"
 

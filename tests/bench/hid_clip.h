@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/config/sensor_config.h"
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/frame_source.h"
 #include "host/source/simulator/scenario.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "host/config/scenario_config.h"
-#include "host/config/sensor_config.h"
+#include "host/app/scenario_config.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "tests/bench/hid_device.h"
 #include "tests/bench/hid_figures.h"

@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "host/config/sensor_config.h"
-#include "host/desk/desk.h"
+#include "host/motion/desk.h"
 #include "host/output/hid_report.h"
+#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench::bench {
@@ -18,7 +19,8 @@ class SimulatedDevice {
   /// `profiles`: as --profile names them; none: the sensor's own shaping.
   explicit SimulatedDevice(const SensorConfig& sensor,
                            const std::vector<std::string>& profiles = {})
-      : desk_(ProfileFiles(profiles, sensor), {}, {}), zero_(zero_options(sensor)) {}
+      : desk_(ProfileFiles(profiles, default_profile(sensor)), {}, {}),
+        zero_(zero_options(sensor)) {}
 
   /// Moves the device, if it has a rate of its own, up to the sample's time by the frames so far,
   /// then takes the sample in. `moved(TimePoint, Counts6)` is told of each move.

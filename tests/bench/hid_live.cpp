@@ -13,9 +13,10 @@
 #include <numeric>
 #include <string>
 
+#include "host/app/pipeline.h"
 #include "host/output/jsonl.h"
 #include "host/output/spnav_output.h"
-#include "host/pipeline.h"
+#include "host/sensor/default_profile.h"
 #include "tests/bench/hid_clip.h"
 #include "tests/bench/hid_figures.h"
 #include "tests/bench/hid_spnav.h"
@@ -149,7 +150,7 @@ LiveFigures run_live(const HidClip& clip, const Script& script, double rate_hz,
   ClipSource source(clip, script.pictures, static_cast<std::size_t>(1.5 * clip.fps));
   Tracker tracker(clip.sensor.camera, clip.sensor.target, clip.sensor.rest);
   WrenchEstimator wrench(clip.sensor.wrench);
-  Desk desk(ProfileFiles(profile(folder, rate_hz), clip.sensor), {}, {});
+  Desk desk(ProfileFiles(profile(folder, rate_hz), default_profile(clip.sensor)), {}, {});
   ZeroOptions zero_options;
   zero_options.range = clip.sensor.wrench.range;
   ZeroTracking zero(zero_options);

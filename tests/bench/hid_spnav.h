@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
+#include "host/core/types.h"
 #include "host/output/spnav_keeper.h"
-#include "host/types.h"
 
 namespace tagwrench::bench {
 

@@ -8,11 +8,11 @@
 #include <random>
 #include <vector>
 
-#include "host/link/board_session.h"
+#include "host/board/board_session.h"
 #include "protocol/codec.h"
 #include "tests/bench/link_board.h"
 #include "tests/bench/table.h"
-#include "tests/unit/link/synthetic_link.h"
+#include "tests/unit/board/synthetic_link.h"
 
 namespace tagwrench::bench {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "host/config/scenario_config.h"
+#include "host/app/scenario_config.h"
 #include "host/source/simulator/tag_print.h"
 #include "tests/bench/tracker_case.h"
 #include "tests/support/hard_run.h"

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/source/simulator/renderer.h"
 #include "host/source/simulator/scenario.h"
-#include "host/types.h"
 
 namespace tagwrench::bench {
 

@@ -3,8 +3,8 @@
 #include <random>
 #include <vector>
 
-#include "host/calibrate/target_recorder.h"
-#include "host/calibrate/target_verdict.h"
+#include "host/calibration/target/recorder.h"
+#include "host/calibration/target/verdict.h"
 #include "tests/bench/tracker_clip.h"
 
 namespace tagwrench::bench {

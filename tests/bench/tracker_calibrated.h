@@ -1,7 +1,7 @@
 // The sensor as its owner has it after `tagwrench calibrate target`.
 #pragma once
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/scenario.h"
 
 namespace tagwrench::bench {

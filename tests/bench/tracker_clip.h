@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/source/simulator/scenario.h"
-#include "host/types.h"
 
 namespace tagwrench::bench {
 

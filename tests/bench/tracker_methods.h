@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/bench/tracker_clip.h"
 
 namespace tagwrench::bench {

@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 
 namespace tagwrench::bench {
 

@@ -17,8 +17,8 @@
 #include <thread>
 #include <vector>
 
-#include "host/config/sensor_config.h"
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/decode.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "host/study/lag.h"
+#include "host/calibration/analysis/lag.h"
 #include "host/wrench/estimate.h"
 #include "host/wrench/fit.h"
 #include "tests/bench/tracker_run.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "host/config/scenario_config.h"
+#include "host/app/scenario_config.h"
 #include "tests/bench/wrench_costs.h"
 #include "tests/bench/wrench_scores.h"
 

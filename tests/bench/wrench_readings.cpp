@@ -4,9 +4,9 @@
 #include <chrono>
 #include <utility>
 
-#include "host/config/sensor_config.h"
+#include "host/calibration/analysis/trial_csv.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
-#include "host/study/trial_csv.h"
 #include "tests/bench/tracker_run.h"
 
 namespace tagwrench::bench {

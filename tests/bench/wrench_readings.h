@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "host/calibration/analysis/trial.h"
 #include "host/source/simulator/scenario.h"
-#include "host/study/trial.h"
 #include "tests/bench/wrench_reference.h"
 
 namespace tagwrench::bench {

@@ -8,9 +8,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
-#include "host/config/scenario_config.h"
-#include "host/config/sensor_config.h"
-#include "host/record/writer.h"
+#include "host/app/scenario_config.h"
+#include "host/recording/writer.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"

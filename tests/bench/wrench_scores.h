@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/study/analysis.h"
+#include "host/calibration/analysis/analysis.h"
 #include "tests/bench/table.h"
 #include "tests/bench/wrench_readings.h"
 

@@ -190,7 +190,7 @@ test('the core\'s memory does not grow while it tracks', { skip: coreReason() },
 
 test('the page\'s grid_10x10 is the program\'s', { skip: coreReason() }, async () => {
   const { GRID_10X10 } = await loadModule('sensor/grid_tags.ts');
-  const rows = readFileSync(join(root, 'host/grid_tags.h'), 'utf8').match(/\{(0x[0-9a-f]{3}(, )?){10}\}/g);
+  const rows = readFileSync(join(root, 'host/core/grid_tags.h'), 'utf8').match(/\{(0x[0-9a-f]{3}(, )?){10}\}/g);
   assert.equal(rows.length, GRID_10X10.ids);
   rows.forEach((row, id) => {
     row.match(/0x[0-9a-f]{3}/g).forEach((bits, r) => {

@@ -189,7 +189,7 @@ test(
       for (const back of [false, true])
         assert.ok(Math.abs(deflection(shape, push + 1e-3, back) - deflection(shape, push, back)) < 0.01);
     }
-    // As host/wrench/response_curve.cpp has it: through the points, never falling, never beyond them.
+    // As host/motion/response_curve.cpp has it: through the points, never falling, never beyond them.
     const curve = {
       power: 1,
       points: [

@@ -1,5 +1,5 @@
 // What the tab says to the board and hears from it and from the bridge's HID device: the very bytes of protocol/README.md, and
-// host/client/examples/wrench_report.js as the second opinion on a report.
+// host/tools/reading/examples/wrench_report.js as the second opinion on a report.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -97,7 +97,7 @@ test('no message makes the reader read beyond it or fail', { skip }, () => {
 });
 
 test('a report is read as the published example reads it', { skip }, () => {
-  const example = createRequire(import.meta.url)(join(root, 'host/client/examples/wrench_report.js'));
+  const example = createRequire(import.meta.url)(join(root, 'host/tools/reading/examples/wrench_report.js'));
   let state = 7;
   const random = () => (state = (state * 1664525 + 1013904223) >>> 0);
   let read = 0;

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "host/record/writer.h"
+#include "host/recording/writer.h"
 #include "tests/cli/bridge.h"
 
 namespace tagwrench::test {

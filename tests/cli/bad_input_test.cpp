@@ -189,6 +189,15 @@ TEST_F(BadInput, ClosedPipeEndsTheRunWithOneLine) {
   EXPECT_NE(o.err.find("reader"), std::string::npos) << o.err;
 }
 
+TEST_F(BadInput, ClosedPipeEndsTheFocusGuideWithOneLine) {
+  Bridge guide({"doctor", "--focus", "--source", "sim"});
+  ASSERT_TRUE(guide.wait_for_lines(1));
+  guide.close_stdout();
+  const Outcome o = guide.finish();
+  EXPECT_EQ(o.status, 1) << o.err;
+  EXPECT_NE(o.err.find("reader"), std::string::npos) << o.err;
+}
+
 TEST_F(BadInput, CtrlCAtAnyMomentEndsCleanlyOnAWholeLine) {
   // Signals spread over start-up and run: after 0, 1, 3, 10 and 30 lines of output.
   for (const std::ptrdiff_t lines : {0, 1, 3, 10, 30}) {

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "board_cli.h"
-#include "tests/unit/link/optoforce_frames.h"
+#include "tests/unit/board/optoforce_frames.h"
 
 namespace tagwrench::test {
 namespace {

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "tests/support/temporary_folder.h"
 
 extern char** environ;
@@ -33,7 +33,8 @@ struct Outcome {
 
 /// What a program is started with beside its arguments.
 struct Surroundings {
-  std::string input = "/dev/null";            ///< path of its standard input
+  std::string input = "/dev/null";  ///< path of its standard input
+  std::string error = "";           ///< path of its standard error; empty: it is read here
   std::vector<std::string> environment = {};  ///< NAME=VALUE, beside what this program has
   std::vector<int> ignored = {};              ///< signals, as in a shell's background job
   std::vector<int> blocked = {};              ///< signals
@@ -70,7 +71,10 @@ class Bridge {
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_addopen(&actions, 0, surroundings.input.c_str(), O_RDONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, out[1], 1);
-    posix_spawn_file_actions_adddup2(&actions, err[1], 2);
+    if (surroundings.error.empty())
+      posix_spawn_file_actions_adddup2(&actions, err[1], 2);
+    else
+      posix_spawn_file_actions_addopen(&actions, 2, surroundings.error.c_str(), O_WRONLY, 0);
     sigset_t blocked = set_of(surroundings.blocked);
     sigset_t defaults = set_of({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
     for (const int number : surroundings.ignored) sigdelset(&defaults, number);

@@ -4,7 +4,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/cli/bridge.h"
-#include "tests/unit/calibrate/camera_render.h"
+#include "tests/unit/calibration/camera/camera_render.h"
 
 namespace tagwrench::test {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/cli/bridge.h"
 
 namespace tagwrench::test {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/cli/bridge.h"
 
 namespace tagwrench::test {

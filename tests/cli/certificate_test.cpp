@@ -6,7 +6,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "host/study/trial_csv.h"
+#include "host/calibration/analysis/trial_csv.h"
 #include "tests/cli/bridge.h"
 
 namespace tagwrench::test {

@@ -4,7 +4,7 @@
 
 #include <regex>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/cli/bridge.h"
 
 namespace tagwrench::test {

@@ -7,8 +7,8 @@
 #include <sstream>
 #include <thread>
 
-#include "host/record/database.h"
-#include "host/record/reader.h"
+#include "host/recording/database.h"
+#include "host/recording/reader.h"
 #include "tests/cli/bridge.h"
 
 namespace tagwrench::test {

@@ -7,8 +7,8 @@
 #include <mutex>
 #include <thread>
 
-#include "tests/unit/link/board_model.h"
-#include "tests/unit/link/pty.h"
+#include "tests/unit/board/board_model.h"
+#include "tests/unit/board/pty.h"
 
 namespace tagwrench::link {
 

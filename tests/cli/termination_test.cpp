@@ -10,10 +10,9 @@
 #include <memory>
 
 #include "tests/cli/bridge.h"
-#include "tests/cli/on_terminal.h"
 #include "tests/cli/served_board.h"
-#include "tests/unit/link/optoforce_frames.h"
-#include "tests/unit/link/pty.h"
+#include "tests/unit/board/optoforce_frames.h"
+#include "tests/unit/board/pty.h"
 
 namespace tagwrench::test {
 namespace {
@@ -286,23 +285,6 @@ TEST_F(TerminationOfACalibration, EndsCheckAndZeroWithStatusOne) {
   }
 }
 
-TEST_F(Termination, EndsTuningAndPutsTheTerminalBack) {
-  Bridge sensor({"run", "--source", "sim", "--profile", "cad", "--output", "jsonl:-"});
-  ASSERT_TRUE(sensor.wait_for_lines(1)) << sensor.err();
-  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
-    OnTerminal tune({"tune"}, {"LD_PRELOAD=" TAGWRENCH_FOREIGN_THREAD});
-    ASSERT_TRUE(tune.shows("profile cad")) << tune.all();
-    tune.signal(number);
-    EXPECT_EQ(tune.finish(), 0);
-    EXPECT_TRUE(tune.restored());
-  }
-  OnTerminal tune({"tune"}, {}, {SIGINT});
-  ASSERT_TRUE(tune.shows("profile cad")) << tune.all();
-  EXPECT_TRUE(ignores(tune.pid(), SIGINT));
-  tune.signal(SIGTERM);
-  EXPECT_EQ(tune.finish(), 0);
-}
-
 TEST_F(Termination, LeavesNothingBehind) {
   const UniqueFd systemd(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_un address{AF_UNIX, {}};
@@ -335,6 +317,18 @@ TEST_F(Termination, ArrivesThoughTheProgramWasStartedWithItBlocked) {
   ASSERT_NO_FATAL_FAILURE(await(program, verb));
   program.signal(SIGTERM);
   expect_end(program, verb);
+}
+
+TEST_F(Termination, ArrivesAndFramesGoOnThoughNobodyReadsStandardError) {
+  const std::string full = path("full");
+  ASSERT_EQ(::mkfifo(full.c_str(), 0600), 0);
+  const UniqueFd pipe(::open(full.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+  const std::string page(4096, 'x');
+  while (::write(pipe.get(), page.data(), page.size()) > 0) continue;
+  Bridge program({"run", "--source", "sim", "--output", "jsonl:-"}, Surroundings{.error = full});
+  ASSERT_TRUE(program.wait_for_lines(60)) << "of which it has told by then that the rest is known";
+  program.signal(SIGTERM);
+  EXPECT_EQ(program.finish().status, 0);
 }
 
 TEST_F(Termination, HasOneThreadToComeToBesideOpenBlas) {

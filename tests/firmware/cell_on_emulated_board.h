@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "host/calibrate/reference.h"
-#include "host/link/cell_calibration.h"
+#include "host/board/cell_calibration.h"
+#include "host/calibration/wrench/reference.h"
 #include "host/source/simulator/bench.h"
 #include "tests/firmware/lockstep_camera.h"
 

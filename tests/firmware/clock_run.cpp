@@ -4,7 +4,7 @@
 #include <cmath>
 #include <deque>
 
-#include "host/link/board_session.h"
+#include "host/board/board_session.h"
 
 namespace tagwrench::emulator {
 

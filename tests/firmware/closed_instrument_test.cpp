@@ -8,12 +8,12 @@
 #include <numeric>
 #include <vector>
 
-#include "host/bandwidth/board_pattern_lamp.h"
-#include "host/bandwidth/measurement.h"
-#include "host/config/scenario_config.h"
-#include "host/link/cell_calibration.h"
-#include "host/link/sample_history.h"
+#include "host/app/scenario_config.h"
+#include "host/board/cell_calibration.h"
+#include "host/board/sample_history.h"
 #include "host/source/simulator/trajectory.h"
+#include "host/tools/camera_timing/board_pattern_lamp.h"
+#include "host/tools/camera_timing/measurement.h"
 #include "tests/firmware/lockstep_camera.h"
 #include "tests/firmware/lockstep_host.h"
 

@@ -18,9 +18,9 @@
 #include <string>
 #include <vector>
 
-#include "host/command_line/command_line.h"
-#include "host/config_error.h"
-#include "host/os/termination.h"
+#include "host/core/command_line/command_line.h"
+#include "host/core/config_error.h"
+#include "host/core/os/termination.h"
 #include "tests/firmware/board_orders.h"
 #include "tests/firmware/other_version.h"
 

@@ -7,16 +7,16 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "host/bandwidth/board_pattern_lamp.h"
-#include "host/calibrate/wrench_guide.h"
-#include "host/calibrate/wrench_observations.h"
-#include "host/config/plan_config.h"
-#include "host/config/sensor_config.h"
-#include "host/link/sample_history.h"
+#include "host/board/sample_history.h"
+#include "host/calibration/wrench/guide.h"
+#include "host/calibration/wrench/observations.h"
+#include "host/calibration/wrench/plan_config.h"
+#include "host/commands/calibrate_wrench/simulated_person.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/mechanics.h"
+#include "host/tools/camera_timing/board_pattern_lamp.h"
 #include "host/tracker/tracker.h"
-#include "host/verbs/calibrate_wrench/simulated_person.h"
 #include "host/wrench/estimate.h"
 #include "tests/firmware/cell_on_emulated_board.h"
 

@@ -2,7 +2,7 @@
 // virtual time itself; bytes take a constant time each way.
 #pragma once
 
-#include "host/link/board_session.h"
+#include "host/board/board_session.h"
 #include "tests/firmware/emulated_board.h"
 
 namespace tagwrench::emulator {

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "firmware/board/pc/port_name.h"
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench::emulator {
 

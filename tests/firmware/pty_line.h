@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench::emulator {
 

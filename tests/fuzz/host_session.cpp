@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "host/link/board_session.h"
+#include "host/board/board_session.h"
 #include "tests/fuzz/expect.h"
 
 namespace {

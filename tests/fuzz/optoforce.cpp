@@ -1,11 +1,11 @@
 // Any bytes through the OptoForce parser, in any pieces, and its counters through the clock.
-#include "host/link/optoforce.h"
+#include "host/board/optoforce.h"
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "host/link/counter_clock.h"
+#include "host/board/counter_clock.h"
 #include "tests/fuzz/expect.h"
 
 namespace {

@@ -14,10 +14,10 @@
 #include <variant>
 #include <vector>
 
-#include "host/config_error.h"
-#include "host/record/database.h"
-#include "host/record/reader.h"
-#include "host/record/schema.h"
+#include "host/core/config_error.h"
+#include "host/recording/database.h"
+#include "host/recording/reader.h"
+#include "host/recording/schema.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/recording_rows.h"
 

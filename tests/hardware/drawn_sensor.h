@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "host/hardware/geometry.h"
-#include "host/hardware/parameters.h"
+#include "host/tools/design/geometry.h"
+#include "host/tools/design/parameters.h"
 #include "tests/cli/bridge.h"
 #include "tests/hardware/mesh.h"
 

@@ -6,7 +6,7 @@
 #include <regex>
 #include <set>
 
-#include "host/hardware/geometry.h"
+#include "host/tools/design/geometry.h"
 #include "tests/hardware/variant.h"
 
 namespace tagwrench::test {

@@ -1,6 +1,6 @@
 // The whole measurement on the simulated camera, whose truth is known: pictures of a flashing lamp
 // in, frame rate, latency, read-out and bad frames out.
-#include "host/study/bandwidth.h"
+#include "host/tools/camera_timing/bandwidth.h"
 
 #include <gtest/gtest.h>
 
@@ -9,13 +9,13 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "host/bandwidth/measurement.h"
-#include "host/bandwidth/report.h"
-#include "host/bandwidth/screen_measurement.h"
-#include "host/bandwidth/screen_window.h"
-#include "host/bandwidth/simulated_lamp.h"
-#include "host/config/scenario_config.h"
+#include "host/app/scenario_config.h"
 #include "host/source/simulator/simulator_source.h"
+#include "host/tools/camera_timing/measurement.h"
+#include "host/tools/camera_timing/report.h"
+#include "host/tools/camera_timing/screen_measurement.h"
+#include "host/tools/camera_timing/screen_window.h"
+#include "host/tools/camera_timing/simulated_lamp.h"
 
 namespace tagwrench::test {
 namespace {

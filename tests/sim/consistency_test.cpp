@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <string>
 
-#include "host/config/scenario_config.h"
-#include "host/config/sensor_config.h"
+#include "host/app/scenario_config.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"

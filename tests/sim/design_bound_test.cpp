@@ -2,9 +2,9 @@
 // rendered pictures have.
 #include <gtest/gtest.h>
 
-#include "host/config/scenario_config.h"
+#include "host/app/scenario_config.h"
 #include "host/source/simulator/target_geometry.h"
-#include "host/study/design.h"
+#include "host/tools/design/design.h"
 #include "host/tracker/tag_patterns.h"
 #include "tests/bench/tracker_bound.h"
 

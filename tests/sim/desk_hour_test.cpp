@@ -8,14 +8,14 @@
 #include <fstream>
 #include <string>
 
-#include "host/config/scenario_config.h"
-#include "host/config/sensor_config.h"
+#include "host/app/scenario_config.h"
+#include "host/motion/gestures.h"
+#include "host/motion/shaping.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
-#include "host/wrench/gestures.h"
-#include "host/wrench/shaping.h"
 #include "host/wrench/zero.h"
 #include "tests/support/desk_judge.h"
 #include "tests/support/desk_readings.h"

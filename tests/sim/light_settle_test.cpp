@@ -2,8 +2,8 @@
 // them.
 #include <gtest/gtest.h>
 
-#include "host/config/sensor_config.h"
-#include "host/light/settle.h"
+#include "host/calibration/light/settle.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"

@@ -8,9 +8,10 @@
 #include <algorithm>
 #include <functional>
 
-#include "host/config/sensor_config.h"
-#include "host/os/unique_fd.h"
-#include "host/pipeline.h"
+#include "host/app/pipeline.h"
+#include "host/core/os/unique_fd.h"
+#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 
@@ -121,7 +122,7 @@ class PipelineLoop : public testing::Test {
     outputs_.push_back(std::move(recorder));
     Tracker tracker(sensor_.camera, sensor_.target, sensor_.rest);
     WrenchEstimator wrench(sensor_.wrench);
-    Desk desk(sensor_);
+    Desk desk(default_profile(sensor_));
     DeadMan dead_man({});
     return Pipeline(source, tracker, wrench, desk, outputs_, dead_man, stop_.get()).run(limits);
   }

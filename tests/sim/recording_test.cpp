@@ -6,7 +6,8 @@
 #include <filesystem>
 
 #include "host/output/sample_text.h"
-#include "host/record/writer.h"
+#include "host/recording/writer.h"
+#include "host/sensor/default_profile.h"
 #include "tests/sim/played.h"
 
 namespace tagwrench::test {
@@ -63,7 +64,7 @@ class RecordedLoop : public PipelineLoop {
     }));
     Tracker tracker(sensor_.camera, sensor_.target, sensor_.rest);
     WrenchEstimator wrench(sensor_.wrench);
-    Desk desk(sensor_);
+    Desk desk(default_profile(sensor_));
     DeadMan dead_man({});
     Pipeline(source, tracker, wrench, desk, outputs_, dead_man, stop_.get(), log).run({});
     std::uint64_t stopped = 0;

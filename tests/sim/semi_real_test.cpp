@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 #include "host/tracker/tracker.h"
 #include "tests/support/after_fit.h"
 

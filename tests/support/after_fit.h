@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench::test {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench::test {
 

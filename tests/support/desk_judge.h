@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "host/motion/gestures.h"
 #include "host/source/simulator/desk_use.h"
-#include "host/wrench/gestures.h"
 
 namespace tagwrench::test {
 

@@ -4,10 +4,10 @@
 #include <array>
 #include <cstdint>
 
+#include "host/core/types.h"
 #include "host/source/simulator/desk_use.h"
 #include "host/source/simulator/random.h"
 #include "host/source/simulator/scenario.h"
-#include "host/types.h"
 
 namespace tagwrench::test {
 

@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench::test {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"

@@ -19,8 +19,8 @@
 #include <string>
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/source/simulator/scenario.h"
-#include "host/types.h"
 
 namespace tagwrench::test {
 

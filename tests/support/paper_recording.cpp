@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "host/study/csv_mapping.h"
+#include "host/calibration/analysis/csv_mapping.h"
 
 namespace tagwrench::test {
 namespace {

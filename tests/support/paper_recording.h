@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "host/study/analysis.h"
+#include "host/calibration/analysis/analysis.h"
 
 namespace tagwrench::test {
 

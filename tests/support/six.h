@@ -1,7 +1,7 @@
-// Six numbers of a pose or a wrench, in the order of host/types.h.
+// Six numbers of a pose or a wrench, in the order of host/core/types.h.
 #pragma once
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench::test {
 

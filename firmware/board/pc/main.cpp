@@ -6,8 +6,8 @@
 
 #include "firmware/app/app.h"
 #include "firmware/board/pc/pc_board.h"
-#include "host/command_line/command_line.h"
-#include "host/config_error.h"
+#include "host/core/command_line/command_line.h"
+#include "host/core/config_error.h"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // Someone outside the simulation who loads the platform, in place of the scenario's trajectory.
 #pragma once
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench::sim {
 

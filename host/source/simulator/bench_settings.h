@@ -1,8 +1,8 @@
 // What is imperfect at the simulated bench: the person, the masses, the reference instruments.
 //
-// SI units unless the name carries another one. Frames as in host/types.h. Every error is drawn
-// from the scenario's seed; a plan that states these numbers as its own standard deviations is
-// honest about this bench.
+// SI units unless the name carries another one. Frames as in host/core/types.h. Every error is
+// drawn from the scenario's seed; a plan that states these numbers as its own standard deviations
+// is honest about this bench.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 #include <limits>
 #include <string>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench::sim {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/algebra/decompositions.h"
+#include "host/core/algebra/decompositions.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/random.h"
 

@@ -13,8 +13,8 @@
 #include <system_error>
 #include <vector>
 
-#include "host/config_error.h"
-#include "host/os/unique_fd.h"
+#include "host/core/config_error.h"
+#include "host/core/os/unique_fd.h"
 #include "host/source/simulator/image_file.h"
 #include "host/source/simulator/simulator_source.h"
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "host/source/png_write.h"
+#include "host/core/png/png_write.h"
 
 namespace tagwrench::sim {
 namespace {

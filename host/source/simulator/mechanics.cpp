@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/algebra/decompositions.h"
+#include "host/core/algebra/decompositions.h"
 
 namespace tagwrench::sim {
 namespace {

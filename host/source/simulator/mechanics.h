@@ -11,10 +11,10 @@
 
 #include <vector>
 
+#include "host/core/types.h"
 #include "host/source/simulator/applied_load.h"
 #include "host/source/simulator/scenario.h"
 #include "host/source/simulator/trajectory.h"
-#include "host/types.h"
 
 namespace tagwrench::sim {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/source/simulator/dirt_print.h"
 #include "host/source/simulator/platform_print.h"
 #include "host/source/simulator/tag_print.h"

@@ -2,7 +2,7 @@
 // (ICRA 2020): a camera 21 mm below a roof with two hand-glued tags, on a platform that four
 // compression springs carry.
 //
-// SI units unless the name carries another one. Frames as in host/types.h.
+// SI units unless the name carries another one. Frames as in host/core/types.h.
 #pragma once
 
 #include <Eigen/Core>

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/source/simulator/desk_use.h"
 
 namespace tagwrench {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/source/camera_light.h"
 #include "host/source/frame_source.h"
 #include "host/source/simulator/applied_load.h"

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "host/grid_tags.h"
+#include "host/core/grid_tags.h"
 
 namespace tagwrench::sim {
 namespace {
@@ -43,7 +43,7 @@ constexpr double kInkEdgeSize = 45e-6;      // m, correlation length of the ink'
 constexpr double kCutSize = 140e-6;         // m, correlation length of the scissors' edge
 constexpr double kLargestRaggedness = 3.0;  // standard deviations; the texture ends there
 
-constexpr std::string_view kGrid = "grid_10x10";  // host/grid_tags.h
+constexpr std::string_view kGrid = "grid_10x10";  // host/core/grid_tags.h
 
 const Family* find_family(const std::string& name) {
   const auto* found = std::find_if(kFamilies.begin(), kFamilies.end(),

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstdint>
 
+#include "host/core/types.h"
 #include "host/source/simulator/scenario.h"
-#include "host/types.h"
 
 namespace tagwrench::sim {
 

@@ -6,7 +6,7 @@
 #include <ctime>
 #include <map>
 
-#include "host/config/plan_config.h"
+#include "host/calibration/wrench/plan_config.h"
 #include "host/web/bridge/profile_saving.h"
 #include "host/web/bridge/web_bridge_impl.h"
 

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <utility>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include "host/desk/control_socket.h"
+#include "host/motion/control_socket.h"
 #include "host/web/server/server_timer.h"
 
 namespace boost::asio {

@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "host/calibrate/board_spec.h"
-#include "host/config/plan_config.h"
-#include "host/config_error.h"
+#include "host/calibration/print/board_spec.h"
+#include "host/calibration/wrench/plan_config.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench {
 namespace {

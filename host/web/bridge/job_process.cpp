@@ -14,10 +14,10 @@
 #include <cstring>
 #include <utility>
 
-#include "host/config_error.h"
-#include "host/os/close_files.h"
-#include "host/os/termination.h"
-#include "host/os/unique_fd.h"
+#include "host/core/config_error.h"
+#include "host/core/os/close_files.h"
+#include "host/core/os/termination.h"
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
 namespace {

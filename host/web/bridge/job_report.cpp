@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "host/core/json/json_text.h"
+
 namespace tagwrench {
 namespace {
 
@@ -74,7 +76,7 @@ void JobReport::printed(std::string_view text) {
 }
 
 std::optional<JobPicture> JobReport::event(std::string_view text) {
-  const json event = json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const json event = parse_json(text);
   if (!event.is_object()) return {};
   if (const json* line = member(event, "line", json::value_t::object)) {
     const json* kind = member(*line, "kind", json::value_t::string);

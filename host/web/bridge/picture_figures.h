@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "host/core/types.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/target.h"
-#include "host/types.h"
 
 namespace tagwrench {
 

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <system_error>
 
-#include "host/config/profile_config.h"
-#include "host/config/sensor_edit.h"
-#include "host/config_error.h"
-#include "host/verbs/tune/knobs.h"
+#include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
+#include "host/core/yaml/yaml_edit.h"
+#include "host/motion/profile_config.h"
+#include "host/motion/profile_edit.h"
+#include "host/sensor/default_profile.h"
 #include "host/web/bridge/job_command.h"
 #include "host/web/bridge/recording_folder.h"
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "host/config/sensor_config.h"
+#include "host/sensor/sensor_config.h"
 
 namespace tagwrench {
 

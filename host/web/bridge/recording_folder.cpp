@@ -10,7 +10,7 @@
 #include <system_error>
 #include <vector>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/web/bridge/job_command.h"
 
 namespace tagwrench {

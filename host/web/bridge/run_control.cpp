@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench {
 namespace {

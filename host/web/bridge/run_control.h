@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
 

@@ -4,7 +4,8 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "host/config/calibration_file.h"
+#include "host/core/axis_names.h"
+#include "host/sensor/calibration_file.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -12,7 +13,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::array<const char*, 6> kAxisNames = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 constexpr double kNoRange = 1e8;
 
 /// Full scale per axis, as samples have it: what the calibration vouches for, else what the
@@ -35,11 +35,11 @@ json hello_of(const RunFacts& facts, const std::string& recordings) {
   if (!sensor.calibration.empty()) {
     const CalibrationRecord record = read_calibration(sensor.calibration).record;
     if (!record.date.empty()) calibrated = record.date.substr(0, 10);
-    for (std::size_t i = 0; record.axis && i < kAxisNames.size(); ++i) {
-      if ((*record.axis)[i].state != AxisState::calibrated) from_springs.push_back(kAxisNames[i]);
+    for (std::size_t i = 0; record.axis && i < kWrenchAxes.size(); ++i) {
+      if ((*record.axis)[i].state != AxisState::calibrated) from_springs.push_back(kWrenchAxes[i]);
     }
   } else {
-    for (const char* axis : kAxisNames) from_springs.push_back(axis);
+    for (const char* axis : kWrenchAxes) from_springs.push_back(axis);
   }
   const Vector6 range = shown_range(sensor);
   json mounting = json::array();  // row by row

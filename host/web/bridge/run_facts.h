@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "host/config/sensor_config.h"
-#include "host/record/records.h"
+#include "host/recording/records.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/frame_source.h"
 #include "host/web/bridge/job_command.h"
 

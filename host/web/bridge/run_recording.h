@@ -8,7 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "host/record/frame_recorder.h"
+#include "host/recording/frame_recorder.h"
 
 namespace tagwrench {
 

@@ -7,9 +7,9 @@
 #include <future>
 #include <utility>
 
-#include "host/desk/control_socket.h"
-#include "host/hint_text.h"
-#include "host/tell.h"
+#include "host/core/tell.h"
+#include "host/motion/control_socket.h"
+#include "host/tracker/hint_text.h"
 #include "host/web/bridge/web_bridge_impl.h"
 #include "host/web/server/picture_message.h"
 

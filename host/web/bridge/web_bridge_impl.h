@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/web/bridge/camera_settings.h"
 #include "host/web/bridge/desk_link.h"
 #include "host/web/bridge/device_readers.h"

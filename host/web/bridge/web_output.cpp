@@ -63,7 +63,7 @@ void WebOutput::look(const Track& track, const Sample& sample) noexcept {
   seen_.corners = track.corners;
   seen_.corner_count = track.corner_count;
   seen_.residual_part = track.residual_part;
-  if (report_ != nullptr) seen_.skipped = report_->skipped;
+  if (skipped_ != nullptr) seen_.skipped = *skipped_;
   if (track.status == Status::ok) {
     seen_.trouble = Hint::none;
   } else if (is_trouble(track.hint)) {

@@ -3,20 +3,22 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "host/frame_log.h"
+#include "host/core/frame_log.h"
 #include "host/output/output.h"
 #include "host/output/spnav_output.h"
-#include "host/pipeline.h"
 #include "host/source/region_source.h"
+#include "host/tracker/tracker.h"
 #include "host/web/bridge/board_control.h"
 #include "host/web/bridge/latest.h"
 #include "host/web/bridge/run_control.h"
 #include "host/web/bridge/run_recording.h"
 #include "host/web/server/live_feed.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 
@@ -67,8 +69,8 @@ class WebOutput final : public Output, public FrameLog {
 
   /// Who else is told of each frame; borrowed.
   void pass_on_to(FrameLog* next) noexcept { next_ = next; }
-  /// Of the run; borrowed.
-  void follow(const RunReport& report) noexcept { report_ = &report; }
+  /// Samples that slow readers of the run have lost; borrowed.
+  void follow_skipped(const std::uint64_t& skipped) noexcept { skipped_ = &skipped; }
 
   // The loop's thread.
   /// Null: none any more. Borrowed.
@@ -81,7 +83,7 @@ class WebOutput final : public Output, public FrameLog {
 
   Parts parts_;
   RunRecording* recording_ = nullptr;
-  const RunReport* report_ = nullptr;
+  const std::uint64_t* skipped_ = nullptr;
   FrameLog* next_ = nullptr;
   SeenNow seen_;
 };

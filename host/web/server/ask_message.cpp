@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "host/core/json/json_text.h"
+
 namespace tagwrench {
 namespace {
 
@@ -49,7 +51,7 @@ AskMessage parse_ask(std::string_view text) {
     out.fault = "nested too deeply";
     return out;
   }
-  json message = json::parse(text, nullptr, false);
+  json message = parse_json(text);
   if (!message.is_object()) {
     out.fault = "not a JSON object";
     return out;

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string_view>
 
-#include "host/types.h"
+#include "host/core/types.h"
 #include "host/web/server/request_guard.h"
 #include "host/web/server/static_site.h"
 

@@ -10,8 +10,8 @@
 #include <optional>
 #include <span>
 
-#include "host/frame_log.h"
-#include "host/types.h"
+#include "host/core/frame_log.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <deque>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

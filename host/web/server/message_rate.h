@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "host/core/json/json_text.h"
 #include "host/web/server/ask.h"
 #include "host/web/server/ask_message.h"
 
@@ -16,8 +17,7 @@ constexpr std::uint16_t kGoingAway = 1001;
 constexpr std::uint16_t kPolicyError = 1008;
 
 std::shared_ptr<const std::string> shared_text(const json& message) {
-  return std::make_shared<const std::string>(
-      message.dump(-1, ' ', false, json::error_handler_t::replace));
+  return std::make_shared<const std::string>(dump_json(message));
 }
 
 std::string message_type(const json& message) { return message.value("type", std::string()); }

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 #include "host/web/server/live_feed.h"
 #include "host/web/server/page_socket.h"
 #include "host/web/server/picture_message.h"

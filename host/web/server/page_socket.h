@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 #include "host/web/server/request_guard.h"
 #include "host/web/server/web_options.h"
 

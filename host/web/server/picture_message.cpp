@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host/core/json/json_text.h"
 #include "host/source/raw_decoder.h"
 
 namespace tagwrench {
@@ -116,7 +117,7 @@ std::shared_ptr<const std::vector<std::uint8_t>> PictureMaker::message(const Liv
 
 std::shared_ptr<const std::vector<std::uint8_t>> picture_message(
     const json& header, std::span<const std::uint8_t> jpeg) {
-  const std::string text = header.dump(-1, ' ', false, json::error_handler_t::replace);
+  const std::string text = dump_json(header);
   std::vector<std::uint8_t> message;
   message.reserve(4 + text.size() + jpeg.size());
   for (int shift = 0; shift < 32; shift += 8)

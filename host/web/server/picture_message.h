@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 #include "host/web/server/live_feed.h"
 
 namespace tagwrench {

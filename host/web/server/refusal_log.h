@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "host/types.h"
+#include "host/core/types.h"
 #include "host/web/server/request_guard.h"
 
 namespace tagwrench {

@@ -4,7 +4,7 @@
 #include <functional>
 #include <memory>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace boost::asio {
 class io_context;

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
 

@@ -11,8 +11,8 @@
 #include <optional>
 #include <string_view>
 
-#include "host/config_error.h"
-#include "host/os/unique_fd.h"
+#include "host/core/config_error.h"
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
 namespace {

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 

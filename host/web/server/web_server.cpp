@@ -16,8 +16,8 @@
 #include <thread>
 #include <utility>
 
-#include "host/config_error.h"
-#include "host/tell.h"
+#include "host/core/config_error.h"
+#include "host/core/tell.h"
 #include "host/web/server/http_connection.h"
 #include "host/web/server/page_hub.h"
 #include "host/web/server/refusal_log.h"

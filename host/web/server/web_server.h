@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 #include "host/web/server/live_figures.h"
 #include "host/web/server/web_options.h"
 

@@ -20,10 +20,10 @@ def prepare(setup):
     """Everything in one folder that an ordinary user can read."""
     os.makedirs(f"{FOLDER}/out", exist_ok=True)
     os.chmod(f"{FOLDER}/out", 0o777)
-    client = os.path.join(os.path.dirname(setup.tagwrench), "client")
+    client = os.path.join(os.path.dirname(setup.tagwrench), "tools", "reading")
     for file in (setup.tagwrench, f"{client}/read_wrench", f"{client}/libtagwrench-hid.so.0",
                  f"{setup.project}/tests/kernel/guest/controller.py",
-                 *(f"{setup.project}/host/client/examples/{name}" for name in EXAMPLES)):
+                 *(f"{setup.project}/host/tools/reading/examples/{name}" for name in EXAMPLES)):
         rig.open_to_all(shutil.copy(file, FOLDER))
     setup.tagwrench = f"{FOLDER}/tagwrench"
 

@@ -166,7 +166,7 @@ def check_other_order(setup, left, right):
 def body(setup):
     rig.load("uhid", "hid-generic", "evdev", "v4l2loopback video_nr=0,1 devices=2 exclusive_caps=1,1")
     os.makedirs(FOLDER)
-    shutil.copy(f"{setup.project}/host/client/examples/read_wrench.py", FOLDER)
+    shutil.copy(f"{setup.project}/host/tools/reading/examples/read_wrench.py", FOLDER)
     left, right = Sensor(setup, "left", "/dev/video0", "cad"), Sensor(setup, "right", "/dev/video1", "game")
     for sensor in (left, right):
         sensor.start()

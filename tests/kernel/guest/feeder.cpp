@@ -25,7 +25,7 @@
 #include <sstream>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "tests/kernel/guest/lines.h"
 
 namespace tagwrench::rig {

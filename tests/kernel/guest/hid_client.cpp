@@ -23,7 +23,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "tests/kernel/guest/lines.h"
 #include "tests/unit/output/hid_parser.h"
 

@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "documents.h"
-#include "host/config/hardware_config.h"
-#include "host/hardware/geometry.h"
+#include "host/tools/design/geometry.h"
+#include "host/tools/design/hardware_config.h"
 
 namespace tagwrench {
 namespace {

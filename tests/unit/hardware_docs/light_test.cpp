@@ -6,8 +6,8 @@
 
 #include "documents.h"
 #include "firmware/app/led.h"
-#include "host/config/hardware_config.h"
-#include "host/hardware/geometry.h"
+#include "host/tools/design/geometry.h"
+#include "host/tools/design/hardware_config.h"
 
 namespace tagwrench {
 namespace {

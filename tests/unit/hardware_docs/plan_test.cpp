@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "host/config/hardware_config.h"
-#include "host/config/plan_config.h"
-#include "host/hardware/load_points.h"
-#include "host/verbs/hardware_plan.h"
+#include "host/calibration/wrench/plan_config.h"
+#include "host/commands/hardware_plan.h"
+#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/load_points.h"
 
 namespace tagwrench {
 namespace {

@@ -10,7 +10,7 @@
 #include <memory>
 #include <optional>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/output/joystick.h"
 #include "host/output/spacemouse.h"
 #include "host/output/wrench_hid.h"

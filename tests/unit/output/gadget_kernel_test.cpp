@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "gadget_rig.h"
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench {
 namespace {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "gadget_rig.h"
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/output/gadget_reports.h"
 #include "host/output/hid_report.h"
 #include "samples.h"

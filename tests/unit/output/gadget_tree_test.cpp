@@ -10,7 +10,7 @@
 #include <fstream>
 
 #include "gadget_rig.h"
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/output/hid_report.h"
 
 namespace tagwrench {

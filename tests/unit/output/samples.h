@@ -3,7 +3,7 @@
 
 #include <chrono>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace test {
 

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <random>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "tests/unit/output/spnav_rig.h"
 
 namespace tagwrench {

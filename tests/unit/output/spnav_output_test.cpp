@@ -7,7 +7,7 @@
 #include <csignal>
 #include <memory>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "tests/cli/bridge.h"
 #include "tests/unit/output/spnav_rig.h"
 

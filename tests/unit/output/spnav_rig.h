@@ -19,7 +19,7 @@
 #include <thread>
 #include <vector>
 
-#include "host/os/unique_fd.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/spnav_keeper.h"
 #include "host/output/spnav_link.h"
 

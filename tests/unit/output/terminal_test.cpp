@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "samples.h"
 
 namespace tagwrench {

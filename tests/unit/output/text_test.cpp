@@ -14,8 +14,8 @@
 #include <sstream>
 #include <thread>
 
-#include "host/config_error.h"
-#include "host/os/termination.h"
+#include "host/core/config_error.h"
+#include "host/core/os/termination.h"
 #include "host/output/csv.h"
 #include "host/output/jsonl.h"
 #include "samples.h"

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 
 namespace tagwrench {
 

@@ -4,9 +4,9 @@
 #include <random>
 #include <string>
 
+#include "host/core/png/png.h"
+#include "host/core/png/png_write.h"
 #include "host/source/pgm.h"
-#include "host/source/png.h"
-#include "host/source/png_write.h"
 
 namespace tagwrench {
 namespace {

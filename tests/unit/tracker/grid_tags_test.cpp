@@ -1,5 +1,5 @@
 // The table of grid_10x10 against the rule behind it, and its tags against each other.
-#include "host/grid_tags.h"
+#include "host/core/grid_tags.h"
 
 #include <gtest/gtest.h>
 

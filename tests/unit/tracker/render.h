@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "host/types.h"
+#include "host/core/types.h"
 
 namespace tagwrench::render {
 

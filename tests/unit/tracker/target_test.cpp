@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "host/tracker/acquire.h"
 
 namespace tagwrench {

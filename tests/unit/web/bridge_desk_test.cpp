@@ -5,7 +5,7 @@
 #include <boost/asio/io_context.hpp>
 #include <filesystem>
 
-#include "host/desk/control_socket.h"
+#include "host/motion/control_socket.h"
 #include "host/web/bridge/desk_link.h"
 
 namespace tagwrench {

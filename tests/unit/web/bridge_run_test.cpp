@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "host/desk/control_socket.h"
+#include "host/motion/control_socket.h"
 #include "host/web/bridge/web_bridge.h"
 #include "tests/support/temporary_folder.h"
 

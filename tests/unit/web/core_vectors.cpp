@@ -23,13 +23,13 @@
 #include <string>
 #include <vector>
 
-#include "host/config/scenario_config.h"
-#include "host/config/sensor_config.h"
-#include "host/config/sensor_edit.h"
-#include "host/config/zero_options.h"
-#include "host/hint_text.h"
+#include "host/app/scenario_config.h"
+#include "host/core/os/atomic_file.h"
+#include "host/sensor/sensor_config.h"
+#include "host/sensor/zero_options.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
+#include "host/tracker/hint_text.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
 #include "tests/support/semi_real.h"

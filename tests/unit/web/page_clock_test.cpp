@@ -1,4 +1,4 @@
-#include "host/bandwidth/page_clock.h"
+#include "host/tools/camera_timing/page_clock.h"
 
 #include <gtest/gtest.h>
 

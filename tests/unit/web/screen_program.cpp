@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "host/bandwidth/page_patch.h"
+#include "host/tools/camera_timing/page_patch.h"
 
 namespace tagwrench {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "host/config_error.h"
+#include "host/core/config_error.h"
 #include "tests/unit/wrench/known_loads.h"
 
 namespace tagwrench {

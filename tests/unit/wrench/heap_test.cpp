@@ -4,8 +4,8 @@
 
 #include <cstdio>
 
+#include "host/motion/shaping.h"
 #include "host/wrench/estimate.h"
-#include "host/wrench/shaping.h"
 #include "tests/support/heap_count.h"
 
 namespace tagwrench {

@@ -1,4 +1,4 @@
-// What can be tuned of a profile, as `tagwrench tune` has it: sliders, switches and choices, and where each
+// What can be tuned of a profile: sliders, switches and choices, and where each
 // stands in the text.
 import { PROFILE_AXES, type Path, type ProfileText } from './profile_text';
 

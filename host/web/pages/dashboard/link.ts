@@ -16,7 +16,7 @@ import {
   stateFrom,
   textIn,
 } from './protocol';
-import { subprotocols } from './token';
+import { subprotocols } from '../common/token';
 
 export type LinkState =
   | { kind: 'connecting' }

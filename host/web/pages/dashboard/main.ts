@@ -3,7 +3,7 @@ import '../common/theme.css';
 import './shell.css';
 import { Link } from './link';
 import { Shell } from './shell';
-import { takeToken } from './token';
+import { takeToken } from '../common/token';
 import { CalibrateView } from './views/calibrate';
 import { CameraView } from './views/camera';
 import { CertificateView } from './views/certificate';

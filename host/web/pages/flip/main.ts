@@ -6,12 +6,12 @@ import { button, field, make, panel, present, say } from '../common/elements';
 import { themeSwitch } from '../common/theme';
 import { Camera } from '../sensor/camera';
 import { firstCameraTrouble } from '../sensor/checks';
-import { download } from '../sensor/download';
+import { download } from '../common/download';
 import { BrightnessReader } from './brightness';
 import { FlipMeasurement, type Result, reportJson, reportText } from './measurement';
 import { Patch } from './patch';
 import { ProgramScreen } from './program_screen';
-import { takeToken } from '../dashboard/token';
+import { takeToken } from '../common/token';
 
 /** Flashes, that is white and black again, a second. Up to 3 are held to be safe for nearly everybody (WCAG 2.3.1). */
 const SAFE_HZ = 3;

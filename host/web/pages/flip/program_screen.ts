@@ -1,6 +1,6 @@
 // This screen for `tagwrench bandwidth`: it says when to flip, and hears when that was, by this page's clock.
 import type { Patch } from './patch';
-import { subprotocols } from '../dashboard/token';
+import { subprotocols } from '../common/token';
 
 interface Order {
   type: string;

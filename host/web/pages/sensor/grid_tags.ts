@@ -1,4 +1,4 @@
-// The cells of the tag family grid_10x10; host/grid_tags.h has the rule behind the table, and a test compares the two.
+// The cells of the tag family grid_10x10; host/core/grid_tags.h has the rule behind the table, and a test compares the two.
 
 /** Row by row from the top; the highest of ten bits is the leftmost cell: 1 white, 0 black. */
 const TAGS: readonly (readonly number[])[] = [

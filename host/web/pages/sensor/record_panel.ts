@@ -1,7 +1,7 @@
 // Start and stop of a recording, and its download as CSV.
 import { button, make, panel, say } from '../common/elements';
 import type { Sample } from '../common/sample';
-import { download } from './download';
+import { download } from '../common/download';
 import { Recorder } from './recorder';
 
 const EVERY_MS = 250;

@@ -1,7 +1,7 @@
 // Which sensor is in force: its files loaded, dropped, changed a little, saved.
 import { button, field, make, panel, present, say } from '../common/elements';
 import type { SensorInfo } from './core';
-import { download } from './download';
+import { download } from '../common/download';
 import type { SensorFiles } from './messages';
 import { FAMILIES, type SensorKeys, readKeys, writeKeys } from './sensor_edit';
 import { withFiles } from './sensor_files';

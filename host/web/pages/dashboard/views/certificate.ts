@@ -2,7 +2,7 @@
 import { button, make, panel, present } from '../../common/elements';
 import { JobPanel } from '../job_panel';
 import { type Job, textIn } from '../protocol';
-import { fetchFile } from '../token';
+import { fetchFile } from '../../common/token';
 import type { App, View } from '../view';
 
 const KINDS = ['pdf', 'json', 'html'] as const;

@@ -2,7 +2,7 @@
 import './record.css';
 import { button, field, make, panel, present, say } from '../../common/elements';
 import { listIn, numberIn, said, textIn, type BridgeState, type RecordingState } from '../protocol';
-import { fetchFile } from '../token';
+import { fetchFile } from '../../common/token';
 import type { App, View } from '../view';
 import { bytes, day, duration } from '../words';
 

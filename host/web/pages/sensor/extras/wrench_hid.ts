@@ -1,4 +1,4 @@
-// The bridge's wrench sensor on HID, read by WebHID: its report in newtons (host/client/README.md).
+// The bridge's wrench sensor on HID, read by WebHID: its report in newtons (host/tools/reading/README.md).
 import { STATUS_WORDS, type Sample, type Status, carriesNumbers } from '../../common/sample';
 
 const VENDOR = 0x1209;

@@ -1,0 +1,59 @@
+// Where the frames of a command come from: SRC and sensor.yaml to the objects.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "host/core/os/unique_fd.h"
+#include "host/recording/records.h"
+#include "host/sensor/sensor_config.h"
+#include "host/source/frame_source.h"
+
+namespace tagwrench {
+
+struct Spec {
+  std::string kind;
+  std::string argument;
+};
+
+/// "kind:argument", or "kind".
+Spec split_spec(const std::string& spec);
+
+struct InputOptions {
+  std::string sensor;  ///< path of sensor.yaml; empty: what the source suggests
+  std::string source;  ///< SRC
+  bool fast = false;   ///< sources that are not live run as fast as they can, no frame dropped
+  WrenchCalibration calibration = WrenchCalibration::use;
+};
+
+/// A source and the sensor that it shows.
+struct Input {
+  SensorConfig sensor;
+  std::unique_ptr<FrameSource> source;
+  std::string spec;         ///< SRC that it was opened with
+  bool camera = false;      ///< a real one, that sees what an LED lights
+  std::string sensor_name;  ///< path of the sensor.yaml that was loaded, or what stands for it
+  std::string sensor_text;  ///< of a sensor that has no file
+  std::optional<record::Head> recorded;  ///< of a recording, whose sensor is its own
+};
+
+/// Throws ConfigError if the source is none, cannot be opened, or the sensor cannot be used.
+Input open_input(const InputOptions& options);
+
+/// sensor.yaml of the paper's sensor with nominal lens: what a fresh build comes closest to.
+std::string paper_sensor_yaml();
+
+/// Throws ConfigError unless the source's frames have the size that the sensor's camera has.
+void check_size(const Input& input);
+
+/// Throws ConfigError unless the picture of the sensor at rest, where one is given, shows its tags.
+void check_appearance(const Input& input);
+
+enum class Next : std::uint8_t { frame, nothing, end, stopped };
+
+/// Waits a while for a frame, the end of the source or a signal; says when a camera goes or comes.
+Next next_frame(FrameSource& source, const UniqueFd& stop, Frame& frame);
+
+}  // namespace tagwrench

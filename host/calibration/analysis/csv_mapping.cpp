@@ -1,0 +1,329 @@
+#include "host/calibration/analysis/csv_mapping.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "host/calibration/analysis/analysis.h"
+#include "host/calibration/analysis/delimited.h"
+#include "host/core/axis_names.h"
+#include "host/core/config_error.h"
+
+namespace tagwrench::study {
+namespace {
+
+struct Unit {
+  std::string_view name;
+  double si;
+};
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr std::array kFeatureUnits{Unit{"m", 1},   Unit{"mm", 1e-3},   Unit{"um", 1e-6},
+                                   Unit{"rad", 1}, Unit{"mrad", 1e-3}, Unit{"deg", kDegree}};
+constexpr std::array kLoadUnits{Unit{"N", 1},      Unit{"mN", 1e-3},  Unit{"Nm", 1},
+                                Unit{"mNm", 1e-3}, Unit{"Nmm", 1e-3}, Unit{"gf", 9.80665e-3}};
+constexpr std::array kTimeUnits{Unit{"s", 1}, Unit{"ms", 1e-3}, Unit{"us", 1e-6}, Unit{"ns", 1e-9}};
+
+// A platform on springs goes no further; numbers that do were written in another unit.
+constexpr double kMostWay = 0.1;       // m
+constexpr double kMostTurn = 2.0;      // rad
+constexpr double kLeastWeight = 1e-6;  // of a smoothing that can be undone
+
+template <std::size_t N>
+const Unit* find_unit(const std::array<Unit, N>& units, std::string_view name) {
+  const auto at =
+      std::find_if(units.begin(), units.end(), [&](const Unit& unit) { return unit.name == name; });
+  return at == units.end() ? nullptr : &*at;
+}
+
+template <std::size_t N>
+std::string names(const std::array<Unit, N>& units) {
+  std::string text;
+  for (const Unit& unit : units) text += (text.empty() ? "" : " ") + std::string(unit.name);
+  return text;
+}
+
+std::vector<std::string> split(std::string_view text, char separator) {
+  std::vector<std::string> parts;
+  for (;;) {
+    const std::size_t end = text.find(separator);
+    parts.emplace_back(text.substr(0, end));
+    if (end == std::string_view::npos) return parts;
+    text.remove_prefix(end + 1);
+  }
+}
+
+/// Rows to use, in order, with their times.
+struct Rows {
+  std::vector<std::size_t> row;
+  Eigen::VectorXd time;
+};
+
+Rows rows_in_order(const DelimitedText& text, const std::string& column, double unit,
+                   std::size_t skip, std::vector<std::string>& notes) {
+  const std::vector<std::size_t> found = text.find(column);
+  if (found.size() != 1)
+    throw ConfigError(fmt::format("{}: name one column of times, not '{}'", text.name(), column));
+  Rows rows;
+  std::vector<double> times;
+  std::size_t repeated = 0;
+  double before = 0;
+  for (std::size_t row = 0; row < text.rows(); ++row) {
+    const double time = text.number(row, found[0], DelimitedText::kLargest / unit) * unit;
+    if (row > 0 && time < before) {
+      throw ConfigError(
+          fmt::format("{}: time runs backwards, {} s after {} s; put the rows in "
+                      "order, or name the right column of times",
+                      text.place(row), time, before));
+    }
+    const bool repeats = row > 0 && time == before;
+    before = time;
+    if (row < skip) continue;
+    if (repeats && !times.empty()) {
+      ++repeated;
+      continue;
+    }
+    rows.row.push_back(row);
+    times.push_back(time);
+  }
+  if (repeated > 0) {
+    notes.push_back(fmt::format("{}: {} with the time of the row before left out", text.name(),
+                                repeated == 1 ? "1 row" : fmt::format("{} rows", repeated)));
+  }
+  if (times.size() < 2) {
+    throw ConfigError(
+        fmt::format("{}: fewer than two rows of different times are left", text.name()));
+  }
+  rows.time =
+      Eigen::Map<const Eigen::VectorXd>(times.data(), static_cast<Eigen::Index>(times.size()));
+  return rows;
+}
+
+Eigen::MatrixXd all_rows(const DelimitedText& text, const std::vector<std::size_t>& columns) {
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(text.rows()),
+                         static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t row = 0; row < text.rows(); ++row) {
+    for (std::size_t j = 0; j < columns.size(); ++j)
+      values(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(j)) =
+          text.number(row, columns[j]);
+  }
+  return values;
+}
+
+Eigen::Matrix3d rotation(const std::string& order, const Eigen::Vector3d& angles) {
+  Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(order[static_cast<std::size_t>(i)] - 'x');
+    r = r * Eigen::AngleAxisd(angles[i], axis).toRotationMatrix();
+  }
+  return r;
+}
+
+/// Rotation vectors from the mean of the first `rest` rows, along the axes of that.
+Eigen::MatrixXd rotation_vectors(const std::string& order, const Eigen::MatrixXd& angles,
+                                 std::size_t rest) {
+  const Eigen::Index count =
+      std::clamp<Eigen::Index>(static_cast<Eigen::Index>(rest), 1, angles.rows());
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  const auto quaternion = [&](Eigen::Index row) {
+    return Eigen::Quaterniond(rotation(order, angles.row(row).transpose()));
+  };
+  const Eigen::Quaterniond first = quaternion(0);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Vector4d q = quaternion(i).coeffs();
+    sum += q.dot(first.coeffs()) < 0 ? Eigen::Vector4d(-q) : q;
+  }
+  const Eigen::Quaterniond mean(Eigen::Vector4d(sum.normalized()));
+  Eigen::MatrixXd vectors(angles.rows(), 3);
+  for (Eigen::Index i = 0; i < angles.rows(); ++i) {
+    const Eigen::AngleAxisd turn(mean.conjugate() * quaternion(i));
+    const double angle = std::remainder(turn.angle(), 2 * std::numbers::pi);
+    vectors.row(i) = angle * turn.axis().transpose();
+  }
+  return vectors;
+}
+
+void add_features(const CsvMapping& mapping, const FeatureColumns& group, const DelimitedText& text,
+                  const Rows& rows, MappedTrial& mapped) {
+  Trial& trial = mapped.trial;
+  const std::vector<std::size_t> columns = text.find(group.columns);
+  Eigen::MatrixXd values = all_rows(text, columns);
+  if (group.unsmooth > 0) {
+    const double w = group.unsmooth;
+    for (Eigen::Index i = values.rows() - 1; i > 0; --i)
+      values.row(i) = (values.row(i) - (1 - w) * values.row(i - 1)) / w;
+  }
+  values = (group.unit * values(rows.row, Eigen::all)).eval();
+  if (!group.euler.empty()) {
+    if (columns.size() != 3) {
+      throw ConfigError(fmt::format("{}: Euler angles are three columns, not {} ('{}')",
+                                    text.name(), columns.size(), group.columns));
+    }
+    values = rotation_vectors(group.euler, values, mapping.rest_readings);
+  }
+  const Eigen::Index before = trial.features.cols();
+  trial.features.conservativeResize(values.rows(), before + values.cols());
+  trial.features.rightCols(values.cols()) = values;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const std::string name = text.header().empty() ? fmt::format("column_{}", columns[i] + 1)
+                                                   : text.header()[columns[i]];
+    trial.feature_names.push_back(
+        group.euler.empty() ? name : fmt::format("{}_r{}", name, "xyz"[static_cast<int>(i)]));
+    const auto column = values.col(static_cast<Eigen::Index>(i));
+    const double way = column.maxCoeff() - column.minCoeff();
+    const bool turns = group.quantity == 'r';
+    if (group.quantity == 0 || way <= (turns ? kMostTurn : kMostWay)) continue;
+    mapped.notes.push_back(fmt::format(
+        "{}: column {} ({}) goes over {:.3g} {}, further than a platform on springs: give its unit "
+        "({}), or leave out the row that is wrong",
+        text.name(), columns[i] + 1, trial.feature_names.back(), way, turns ? "rad" : "m",
+        turns ? "deg or mrad" : "mm or um"));
+  }
+}
+
+void add_loads(const CsvMapping& mapping, const DelimitedText& text, const Rows& rows,
+               Trial& trial) {
+  trial.reference = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows.row.size()), 6);
+  std::array<bool, 6> given{};
+  std::size_t next = 0;
+  for (const LoadColumns& group : mapping.loads) {
+    const std::vector<std::size_t> columns = text.find(group.columns);
+    const auto wrong = [&](std::size_t count, const char* what) {
+      return ConfigError(fmt::format("{}: {} columns '{}', but {} {}", text.name(), columns.size(),
+                                     group.columns, count, what));
+    };
+    if (!group.counts_per_unit.empty() && group.counts_per_unit.size() != columns.size())
+      throw wrong(group.counts_per_unit.size(), "counts");
+    if (!group.axes.empty() && group.axes.size() != columns.size())
+      throw wrong(group.axes.size(), "axes");
+    Eigen::MatrixXd values = all_rows(text, columns);
+    if (mapping.zero_rows > 0) {
+      const Eigen::Index count =
+          std::min<Eigen::Index>(static_cast<Eigen::Index>(mapping.zero_rows), values.rows());
+      const Eigen::RowVectorXd zero = values.topRows(count).colwise().mean();
+      values.rowwise() -= zero;
+    }
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      std::size_t axis = next;
+      if (!group.axes.empty()) {
+        axis = static_cast<std::size_t>(
+            std::find(kWrenchAxes.begin(), kWrenchAxes.end(), group.axes[i]) - kWrenchAxes.begin());
+      }
+      if (axis >= kWrenchAxes.size() || given[axis]) {
+        throw ConfigError(fmt::format(
+            "{}: '{}' gives {}; name each axis once with axes=Fx,...", text.name(), group.columns,
+            axis < kWrenchAxes.size() ? "an axis twice" : "more than six axes"));
+      }
+      given[axis] = true;
+      next = axis + 1;
+      const double counts = group.counts_per_unit.empty() ? 1 : group.counts_per_unit[i];
+      trial.reference.col(static_cast<Eigen::Index>(axis)) =
+          group.sign * group.unit / counts * values(rows.row, static_cast<Eigen::Index>(i));
+    }
+  }
+}
+
+ConfigError unknown(const std::string& option, const std::string& text, const std::string& part,
+                    const std::string& known) {
+  return ConfigError(fmt::format("{} {}: what is '{}'? Known: {}", option, text, part, known));
+}
+
+}  // namespace
+
+FeatureColumns parse_feature_columns(const std::string& text, const std::string& option) {
+  const std::vector<std::string> parts = split(text, ':');
+  FeatureColumns columns;
+  columns.columns = parts[0];
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const std::string& part = parts[i];
+    if (const Unit* unit = find_unit(kFeatureUnits, part)) {
+      columns.unit = unit->si;
+      columns.quantity = part.ends_with('m') ? 'm' : 'r';
+    } else if (part == "euler") {
+      columns.euler = "xyz";
+    } else if (part.starts_with("euler=") && part.size() == 9 &&
+               part.find_first_not_of("xyz", 6) == std::string::npos) {
+      columns.euler = part.substr(6);
+    } else if (part.starts_with("unsmooth=")) {
+      if (!parse_number(part.substr(9), columns.unsmooth) || columns.unsmooth < kLeastWeight ||
+          columns.unsmooth > 1)
+        throw ConfigError(fmt::format("{} {}: the weight of a smoothing is from {:g} to 1", option,
+                                      text, kLeastWeight));
+    } else {
+      throw unknown(option, text, part,
+                    names(kFeatureUnits) + " euler euler=ORDER unsmooth=WEIGHT");
+    }
+  }
+  return columns;
+}
+
+LoadColumns parse_load_columns(const std::string& text, const std::string& option) {
+  const std::vector<std::string> parts = split(text, ':');
+  LoadColumns columns;
+  columns.columns = parts[0];
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const std::string& part = parts[i];
+    if (const Unit* unit = find_unit(kLoadUnits, part)) {
+      columns.unit = unit->si;
+    } else if (part == "negative") {
+      columns.sign = -1;
+    } else if (part.starts_with("counts=")) {
+      for (const std::string& one : split(std::string_view(part).substr(7), ',')) {
+        double value = 0;
+        if (!parse_number(one, value) || std::abs(value) < 1 / DelimitedText::kLargest ||
+            std::abs(value) > DelimitedText::kLargest) {
+          throw ConfigError(fmt::format("{} {}: counts per unit are numbers from {:g} to {:g}",
+                                        option, text, 1 / DelimitedText::kLargest,
+                                        DelimitedText::kLargest));
+        }
+        columns.counts_per_unit.push_back(value);
+      }
+    } else if (part.starts_with("axes=")) {
+      for (const std::string& one : split(std::string_view(part).substr(5), ',')) {
+        if (std::find(kWrenchAxes.begin(), kWrenchAxes.end(), one) == kWrenchAxes.end())
+          throw unknown(option, text, one, fmt::format("{}", fmt::join(kWrenchAxes, " ")));
+        columns.axes.push_back(one);
+      }
+    } else {
+      throw unknown(option, text, part, names(kLoadUnits) + " counts=A,B,... axes=Fx,... negative");
+    }
+  }
+  return columns;
+}
+
+double parse_time_unit(const std::string& text, const std::string& option) {
+  const Unit* unit = find_unit(kTimeUnits, text);
+  if (unit == nullptr)
+    throw ConfigError(fmt::format("{}: no unit '{}'; use {}", option, text, names(kTimeUnits)));
+  return unit->si;
+}
+
+MappedTrial read_mapped(const CsvMapping& mapping) {
+  MappedTrial mapped;
+  Trial& trial = mapped.trial;
+  trial.name = mapping.readings.stem().string();
+  trial.file = mapping.readings.string();
+  const DelimitedText readings(mapping.readings, mapping.separator, mapping.skip_lines);
+  const Rows rows = rows_in_order(readings, mapping.reading_time, mapping.time_unit,
+                                  mapping.skip_readings, mapped.notes);
+  trial.time = rows.time;
+  for (const FeatureColumns& group : mapping.features)
+    add_features(mapping, group, readings, rows, mapped);
+
+  if (mapping.reference.empty()) {
+    trial.reference_time = rows.time;
+    add_loads(mapping, readings, rows, trial);
+    return mapped;
+  }
+  const DelimitedText reference(mapping.reference, mapping.separator, mapping.skip_lines);
+  const Rows felt = rows_in_order(reference, mapping.reference_time, mapping.reference_time_unit,
+                                  mapping.skip_references, mapped.notes);
+  trial.reference_time = felt.time;
+  add_loads(mapping, reference, felt, trial);
+  return mapped;
+}
+
+}  // namespace tagwrench::study

@@ -1,0 +1,330 @@
+#include "host/calibration/analysis/lag.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "host/calibration/analysis/smoothing.h"
+
+namespace tagwrench::study {
+namespace {
+
+constexpr double kCoarse = 0.010;              // s
+constexpr double kFine = 0.002;                // s
+constexpr int kFineReach = 12;                 // steps to each side
+constexpr int kParabola = 2;                   // points to each side of the least
+constexpr Eigen::Index kBlocks = 12;           // of the jackknife, at least
+constexpr Eigen::Index kMostReadings = 10000;  // of more, every so many: it costs time, and clocks
+                                               // are not as good as that
+constexpr double kFloor = 1e-12;               // of the share that no model explains
+constexpr double kLeastExplained = 0.3;        // R^2 of the best axis, or nothing is known
+constexpr double kGapsOfMedian = 5;
+
+/// A stretch with the readings that lie within the reference at every lag that is asked for.
+struct Prepared {
+  Eigen::VectorXd time;
+  Eigen::MatrixXd features;  ///< centred
+  const Stretch* source = nullptr;
+  double longest_gap = 0;
+};
+
+Prepared prepare(const Stretch& stretch, double from, double to, Eigen::Index every) {
+  Prepared prepared;
+  prepared.source = &stretch;
+  prepared.longest_gap = kGapsOfMedian * median_interval(stretch.reference_time);
+  std::vector<Eigen::Index> kept;
+  const Eigen::Index last = stretch.reference_time.size() - 1;
+  for (Eigen::Index i = 0; i < stretch.time.size() && last > 0; i += every) {
+    if (stretch.time[i] - to >= stretch.reference_time[0] &&
+        stretch.time[i] - from <= stretch.reference_time[last])
+      kept.push_back(i);
+  }
+  prepared.time = stretch.time(kept);
+  prepared.features = stretch.features(kept, Eigen::all);
+  if (!kept.empty()) {
+    const Eigen::RowVectorXd mean = prepared.features.colwise().mean();
+    prepared.features.rowwise() -= mean;
+  }
+  return prepared;
+}
+
+/// Sums of one block of readings, of which any number add up to a regression.
+struct Sums {
+  Eigen::MatrixXd xx;  ///< p x p
+  Eigen::MatrixXd xy;  ///< p x q
+  Eigen::VectorXd yy;  ///< q
+  double n = 0;
+
+  void add(const Sums& other, double sign) {
+    xx += sign * other.xx;
+    xy += sign * other.xy;
+    yy += sign * other.yy;
+    n += sign * other.n;
+  }
+};
+
+struct Block {
+  int model = 0;
+  Sums sums;
+};
+
+class LagScan {
+ public:
+  LagScan(std::span<const Stretch> stretches, const LagSearch& search, double from, double to)
+      : ridge_(search.ridge) {
+    Eigen::Index all = 0;
+    for (const Stretch& stretch : stretches) all += stretch.time.size();
+    const Eigen::Index every = std::max<Eigen::Index>(1, all / kMostReadings);
+    Eigen::Index rows = 0;
+    for (const Stretch& stretch : stretches) {
+      prepared_.push_back(prepare(stretch, from, to, every));
+      rows += prepared_.back().time.size();
+    }
+    rows_ = rows;
+    block_rows_ = std::max<Eigen::Index>(1, (rows + kBlocks - 1) / kBlocks);
+  }
+
+  Eigen::Index rows() const { return rows_; }
+
+  /// The sums at one lag, block by block; always the same blocks.
+  std::vector<Block> blocks_at(double lag) const {
+    std::vector<Block> blocks;
+    for (const Prepared& p : prepared_) {
+      const Eigen::Index n = p.time.size();
+      if (n == 0) continue;
+      Eigen::MatrixXd y =
+          reference_at(p.time, lag, p.source->reference_time, p.source->reference, p.longest_gap);
+      Eigen::VectorXd there = Eigen::VectorXd::Ones(n);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        if (y.row(i).allFinite()) continue;
+        there[i] = 0;
+        y.row(i).setZero();
+      }
+      const double count = there.sum();
+      if (count < 1) continue;
+      const Eigen::RowVectorXd mean = y.colwise().sum() / count;
+      y -= there * mean;
+      const Eigen::MatrixXd x = there.asDiagonal() * p.features;
+      const Eigen::Index parts = std::max<Eigen::Index>(1, (n + block_rows_ / 2) / block_rows_);
+      for (Eigen::Index b = 0; b < parts; ++b) {
+        const Eigen::Index first = n * b / parts;
+        const Eigen::Index size = n * (b + 1) / parts - first;
+        const auto xb = x.middleRows(first, size);
+        const auto yb = y.middleRows(first, size);
+        blocks.push_back(
+            {p.source->model,
+             {xb.transpose() * xb, xb.transpose() * yb, yb.colwise().squaredNorm().transpose(),
+              there.segment(first, size).sum()}});
+      }
+    }
+    return blocks;
+  }
+
+  /// Sum of log(unexplained share), weighted by the readings, of all blocks but `without`; infinite
+  /// where there is nothing to regress. `explained` becomes the mean and the largest R^2.
+  double criterion(const std::vector<Block>& blocks, std::size_t without,
+                   Eigen::Vector2d* explained = nullptr) const {
+    std::map<int, Sums> models;
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      if (b == without) continue;
+      const auto [at, is_new] = models.try_emplace(blocks[b].model, blocks[b].sums);
+      if (!is_new) at->second.add(blocks[b].sums, 1);
+    }
+    double sum = 0;
+    double shares = 0;
+    double weight = 0;
+    double least = 1;
+    for (auto& [model, s] : models) {
+      const Eigen::Index p = s.xx.rows();
+      if (s.n < static_cast<double>(3 * p)) continue;
+      Eigen::VectorXd scale = s.xx.diagonal() / s.n;
+      for (double& v : scale) v = v > 0 ? 1 / std::sqrt(v) : 0;
+      Eigen::MatrixXd normal = scale.asDiagonal() * s.xx * scale.asDiagonal();
+      normal.diagonal().array() += (ridge_ + 1e-12) * s.n;
+      const Eigen::MatrixXd xy = scale.asDiagonal() * s.xy;
+      const Eigen::MatrixXd weights = normal.ldlt().solve(xy);
+      for (Eigen::Index k = 0; k < s.yy.size(); ++k) {
+        if (!(s.yy[k] > 0)) continue;
+        const double share = std::clamp(1 - xy.col(k).dot(weights.col(k)) / s.yy[k], 0.0, 1.0);
+        sum += s.n * std::log(share + kFloor);
+        shares += s.n * share;
+        weight += s.n;
+        least = std::min(least, share);
+      }
+    }
+    if (!(weight > 0)) return std::numeric_limits<double>::infinity();
+    if (explained != nullptr) *explained = {1 - shares / weight, 1 - least};
+    return sum / weight;
+  }
+
+ private:
+  std::vector<Prepared> prepared_;
+  double ridge_;
+  Eigen::Index rows_ = 0;
+  Eigen::Index block_rows_ = 1;
+};
+
+/// Readings and reference by one triangle, wide enough that what is left of the reference's noise
+/// is nearly the same between its samples as at them: linear interpolation halves white noise
+/// midway, which would draw the lag of clocks in step towards there.
+Stretch smooth_alike(const Stretch& stretch) {
+  constexpr double kSamples = 4;  // of the reference: its noise then varies by 5 %
+  Stretch smooth = stretch;
+  const double width =
+      std::max(kSamples * median_interval(stretch.reference_time), median_interval(stretch.time));
+  if (!(width > 0)) return smooth;
+  smooth.features = smooth_reference(stretch.time, stretch.features, width);
+  smooth.reference = smooth_reference(stretch.reference_time, stretch.reference, width);
+  return smooth;
+}
+
+constexpr std::size_t kAllBlocks = std::numeric_limits<std::size_t>::max();
+
+/// Where the parabola through the points about the least one of an even grid is least.
+double lowest(const std::vector<double>& values, double first, double step) {
+  const auto n = static_cast<int>(values.size());
+  const auto least =
+      static_cast<int>(std::min_element(values.begin(), values.end()) - values.begin());
+  const int middle =
+      std::clamp(least, std::min(kParabola, n / 2), std::max(n - 1 - kParabola, (n - 1) / 2));
+  double s2 = 0, s4 = 0, y0 = 0, y1 = 0, y2 = 0;
+  int count = 0;
+  for (int j = -kParabola; j <= kParabola; ++j) {
+    if (middle + j < 0 || middle + j >= n) continue;
+    const double v = values[static_cast<std::size_t>(middle + j)];
+    s2 += j * j;
+    s4 += j * j * j * j;
+    y0 += v;
+    y1 += j * v;
+    y2 += j * j * v;
+    ++count;
+  }
+  const double curvature = (count * y2 - s2 * y0) / (count * s4 - s2 * s2);
+  const double slope = y1 / s2;
+  const double shift = curvature > 0
+                           ? std::clamp(-slope / (2 * curvature), -1.0 * kParabola, 1.0 * kParabola)
+                           : least - middle;
+  return first + (middle + shift) * step;
+}
+
+std::vector<double> grid(double from, double to, double step) {
+  const int n = std::max(1, static_cast<int>(std::lround((to - from) / step)));
+  std::vector<double> lags(static_cast<std::size_t>(n) + 1);
+  for (int i = 0; i <= n; ++i) lags[static_cast<std::size_t>(i)] = from + (to - from) * i / n;
+  return lags;
+}
+
+}  // namespace
+
+Eigen::MatrixXd reference_at(const Eigen::VectorXd& time, double lag,
+                             const Eigen::VectorXd& reference_time,
+                             const Eigen::MatrixXd& reference, double longest_gap) {
+  Eigen::MatrixXd at = Eigen::MatrixXd::Constant(time.size(), reference.cols(),
+                                                 std::numeric_limits<double>::quiet_NaN());
+  const double* begin = reference_time.data();
+  const double* end = begin + reference_time.size();
+  for (Eigen::Index i = 0; i < time.size(); ++i) {
+    const double t = time[i] - lag;
+    const double* after = std::upper_bound(begin, end, t);
+    if (after == begin) continue;
+    const Eigen::Index before = after - begin - 1;
+    if (reference_time[before] == t) {
+      at.row(i) = reference.row(before);
+      continue;
+    }
+    if (after == end) continue;
+    const double interval = reference_time[before + 1] - reference_time[before];
+    if (interval > longest_gap) continue;
+    const double share = (t - reference_time[before]) / interval;
+    at.row(i) = (1 - share) * reference.row(before) + share * reference.row(before + 1);
+  }
+  return at;
+}
+
+Lag estimate_lag(std::span<const Stretch> given, const LagSearch& search) {
+  Lag lag;
+  if (given.empty()) return lag;
+  std::vector<Stretch> smoothed;
+  if (search.smooth) {
+    for (const Stretch& stretch : given) smoothed.push_back(smooth_alike(stretch));
+  }
+  const std::span<const Stretch> stretches = search.smooth ? smoothed : given;
+  const LagScan coarse(stretches, search, search.from, search.to);
+  if (coarse.rows() < 3 * stretches.front().features.cols()) return lag;
+  double best = std::numeric_limits<double>::infinity();
+  for (const double candidate : grid(search.from, search.to, kCoarse)) {
+    const double value = coarse.criterion(coarse.blocks_at(candidate), kAllBlocks);
+    if (value < best) {
+      best = value;
+      lag.value = candidate;
+    }
+  }
+  if (!std::isfinite(best)) return lag;
+  lag.at_limit = lag.value < search.from + 0.5 * kCoarse || lag.value > search.to - 0.5 * kCoarse;
+
+  const double reach = kFineReach * kFine;
+  const LagScan fine(stretches, search, lag.value - reach, lag.value + reach);
+  const std::vector<double> lags = grid(lag.value - reach, lag.value + reach, kFine);
+  std::vector<std::vector<Block>> at;
+  std::size_t count = std::numeric_limits<std::size_t>::max();
+  for (const double candidate : lags) {
+    at.push_back(fine.blocks_at(candidate));
+    count = std::min(count, at.back().size());
+  }
+  const auto find = [&](std::size_t without) {
+    std::vector<double> values;
+    for (const std::vector<Block>& blocks : at) values.push_back(fine.criterion(blocks, without));
+    return lowest(values, lags.front(), kFine);
+  };
+  lag.value = std::clamp(find(kAllBlocks), search.from, search.to);
+  std::vector<double> without(count);
+  double mean = 0;
+  for (std::size_t b = 0; b < count; ++b) {
+    without[b] = find(b);
+    mean += without[b] / static_cast<double>(count);
+  }
+  double squares = 0;
+  for (const double value : without) squares += (value - mean) * (value - mean);
+  lag.sigma = count > 1
+                  ? std::sqrt(squares * static_cast<double>(count - 1) / static_cast<double>(count))
+                  : reach;
+  Eigen::Vector2d explained = Eigen::Vector2d::Zero();
+  fine.criterion(fine.blocks_at(lag.value), kAllBlocks, &explained);
+  lag.explained = explained[0];
+  lag.known = explained[1] >= kLeastExplained && lag.sigma < reach;
+  if (!lag.known) {
+    lag.value = 0;
+    lag.at_limit = false;
+  }
+  return lag;
+}
+
+std::string lag_text(const Lag& lag) {
+  const bool late = lag.value >= 0;
+  return fmt::format("the {} {:.1f} +- {:.1f} ms after the {}",
+                     late ? "readings come" : "reference comes", 1e3 * std::abs(lag.value),
+                     1e3 * lag.sigma, late ? "reference" : "readings");
+}
+
+std::string lag_warning(const Lag& lag, double from, double to) {
+  if (!lag.known) {
+    return "the lag between readings and reference cannot be told: they do not move together";
+  }
+  if (lag.at_limit) {
+    return lag_text(lag) +
+           ": the end of what was searched, so the true lag may lie beyond; are both on one clock?";
+  }
+  const bool early = lag.value + 2 * lag.sigma < from;
+  if (!early && lag.value - 2 * lag.sigma <= to) return {};
+  return lag_text(lag) + fmt::format(
+                             ", more than {:.0f} ms; are both on one clock, and stamped when they "
+                             "were taken?",
+                             1e3 * std::abs(early ? from : to));
+}
+
+}  // namespace tagwrench::study

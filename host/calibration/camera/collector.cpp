@@ -1,0 +1,153 @@
+#include "host/calibration/camera/collector.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "host/calibration/camera/limits.h"
+#include "host/core/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr double kAlike = 0.015;  // of the image's width: mean motion of the corners
+constexpr double kStill = 0.001;  // of the image's width, between two frames
+constexpr int kStillFrames = 2;   // in a row
+constexpr std::size_t kMostPuzzles = 5;
+constexpr std::size_t kMostViews = 500;  // held; memory must end
+constexpr std::size_t kFewestShared = 6;
+
+}  // namespace
+
+double difference_px(const std::vector<BoardCorner>& a, const std::vector<BoardCorner>& b) {
+  double sum = 0;
+  std::size_t shared = 0;
+  for (const BoardCorner& p : a) {
+    for (const BoardCorner& q : b) {
+      if ((p.board - q.board).squaredNorm() > 0.01) continue;
+      sum += (p.pixel - q.pixel).norm();
+      ++shared;
+    }
+  }
+  if (shared < std::min({kFewestShared, a.size(), b.size()}) || shared == 0)
+    return std::numeric_limits<double>::max();
+  return sum / static_cast<double>(shared);
+}
+
+ViewCollector::ViewCollector(const BoardSpec& board, const CameraModel& camera, bool live)
+    : board_(board), camera_(camera), live_(live), finder_(board, camera.mirrored) {}
+
+bool ViewCollector::still(const std::vector<BoardCorner>& corners) {
+  const bool now = difference_px(previous_, corners) < kStill * camera_.width_px;
+  still_frames_ = now ? still_frames_ + 1 : 0;
+  previous_ = corners;
+  return still_frames_ >= kStillFrames;
+}
+
+void ViewCollector::keep(const ImageView& image) {
+  if (puzzles_.size() >= kMostPuzzles) return;
+  std::vector<std::uint8_t>& copy = puzzles_.emplace_back();
+  for (int y = 0; y < image.height; ++y) {
+    const std::uint8_t* row = image.pixels + static_cast<std::ptrdiff_t>(y) * image.stride;
+    copy.insert(copy.end(), row, row + image.width);
+  }
+}
+
+Taken ViewCollector::look(const ImageView& image, const std::string& name) {
+  const bool mirrored_before = finder_.mirrored();
+  BoardSighting sighting = finder_.find(image);
+  if (finder_.mirrored() != mirrored_before) previous_.clear();
+  last_look_ = sighting.look;
+  ++looks_[sighting.look];
+  ++looked_;
+  if (sighting.look == Look::no_board || sighting.look == Look::other_board) keep(image);
+  if (sighting.look != Look::board) return Taken::no;
+  if (live_ && !still(sighting.corners)) return Taken::moving;
+  const auto alike = [&](const CameraView& view) {
+    return difference_px(view.corners, sighting.corners) < kAlike * camera_.width_px;
+  };
+  if (std::any_of(views_.begin(), views_.end(), alike)) {
+    ++alike_;
+    return Taken::alike;
+  }
+  if (views_.size() < kMostViews)
+    views_.push_back({name, std::move(sighting.corners), sighting.corner_look.blur_px});
+  return Taken::yes;
+}
+
+Coverage ViewCollector::coverage() const {
+  const std::vector<BoardPose> poses =
+      rough_poses(views_, camera_.width_px, camera_.height_px, camera_.fx_px);
+  Coverage coverage(camera_.width_px, camera_.height_px);
+  for (std::size_t i = 0; i < views_.size(); ++i) coverage.add(views_[i].corners, poses[i]);
+  return coverage;
+}
+
+void ViewCollector::thin_out(int most) {
+  const auto count = static_cast<std::size_t>(std::max(1, most));
+  if (views_.size() <= count) return;
+  // Farthest point first: the next view is the one least like any that is in.
+  std::vector<double> to_chosen(views_.size(), std::numeric_limits<double>::max());
+  std::vector<bool> chosen(views_.size(), false);
+  std::size_t next = 0;
+  for (std::size_t n = 0; n < count; ++n) {
+    chosen[next] = true;
+    for (std::size_t i = 0; i < views_.size(); ++i)
+      to_chosen[i] = std::min(to_chosen[i], difference_px(views_[i].corners, views_[next].corners));
+    next = 0;
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      if (!chosen[i] && (chosen[next] || to_chosen[i] > to_chosen[next])) next = i;
+    }
+  }
+  std::vector<CameraView> left;
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    if (chosen[i]) left.push_back(std::move(views_[i]));
+  }
+  views_ = std::move(left);
+}
+
+std::string ViewCollector::what_was_seen() const {
+  std::vector<std::string> parts;
+  for (const auto& [look, count] : looks_) {
+    if (look != Look::board) parts.push_back(fmt::format("{} {}", count, words(look)));
+  }
+  return listed(parts);
+}
+
+std::string ViewCollector::other_board() const {
+  std::vector<ImageView> images;
+  for (const auto& pixels : puzzles_)
+    images.push_back({pixels.data(), camera_.width_px, camera_.height_px, camera_.width_px});
+  return guess_board(images, board_);
+}
+
+void ViewCollector::check() const {
+  const std::string asked = describe(board_);
+  const auto found = looks_.find(Look::board);
+  const int count = found == looks_.end() ? 0 : found->second;
+  // Part of a checkerboard may pass for a smaller one here and there.
+  if (static_cast<int>(views_.size()) < kFewestCameraViews) {
+    if (const std::string guess = other_board(); !guess.empty()) {
+      throw ConfigError(fmt::format(
+          "--board {}: found in {} of {} images; the board in the others looks like {}: correct "
+          "--board, or show all of it",
+          asked, count, looked_, guess));
+    }
+  }
+  if (count == 0) {
+    throw ConfigError(
+        fmt::format("--board {}: no usable view of it ({}); light it evenly, hold it sharp and "
+                    "whole in view, and check --board",
+                    asked, looked_ == 0 ? "no image" : "images: " + what_was_seen()));
+  }
+  if (views_.size() < 3 && alike_ > 0) {
+    throw ConfigError(fmt::format(
+        "all {} images with the board show it in the same pose: move it about and tilt it between "
+        "views",
+        count));
+  }
+}
+
+}  // namespace tagwrench

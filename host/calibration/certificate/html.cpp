@@ -1,0 +1,306 @@
+#include "host/calibration/certificate/html.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/calibration/analysis/analysis_warnings.h"
+#include "host/calibration/certificate/quantity.h"
+#include "host/calibration/certificate/style.h"
+#include "host/core/axis_names.h"
+
+namespace tagwrench {
+namespace {
+
+using study::Analysis;
+using study::AxisReport;
+
+constexpr double kCrossTalkOfNote = 1;  // % of full scale: printed bold
+constexpr std::size_t kHashShown = 16;  // hexadecimal digits; the JSON has them all
+constexpr std::size_t kMostData = 4;
+constexpr double kMostExcitation = 1000;
+constexpr std::size_t kLongestName = 28;
+
+/// Bytes of the UTF-8 sequence that begins at `i`, 0 if there is none (RFC 3629).
+std::size_t sequence_length(std::string_view text, std::size_t i) {
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+  const unsigned char first = byte(i);
+  if (first < 0x80) return 1;
+  const std::size_t length = first >= 0xc2 && first < 0xe0   ? 2
+                             : first >= 0xe0 && first < 0xf0 ? 3
+                             : first >= 0xf0 && first < 0xf5 ? 4
+                                                             : 0;
+  if (length == 0 || i + length > text.size()) return 0;
+  for (std::size_t k = 1; k < length; ++k) {
+    if ((byte(i + k) & 0xc0) != 0x80) return 0;
+  }
+  const unsigned char second = byte(i + 1);
+  if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second >= 0xa0) ||
+      (first == 0xf0 && second < 0x90) || (first == 0xf4 && second >= 0x90)) {
+    return 0;
+  }
+  return length;
+}
+
+/// At most `most` characters, the end replaced by an ellipsis.
+std::string shortened(std::string_view text, std::size_t most) {
+  std::size_t characters = 0;
+  for (std::size_t i = 0; i < text.size(); ++characters) {
+    if (characters + 1 == most) return std::string(text.substr(0, i)) + "…";
+    i += std::max<std::size_t>(1, sequence_length(text, i));
+  }
+  return std::string(text);
+}
+
+std::string cell(const std::string& text, const char* attributes = "") {
+  return fmt::format("<td{}>{}</td>", attributes, text);
+}
+
+std::string optional_load(const std::optional<double>& value, int axis) {
+  return value ? load_text(*value, axis) : "–";
+}
+
+std::string header(const Certificate& c) {
+  return fmt::format(
+      "<header><div><h1>Calibration certificate</h1>"
+      "<p>Six-axis force–torque sensor, tracked optically</p></div>"
+      "<div class=\"id\"><b>No. {}</b><br>issued {}<br>{}</div></header>\n",
+      escaped(c.number), escaped(c.issued), escaped(c.software));
+}
+
+std::string fact_list(const char* title, const std::vector<Fact>& facts, const PageRoom& room) {
+  std::string text = fmt::format("<section><h2>{}</h2><table class=\"facts\">", title);
+  for (const Fact& fact : facts) {
+    text += fmt::format("<tr><th>{}</th><td>{}</td></tr>", escaped(fact.name),
+                        escaped(shortened(fact.value, room.fact_length)));
+  }
+  return text + "</table></section>";
+}
+
+/// Masses have next to no noise.
+std::string excitation_text(double value) {
+  if (!(value > 0)) return "–";
+  return value < kMostExcitation ? number_text(value) : ">1000";
+}
+
+std::string axis_row(const AxisReport& r, int axis, const PageRoom& room) {
+  const char* name = kWrenchAxes[static_cast<std::size_t>(axis)];
+  std::string row = fmt::format("<tr><th>{}</th>", name);
+  if (!r.calibrated) {
+    return row +
+           fmt::format("<td colspan=\"13\" class=\"no\"><b>Not calibrated.</b> {}</td></tr>\n",
+                       escaped(shortened(r.reason, room.warning_length)));
+  }
+  row += cell(range_text(r.range_low, r.range_high, axis));
+  row += cell(std::isfinite(r.r2) ? fmt::format("{:.5f}", r.r2) : "–", " class=\"first\"");
+  row += cell(load_text(r.rmse, axis)) + cell(percent_text(r.rmse_percent));
+  row += cell(r.coverage ? fmt::format("{:.0f}\u00a0%", 100 * *r.coverage) : "–");
+  row += cell(percent_text(r.nonlinearity_percent), " class=\"first\"");
+  row += cell(percent_text(r.hysteresis_percent));
+  row += cell(r.creep_percent ? percent_text(*r.creep_percent) : "–");
+  row += cell(optional_load(r.noise, axis), " class=\"first\"");
+  row += cell(optional_load(r.noise_density, axis));
+  row += cell(optional_load(r.resolution, axis));
+  row += cell(optional_load(r.drift_per_hour, axis));
+  row += cell(excitation_text(r.excitation), " class=\"first\"");
+  return row + "</tr>\n";
+}
+
+/// Widths in percent.
+std::string columns() {
+  std::string text = "<colgroup>";
+  for (const double width :
+       {3.2, 15.0, 6.4, 8.4, 5.8, 5.6, 6.0, 6.0, 5.8, 8.2, 8.4, 8.2, 8.6, 4.4}) {
+    text += fmt::format("<col style=\"width:{}%\">", width);
+  }
+  return text + "</colgroup>";
+}
+
+std::string axes_note(const Analysis& a) {
+  return fmt::format(
+      "<p class=\"note\">R² and RMSE are of single readings{}, their own noise and that "
+      "of "
+      "the reference included. Percentages are of the full scale loaded: the larger end of the "
+      "range. – not told by these data.</p>\n",
+      a.own_predictions ? ", predicted by the calibration's own fit without their step" : "");
+}
+
+std::string axes(const Analysis& a, const PageRoom& room) {
+  std::string text =
+      "<table class=\"axes\">" + columns() +
+      "<thead><tr><th></th><th></th>"
+      "<th colspan=\"4\" class=\"first\">held out</th><th colspan=\"3\" class=\"first\">shape, of "
+      "full scale</th><th colspan=\"4\" class=\"first\">at rest</th><th class=\"first\"></th></tr>"
+      "<tr><th></th><th>range</th><th class=\"first\">R²</th><th>RMSE</th><th>of full<br>scale</th>"
+      "<th>in 95 %<br>interval</th><th class=\"first\">non-<br>linearity</th><th>hyster-<br>esis"
+      "</th><th>creep</th><th class=\"first\">noise</th><th>density<br>per "
+      "√Hz</th><th>resolu-<br>tion</th>"
+      "<th>drift/h</th><th class=\"first\">excita-<br>tion</th></tr></thead><tbody>\n";
+  for (int axis = 0; axis < 6; ++axis)
+    text += axis_row(a.axis[static_cast<std::size_t>(axis)], axis, room);
+  return text + "</tbody></table>\n" + axes_note(a);
+}
+
+/// % with two decimals, and no minus before a zero.
+std::string cross_text(double value) {
+  const std::string text = fmt::format("{:.2f}", value);
+  return text == "-0.00" ? "0.00" : text[0] == '-' ? "−" + text.substr(1) : text;
+}
+
+std::string cross_talk(const Analysis& a) {
+  std::string text = "<h2>Cross-talk, % of full scale</h2><table class=\"cross\"><tr><th></th>";
+  for (const char* name : kWrenchAxes) text += fmt::format("<th>{}</th>", name);
+  text += "</tr>";
+  for (int row = 0; row < 6; ++row) {
+    const auto index = static_cast<std::size_t>(row);
+    text += fmt::format("<tr><th>{}</th>", kWrenchAxes[index]);
+    for (int column = 0; column < 6; ++column) {
+      const double value = a.cross_talk(row, column);
+      const bool known = a.axis[index].calibrated &&
+                         a.axis[static_cast<std::size_t>(column)].calibrated &&
+                         std::isfinite(value);
+      const bool large = known && std::abs(value) >= kCrossTalkOfNote;
+      text += cell(known ? cross_text(value) : "–", row == column ? " class=\"self\""
+                                                    : large       ? " class=\"large\""
+                                                                  : "");
+    }
+    text += "</tr>";
+  }
+  return text +
+         "</table><p class=\"note\">Row: the axis that errs; column: the one that is loaded; "
+         "diagonal: error of gain.</p>";
+}
+
+std::string lag_of(const study::Lag& lag) {
+  if (!lag.known) return "not found";
+  std::string text = study::lag_text(lag);
+  if (const std::size_t sign = text.find("+-"); sign != std::string::npos)
+    text.replace(sign, 2, "±");
+  return text + ", the same on all axes";
+}
+
+std::vector<Fact> conditions(const Analysis& a) {
+  const bool moving = a.reference_rate > 0;
+  std::vector<Fact> facts;
+  facts.push_back({"Readings", fmt::format("{} in {} s, {} Hz", a.readings, number_text(a.seconds),
+                                           number_text(a.reading_rate))});
+  if (moving) {
+    facts.push_back({"Reference", fmt::format("{} readings, {} Hz", a.references,
+                                              number_text(a.reference_rate))});
+  } else {
+    facts.push_back({"Reference", "loads that hung still, without lag"});
+  }
+  if (moving) facts.push_back({"Lag", lag_of(a.lag)});
+  if (!a.validation.empty()) facts.push_back({"Held out", a.validation});
+  facts.push_back({"Conditioning", number_text(a.condition)});
+  if (!a.weakest.empty()) facts.push_back({"Least excited", a.weakest});
+  return facts;
+}
+
+std::string data(const Certificate& c) {
+  std::string text = "<section><h2>Data</h2><table class=\"facts\">";
+  for (std::size_t i = 0; i < std::min(c.data.size(), kMostData); ++i) {
+    text += fmt::format("<tr><th>{}</th><td>{} bytes, SHA-256 <code>{}…</code></td></tr>",
+                        escaped(shortened(c.data[i].name, kLongestName)), c.data[i].bytes,
+                        escaped(c.data[i].sha256.substr(0, kHashShown)));
+  }
+  if (c.data.size() > kMostData) {
+    text += fmt::format("<tr><th></th><td>and {} more, in the JSON</td></tr>",
+                        c.data.size() - kMostData);
+  }
+  return text + "</table></section>";
+}
+
+/// Whether the table of axes says it already.
+bool in_the_table(const Analysis& a, const std::string& warning) {
+  const std::vector<std::string> said = study::excitation_warnings(a);
+  return std::find(said.begin(), said.end(), warning) != said.end();
+}
+
+std::string remarks(const Analysis& a, const PageRoom& room) {
+  std::string items;
+  std::size_t more = 0;
+  std::size_t shown = 0;
+  for (const std::string& warning : a.warnings) {
+    if (in_the_table(a, warning)) continue;
+    if (shown == room.warnings) {
+      ++more;
+    } else {
+      ++shown;
+      items += fmt::format("<li>{}</li>", escaped(shortened(warning, room.warning_length)));
+    }
+  }
+  if (more > 0) items += fmt::format("<li><b>{} more, in the JSON.</b></li>", more);
+  if (items.empty()) return "<section><h2>Remarks: None.</h2></section>";
+  return "<section><h2>Remarks</h2><ul>" + items + "</ul></section>";
+}
+
+constexpr const char* kDefinitions =
+    "Held out: each part of the data is judged by a fit that has not seen it. R² and RMSE against "
+    "the reference. Non-linearity: largest deviation of the binned mean from a line. Hysteresis: "
+    "largest gap between rising and falling load. Creep: change during a constant load. "
+    "Resolution: what two readings at rest tell apart at 95 %. Excitation: spread of the reference "
+    "over its own noise. No accredited laboratory has taken part: the figures are as good as the "
+    "reference or the masses.";
+
+}  // namespace
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = sequence_length(text, i);
+    const char c = text[i];
+    if (length == 0) {
+      out += "\uFFFD";
+    } else if (length > 1) {
+      out += text.substr(i, length);
+    } else if (c == '&') {
+      out += "&amp;";
+    } else if (c == '<') {
+      out += "&lt;";
+    } else if (c == '>') {
+      out += "&gt;";
+    } else if (c == '"') {
+      out += "&quot;";
+    } else if (c == '\'') {
+      out += "&#39;";
+    } else {
+      out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+    }
+    i += std::max<std::size_t>(1, length);
+  }
+  return out;
+}
+
+std::string certificate_html(const Certificate& c, const std::string& scatter,
+                             const std::string& traces, const PageRoom& room) {
+  std::string page = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<title>Calibration certificate {}</title><style>{}"
+      ".scatter svg{{height:{:.1f}mm}} .traces svg{{height:{:.1f}mm}}</style></head><body>\n",
+      escaped(c.number), kCertificateStyle, room.scatter_mm, room.traces_mm);
+  page += header(c);
+  page += "<div class=\"columns\">" + fact_list("Sensor", c.sensor, room) +
+          fact_list("Calibration", c.procedure, room) + "</div>\n";
+  page += axes(c.analysis, room);
+  page +=
+      "<div class=\"columns wide-left\"><section class=\"scatter\"><h2>This sensor, held out, "
+      "against the "
+      "reference</h2>" +
+      scatter + "</section><section>" + cross_talk(c.analysis) +
+      fact_list("Conditions", conditions(c.analysis), room) + "</section></div>\n";
+  page +=
+      "<section class=\"traces\"><h2>Over time, s, without pauses: <span "
+      "class=\"black\">reference</span> and "
+      "<span class=\"red\">this sensor, held out</span></h2>" +
+      traces + "</section>\n";
+  page += "<div class=\"columns\">" + data(c) + remarks(c.analysis, room) + "</div>\n";
+  page += fmt::format(
+      "<footer><div>{}</div><div class=\"sign\">Date, name and signature</div></footer>\n"
+      "</body></html>\n",
+      kDefinitions);
+  return page;
+}
+
+}  // namespace tagwrench

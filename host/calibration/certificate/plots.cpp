@@ -1,0 +1,237 @@
+#include "host/calibration/certificate/plots.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/calibration/certificate/program.h"
+#include "host/core/axis_names.h"
+
+namespace tagwrench {
+namespace {
+
+using study::Analysis;
+
+constexpr std::chrono::seconds kPatience{60};
+constexpr Eigen::Index kMostDots = 500;     // of a panel
+constexpr Eigen::Index kMostColumns = 420;  // of a trace: about one a pixel of paper
+constexpr double kPause = 16;               // typical steps of time, drawn between trials ...
+constexpr double kMostPauses = 0.5;  // ... but all together no more of the time that is shown
+
+/// Forces in N, torques in mN m.
+double shown(double value, int axis) { return axis < 3 ? value : 1e3 * value; }
+const char* unit(int axis) { return axis < 3 ? "N" : "mN m"; }
+
+bool drawable(const Analysis& a, int axis) {
+  return a.axis[static_cast<std::size_t>(axis)].calibrated && a.time.size() > 0;
+}
+
+/// Round numbers that enclose all values; never empty.
+struct Span {
+  double low = 0, high = 0;
+};
+
+Span span(const Analysis& a, int axis) {
+  Span s{0, 0};
+  for (Eigen::Index i = 0; i < a.time.size(); ++i) {
+    for (const double value : {a.predicted(i, axis), a.felt(i, axis)}) {
+      if (!std::isfinite(value)) continue;
+      s.low = std::min(s.low, shown(value, axis));
+      s.high = std::max(s.high, shown(value, axis));
+    }
+  }
+  const double margin = std::max(0.06 * (s.high - s.low), 1e-9);
+  return {s.low - margin, s.high + margin};
+}
+
+/// 1, 2 or 5 times a power of ten: about `count` of them in the span.
+double tick(const Span& s, int count) {
+  const double wanted = (s.high - s.low) / count;
+  const double decade = std::pow(10, std::floor(std::log10(wanted)));
+  for (const double step : {1.0, 2.0, 5.0}) {
+    if (step * decade >= wanted) return step * decade;
+  }
+  return 10 * decade;
+}
+
+std::string terminal(PlotSize size) {
+  // The font is the page's: the SVG stands in it. Dots are the round ends of lines.
+  return fmt::format(
+      "set encoding utf8\n"
+      "set terminal svg size {},{} dynamic font 'sans-serif,7.5' linewidth 0.6 rounded "
+      "background '#ffffff'\n"
+      "set key off\n"
+      "set tics scale 0.4 nomirror textcolor '#333333'\n"
+      "set border 3 linecolor '#777777' linewidth 0.7\n",
+      size.width, size.height);
+}
+
+/// Leaves the x axis and the axis' name as they are.
+std::string empty_panel() {
+  return "unset ytics\nset yrange [0:1]\n"
+         "set label 3 'not calibrated' at graph 0.5,0.5 center textcolor '#888888'\n"
+         "plot NaN notitle\n";
+}
+
+std::string named(int axis, const char* name_place, const char* unit_place) {
+  return fmt::format(
+      "set label 1 '{}' at graph {} left font ',8.5'\n"
+      "set label 2 '{}' at graph {} left textcolor '#555555'\n",
+      kWrenchAxes[static_cast<std::size_t>(axis)], name_place, unit(axis), unit_place);
+}
+
+constexpr const char* kForgetLabels = "unset label 1\nunset label 2\nunset label 3\n";
+
+std::string scatter_panel(const Analysis& a, int axis) {
+  const Span s = span(a, axis);
+  // A dot is a short line with round ends: gnuplot's own points are <use> elements in currentColor,
+  // which weasyprint 57 does not draw.
+  const double short_line = 2e-3 * (s.high - s.low);
+  std::string script = "$dots << END\n";
+  const Eigen::Index stride = std::max<Eigen::Index>(1, a.time.size() / kMostDots);
+  for (Eigen::Index i = 0; i < a.time.size(); i += stride) {
+    const double x = shown(a.felt(i, axis), axis);
+    const double y = shown(a.predicted(i, axis), axis);
+    if (std::isfinite(x) && std::isfinite(y))
+      script += fmt::format("{:.6g} {:.6g}\n{:.6g} {:.6g}\n\n", x, y, x + short_line, y);
+  }
+  script += "END\n" + named(axis, "0.04,0.93", "0.04,0.80");
+  script += fmt::format(
+      "set xrange [{0:.6g}:{1:.6g}]\nset yrange [{0:.6g}:{1:.6g}]\n"
+      "set xtics nomirror scale 0.4 {2:.6g} offset 0,0.5\n"
+      "set ytics nomirror scale 0.4 {2:.6g} offset 0.7,0\n"
+      "plot x with lines linecolor '#000000' linewidth 0.8, "
+      "$dots using 1:2 with lines linecolor '#d62728' linewidth {3}\n",
+      s.low, s.high, tick(s, 6), a.reference_rate > 0 ? 3 : 6);
+  return script;
+}
+
+double typical_step(const Eigen::VectorXd& time) {
+  std::vector<double> steps;
+  for (Eigen::Index i = 1; i < time.size(); ++i) steps.push_back(time[i] - time[i - 1]);
+  if (steps.empty()) return 1;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return std::max(*middle, 1e-9);
+}
+
+/// Whether a line goes on from row i - 1 to row i.
+bool goes_on(const Analysis& a, Eigen::Index i) {
+  return a.stretch.size() != a.time.size() || a.stretch[i] == a.stretch[i - 1];
+}
+
+/// From 0 on, with short pauses between stretches, however long they were: a trial may begin
+/// earlier than the one before has ended, and loads hang for seconds, minutes apart.
+Eigen::VectorXd running_time(const Analysis& a) {
+  Eigen::VectorXd passed = Eigen::VectorXd::Zero(a.time.size());  // 0: a pause
+  for (Eigen::Index i = 1; i < a.time.size(); ++i) {
+    if (goes_on(a, i)) passed[i] = std::max(0.0, a.time[i] - a.time[i - 1]);
+  }
+  const auto pauses = static_cast<double>(std::max<Eigen::Index>(1, (passed.array() == 0).count()));
+  const double most = kMostPauses * passed.sum() / pauses;
+  const double step = kPause * typical_step(a.time);
+  const double pause = most > 0 ? std::min(step, most) : step;
+  Eigen::VectorXd running = Eigen::VectorXd::Zero(a.time.size());
+  for (Eigen::Index i = 1; i < a.time.size(); ++i)
+    running[i] = running[i - 1] + (passed[i] > 0 ? passed[i] : pause);
+  return running;
+}
+
+/// One column of numbers over time. Where there are more readings than pixels, the least and the
+/// greatest of each pixel, so that no peak is lost. Empty lines break the line.
+std::string trace_data(const Analysis& a, const Eigen::VectorXd& time,
+                       const Eigen::MatrixXd& values, int axis) {
+  const Eigen::Index most = std::max<Eigen::Index>(1, 2 * time.size() / kMostColumns);
+  std::string text;
+  const auto add = [&](Eigen::Index i) {
+    if (std::isfinite(values(i, axis)))
+      text += fmt::format("{:.7g} {:.6g}\n", time[i], shown(values(i, axis), axis));
+  };
+  for (Eigen::Index begin = 0; begin < time.size();) {
+    if (begin > 0 && !goes_on(a, begin)) text += "\n";
+    Eigen::Index end = begin + 1;
+    while (end < time.size() && end < begin + most && goes_on(a, end)) ++end;
+    Eigen::Index low = 0;
+    Eigen::Index high = 0;
+    values.col(axis).segment(begin, end - begin).minCoeff(&low);
+    values.col(axis).segment(begin, end - begin).maxCoeff(&high);
+    add(begin + std::min(low, high));
+    if (low != high) add(begin + std::max(low, high));
+    begin = end;
+  }
+  return text;
+}
+
+std::string trace_panel(const Analysis& a, const Eigen::VectorXd& time, int axis) {
+  const Span s = span(a, axis);
+  const bool moving = a.reference_rate > 0;
+  return fmt::format(
+      "$felt << END\n{}END\n$ours << END\n{}END\n"
+      "set yrange [{:.6g}:{:.6g}]\nset ytics nomirror scale 0.4 {:.6g} offset 0.7,0\n"
+      "plot $felt using 1:2 with lines linecolor '#000000' linewidth {}, "
+      "$ours using 1:2 with lines linecolor '#d62728' linewidth {}\n",
+      trace_data(a, time, a.felt, axis), trace_data(a, time, a.predicted, axis), s.low, s.high,
+      tick(s, 5), moving ? 2.0 : 5.0, moving ? 0.9 : 1.6);
+}
+
+std::string time_axis(const Eigen::VectorXd& time) {
+  const Span seconds{0, time.size() > 1 ? time[time.size() - 1] : 1};
+  return fmt::format("set xrange [0:{:.7g}]\nset xtics {:.6g} offset 0,0.5\n", seconds.high,
+                     tick(seconds, 10));
+}
+
+/// Without the declarations that may stand only at the start of a file.
+std::string draw(const std::string& script) {
+  const std::string svg = run_program({"gnuplot", "gnuplot-nox"}, {"-d", "-"}, script, kPatience);
+  const std::size_t begin = svg.find("<svg");
+  if (begin == std::string::npos) throw std::runtime_error("gnuplot failed: it drew no SVG");
+  return svg.substr(begin);
+}
+
+std::string placed(double left, double bottom, double width, double height) {
+  return fmt::format(
+      "set lmargin at screen {:.5f}\nset rmargin at screen {:.5f}\n"
+      "set bmargin at screen {:.5f}\nset tmargin at screen {:.5f}\n",
+      left, left + width, bottom, bottom + height);
+}
+
+}  // namespace
+
+std::string scatter_svg(const Analysis& analysis, PlotSize size) {
+  std::string script = terminal(size) + "set multiplot\n";
+  const double cell_width = 1.0 / 3;
+  const double cell_height = 1.0 / 2;
+  const double left = 26.0 / size.width;
+  const double below = 16.0 / size.height;
+  for (int axis = 0; axis < 6; ++axis) {
+    script += placed(axis % 3 * cell_width + left, (1 - axis / 3) * cell_height + below,
+                     cell_width - left - 4.0 / size.width, cell_height - below - 5.0 / size.height);
+    script += drawable(analysis, axis) ? scatter_panel(analysis, axis)
+                                       : named(axis, "0.04,0.93", "0.04,0.80") +
+                                             "unset xtics\nset xrange [0:1]\n" + empty_panel();
+    script += kForgetLabels;
+  }
+  return draw(script + "unset multiplot\n");
+}
+
+std::string traces_svg(const Analysis& analysis, PlotSize size) {
+  const Eigen::VectorXd time = running_time(analysis);
+  std::string script = terminal(size) + time_axis(time) + "set format x ''\nset multiplot\n";
+  const double below = 15.0 / size.height;
+  const double left = 54.0 / size.width;
+  const double width = 1 - left - 8.0 / size.width;
+  const double cell = (1 - below) / 6;
+  const std::string beside = fmt::format("{:.4f}", -52.0 / size.width / width);
+  for (int axis = 0; axis < 6; ++axis) {
+    script += placed(left, below + (5 - axis) * cell + 1.5 / size.height, width,
+                     cell - 5.0 / size.height);
+    script += named(axis, (beside + ",0.74").c_str(), (beside + ",0.26").c_str());
+    if (axis == 5) script += "set format x '%g'\n";
+    script += drawable(analysis, axis) ? trace_panel(analysis, time, axis) : empty_panel();
+    script += kForgetLabels;
+  }
+  return draw(script + "unset multiplot\n");
+}
+
+}  // namespace tagwrench

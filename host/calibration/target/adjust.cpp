@@ -1,0 +1,381 @@
+#include "host/calibration/target/adjust.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "host/calibration/target/derivatives.h"
+#include "host/calibration/target/normal.h"
+#include "host/calibration/target/print.h"
+#include "host/core/algebra/decompositions.h"
+#include "host/core/robust_statistics.h"
+#include "host/tracker/rotation.h"
+
+namespace tagwrench {
+namespace {
+
+/// Half length of the profiles: short, for the paper's edge beyond the white margin comes near when
+/// a tag leans away, and its blur would pull at the outer edges.
+constexpr double kHalf_px = 3.5;
+constexpr int kMostIterations = 12;
+constexpr double kStillPosition = 3e-8;  // m; a step of the tags below these is the end
+constexpr double kStillRotation = 1e-5;  // rad
+constexpr double kStillFocal = 1e-5;     // of the ratio
+constexpr double kLargestFocalStep = 0.03;
+
+constexpr double kTukey = 4.685;  // Holland and Welsch 1977
+constexpr double kLeastNoise_px = 0.01;
+constexpr double kLeastNoisePart = 0.5;  // of a point, to the median of all
+constexpr int kFewSeen = 8;              // frames that show too little of a point's noise
+constexpr double kRestFloor_px = 0.01;   // the averaged rest image has errors that do not average
+/// What keeps the offsets of all frames together from being better than this, however many there
+/// are: shading, change of blur.
+constexpr double kModel_px = 0.004;
+/// And the same for the focal length, as a part of it.
+constexpr double kFocalModel = 0.002;
+/// And the read-out time: a picture's velocity is the mean over two steps.
+constexpr double kReadoutModel = 0.3e-3;    // s
+constexpr double kReadoutPrior = 30e-3;     // s, a rolling shutter's
+constexpr double kSpreadPrior = 50e-6;      // m
+constexpr double kLeastContrastPart = 0.3;  // of the tag's median, for a point to be used
+
+double tukey(double offset, double sigma) {
+  const double q = offset / (kTukey * sigma);
+  return q * q < 1 ? (1 - q * q) * (1 - q * q) : 0;
+}
+
+CameraModel with_focal(CameraModel camera, double ratio) {
+  camera.fx_px *= ratio;
+  camera.fy_px *= ratio;
+  return camera;
+}
+
+struct Observation {
+  bool valid = false;
+  double by_readout = 0;  // px/s
+  double offset = 0;      // px, true to scale
+  EdgeDerivatives by;
+};
+
+}  // namespace
+
+struct TargetAdjuster::Problem {
+  // What moves while iterating.
+  struct State {
+    std::vector<Eigen::Isometry3d> camera_T_tag;
+    std::vector<double> spread;
+    Eigen::VectorXd shift;  // of each point, toward white, m
+    std::vector<Eigen::Isometry3d> poses;
+    double readout = 0;  // s
+    double focal_ratio = 1;
+  };
+
+  explicit Problem(TargetAtRest given) : rest(std::move(given)) {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (const Eigen::Isometry3d& pose : rest.camera_T_tag) centre += pose.translation();
+    rest_pose.translation() = centre / static_cast<double>(rest.camera_T_tag.size());
+    for (const TagPattern& pattern : rest.patterns) {
+      printed.push_back(make_edge_tag(pattern, Eigen::Isometry3d::Identity()));
+    }
+    keep_visible();
+  }
+
+  PixelView<float> rest_view() const {
+    return {rest.image.level.data(), rest.image.width, rest.image.height, rest.image.width};
+  }
+
+  void keep_visible();
+  EdgeTag edges(const State& state, std::size_t tag) const;
+  template <class Pixel>
+  void observe(const EdgeMeter& meter, const PixelView<Pixel>& image, const State& state,
+               const Eigen::Isometry3d& pose, const Eigen::VectorXd& late,
+               std::vector<Observation>& out) const;
+  Eigen::VectorXd lateness(const std::vector<Observation>& seen, double readout) const;
+  void observe_all(const std::vector<Keyframe>& frames, const State& state);
+  void learn_noise();
+  TargetNormal equations(const State& state, bool at_rest_only) const;
+  bool iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal);
+
+  TargetAtRest rest;
+  Eigen::Isometry3d rest_pose = Eigen::Isometry3d::Identity();
+  std::vector<EdgeTag> printed;
+  std::vector<Eigen::Index> first;  // point of each tag, and the end
+  Eigen::Index points = 0;
+
+  std::vector<Observation> at_rest;              // of each point
+  std::vector<std::vector<Observation>> moving;  // of each keyframe and point
+  Eigen::VectorXd noise_px;                      // of each point in one keyframe
+  PrintScatter scatter;
+};
+
+/// Leaves out the points that have no clear edge in the rest image.
+void TargetAdjuster::Problem::keep_visible() {
+  const EdgeMeter meter(rest.camera);
+  first.assign(1, 0);
+  for (std::size_t t = 0; t < printed.size(); ++t) {
+    EdgeTag& tag = printed[t];
+    tag.platform_T_tag = rest_pose.inverse() * rest.camera_T_tag[t];
+    std::vector<EdgeMeasurement> seen(tag.points.size());
+    meter.measure(rest_view(), tag, rest_pose, kHalf_px, false, seen);
+    std::vector<double> contrasts;
+    for (const EdgeMeasurement& m : seen) {
+      if (m.valid) contrasts.push_back(m.contrast);
+    }
+    const double least = kLeastContrastPart * median(contrasts);
+    std::vector<EdgePoint> kept;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (!seen[i].valid || seen[i].contrast < least) continue;
+      kept.push_back(tag.points[i]);
+      kept.back().contrast = static_cast<float>(seen[i].contrast);
+    }
+    tag.points = std::move(kept);
+    first.push_back(first.back() + static_cast<Eigen::Index>(tag.points.size()));
+  }
+  points = first.back();
+}
+
+EdgeTag TargetAdjuster::Problem::edges(const State& state, std::size_t tag) const {
+  EdgeTag out = printed[tag];
+  out.platform_T_tag = rest_pose.inverse() * state.camera_T_tag[tag];
+  for (std::size_t i = 0; i < out.points.size(); ++i) {
+    out.points[i] = shifted(out.points[i], state.shift[first[tag] + static_cast<Eigen::Index>(i)]);
+  }
+  return out;
+}
+
+/// How far (m, along its normal) the rolling shutter shows each point off its place.
+Eigen::VectorXd TargetAdjuster::Problem::lateness(const std::vector<Observation>& seen,
+                                                  double readout) const {
+  Eigen::VectorXd late = Eigen::VectorXd::Zero(points);
+  for (std::size_t p = 0; p < seen.size(); ++p) {
+    if (seen[p].valid)
+      late[static_cast<Eigen::Index>(p)] = seen[p].by_readout * readout / seen[p].by.normal;
+  }
+  return late;
+}
+
+/// Profiles are taken `late` off the points' places, and offsets count from there.
+template <class Pixel>
+void TargetAdjuster::Problem::observe(const EdgeMeter& meter, const PixelView<Pixel>& image,
+                                      const State& state, const Eigen::Isometry3d& pose,
+                                      const Eigen::VectorXd& late,
+                                      std::vector<Observation>& out) const {
+  out.assign(static_cast<std::size_t>(points), {});
+  for (std::size_t t = 0; t < printed.size(); ++t) {
+    EdgeTag tag = edges(state, t);
+    for (std::size_t i = 0; i < tag.points.size(); ++i)
+      tag.points[i] = shifted(tag.points[i], late[first[t] + static_cast<Eigen::Index>(i)]);
+    std::vector<EdgeMeasurement> measured(tag.points.size());
+    meter.measure(image, tag, pose, kHalf_px, false, measured);
+    std::vector<double> gains;
+    for (const EdgeMeasurement& m : measured) {
+      if (m.valid) gains.push_back(m.gain);
+    }
+    const double gain = std::clamp(median(gains), 0.3, 1.3);
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      if (!measured[i].valid) continue;
+      Observation& seen = out[static_cast<std::size_t>(first[t]) + i];
+      seen.valid = true;
+      seen.by = edge_derivatives(meter.camera(), measured[i], pose, rest_pose,
+                                 state.camera_T_tag[t], {tag.points[i].x, tag.points[i].y, 0});
+      seen.offset = measured[i].offset_px / gain;
+    }
+  }
+}
+
+void TargetAdjuster::Problem::observe_all(const std::vector<Keyframe>& frames, const State& state) {
+  observe(EdgeMeter(with_focal(rest.camera, state.focal_ratio)), rest_view(), state, rest_pose,
+          Eigen::VectorXd::Zero(points), at_rest);
+  moving.resize(frames.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const Keyframe& frame = frames[k];
+    // Profiles are short: an edge that is far from where it is looked for is found too near.
+    const Eigen::VectorXd late = lateness(moving[k], state.readout);
+    observe(EdgeMeter(with_focal(frame.camera, state.focal_ratio)), frame.view(), state,
+            state.poses[k], late, moving[k]);
+    // A row is read before or after the middle one, by its part of the read-out time.
+    const double middle = 0.5 * (frame.image_rows - 1) - frame.first_row;
+    for (std::size_t p = 0; p < moving[k].size(); ++p) {
+      Observation& seen = moving[k][p];
+      seen.by_readout =
+          seen.by.frame.dot(frame.velocity) * (seen.by.row_px - middle) / frame.image_rows;
+      seen.offset +=
+          late[static_cast<Eigen::Index>(p)] * seen.by.normal - seen.by_readout * state.readout;
+    }
+  }
+}
+
+/// Of each point, from its own offsets in all keyframes: points differ in contrast and in the
+/// length of their profiles.
+void TargetAdjuster::Problem::learn_noise() {
+  noise_px = Eigen::VectorXd::Zero(points);
+  std::vector<double> all;
+  std::vector<double> offsets;
+  for (Eigen::Index p = 0; p < points; ++p) {
+    offsets.clear();
+    for (const auto& frame : moving) {
+      const Observation& seen = frame[static_cast<std::size_t>(p)];
+      if (seen.valid) offsets.push_back(std::abs(seen.offset));
+    }
+    if (offsets.size() < kFewSeen) continue;
+    noise_px[p] = kMadToSigma * median(offsets);
+    all.push_back(noise_px[p]);
+  }
+  const double typical = std::max(kLeastNoise_px, median(all));
+  for (double& noise : noise_px) {
+    noise = noise > 0 ? std::max(noise, kLeastNoisePart * typical) : typical;
+  }
+}
+
+TargetNormal TargetAdjuster::Problem::equations(const State& state, bool at_rest_only) const {
+  const int frames = at_rest_only ? 0 : static_cast<int>(moving.size());
+  TargetNormal normal(frames, static_cast<int>(printed.size()), points);
+  normal.add_readout(-state.readout, 1 / (kReadoutPrior * kReadoutPrior));
+  for (std::size_t t = 0; t < printed.size(); ++t) {
+    const int tag = static_cast<int>(t);
+    normal.add_spread(tag, -state.spread[t], 1 / (kSpreadPrior * kSpreadPrior));
+    for (Eigen::Index p = first[t]; p < first[t + 1]; ++p) {
+      const double off_print = state.shift[p] - state.spread[t];
+      const double print =
+          tukey(off_print, scatter.robust) / (scatter.effective * scatter.effective);
+      // A point off the print tells nothing of the scale, but still of the motion.
+      normal.add_print(p, tag, -off_print, std::max(print, 1 / (kSpreadPrior * kSpreadPrior)));
+      EdgeEquation equation;
+      equation.tag = tag;
+      equation.point = p;
+      const double variance = noise_px[p] * noise_px[p];
+      const auto add = [&](const Observation& seen, int frame, double weight) {
+        if (!seen.valid || !(weight > 0)) return;
+        equation.frame = frame;
+        equation.by_frame = seen.by.frame;
+        equation.by_tag = seen.by.tag;
+        equation.by_normal = seen.by.normal;
+        equation.by_readout = seen.by_readout;
+        equation.by_focal = seen.by.focal;
+        equation.offset = seen.offset;
+        equation.weight = weight;
+        normal.add(equation);
+      };
+      add(at_rest[static_cast<std::size_t>(p)], -1,
+          1 / (variance / std::max(1, rest.image.frames) + kRestFloor_px * kRestFloor_px));
+      for (int k = 0; k < frames; ++k) {
+        const Observation& seen = moving[static_cast<std::size_t>(k)][static_cast<std::size_t>(p)];
+        add(seen, k, tukey(seen.offset, noise_px[p]) / (variance + frames * kModel_px * kModel_px));
+      }
+    }
+  }
+  return normal;
+}
+
+/// One step; true once it is so small that another would change nothing. Throws nothing; a step
+/// without a solution leaves NaN in the state.
+bool TargetAdjuster::Problem::iterate(const std::vector<Keyframe>& frames, State& state,
+                                      bool free_focal) {
+  observe_all(frames, state);
+  learn_noise();
+  scatter = print_scatter(printed, first, state.shift, state.spread);
+  TargetNormal normal = equations(state, false);
+  const Eigen::VectorXd shared =
+      normal.reduce() ? normal.shared_step(free_focal) : Eigen::VectorXd();
+  if (shared.size() == 0) {
+    state.focal_ratio = std::nan("");
+    return true;
+  }
+  const Eigen::VectorXd moved_frames = normal.frame_steps(shared);
+  state.shift += normal.point_steps(shared, moved_frames);
+  for (std::size_t k = 0; k < state.poses.size(); ++k) {
+    state.poses[k] =
+        moved(state.poses[k], moved_frames.segment<6>(6 * static_cast<Eigen::Index>(k)));
+    renormalise(state.poses[k]);
+  }
+  bool still = true;
+  for (std::size_t t = 0; t < state.camera_T_tag.size(); ++t) {
+    const Vector6 step = shared.segment<6>(6 * static_cast<Eigen::Index>(t));
+    state.camera_T_tag[t] = moved(state.camera_T_tag[t], step);
+    renormalise(state.camera_T_tag[t]);
+    state.spread[t] += shared[normal.spread_index(static_cast<int>(t))];
+    still =
+        still && step.head<3>().norm() < kStillPosition && step.tail<3>().norm() < kStillRotation;
+  }
+  state.readout += shared[normal.readout_index()];
+  const double zoom =
+      std::clamp(shared[normal.focal_index()], -kLargestFocalStep, kLargestFocalStep);
+  state.focal_ratio *= std::exp(zoom);
+  return still && std::abs(zoom) < kStillFocal;
+}
+
+TargetAdjuster::TargetAdjuster(TargetAtRest rest)
+    : problem_(std::make_unique<Problem>(std::move(rest))) {}
+
+TargetAdjuster::~TargetAdjuster() = default;
+
+TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
+                                      const std::function<bool(double)>& progress) {
+  Problem& problem = *problem_;
+  Problem::State state;
+  state.camera_T_tag = problem.rest.camera_T_tag;
+  state.spread.assign(state.camera_T_tag.size(), 0.0);
+  state.shift = Eigen::VectorXd::Zero(problem.points);
+  for (const Keyframe& frame : frames)
+    state.poses.push_back(moved(problem.rest_pose, frame.displacement));
+
+  int steps = 0;
+  const auto settle = [&](Problem::State& from, bool free_focal) {
+    for (int i = 0; i < kMostIterations; ++i) {
+      const bool still = problem.iterate(frames, from, free_focal);
+      if (progress && !progress(++steps / (2.0 * kMostIterations))) return false;
+      if (still) break;
+    }
+    return std::isfinite(from.focal_ratio);
+  };
+  TargetEstimate estimate;
+  estimate.points = static_cast<int>(problem.points);
+  Problem::State zoomed;
+  if (!settle(state, false)) return estimate;
+  zoomed = state;
+  if (!settle(zoomed, true)) return estimate;
+  estimate.focal_ratio = zoomed.focal_ratio;
+
+  problem.observe_all(frames, state);
+  problem.learn_noise();
+  TargetNormal normal = problem.equations(state, false);
+  TargetNormal alone = problem.equations(state, true);
+  if (!normal.reduce() || !alone.reduce()) return estimate;
+  const Eigen::Index all = normal.shared_count() - 1;  // without the focal length
+  const auto tags = static_cast<Eigen::Index>(6 * state.camera_T_tag.size());
+  const auto inverse = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
+    return Ldlt<Eigen::Dynamic>(information).inverse();
+  };
+  const Eigen::MatrixXd covariance = inverse(normal.information().topLeftCorner(all, all));
+  estimate.covariance = covariance.topLeftCorner(tags, tags);
+  estimate.covariance_at_rest =
+      inverse(alone.information().topLeftCorner(all, all)).topLeftCorner(tags, tags);
+  estimate.focal_sigma =
+      std::hypot(kFocalModel, std::sqrt(inverse(normal.information())(all, all)));
+  estimate.readout = state.readout;
+  const Eigen::Index readout = normal.readout_index();
+  const double readout_noise = std::sqrt(covariance(readout, readout));
+  estimate.readout_sigma = std::hypot(kReadoutModel, readout_noise);
+  estimate.camera_T_tag = state.camera_T_tag;
+  estimate.ink_spread = state.spread;
+  estimate.print_scatter = problem.scatter.robust;
+  std::vector<double> noise(problem.noise_px.begin(), problem.noise_px.end());
+  estimate.noise_px = median(noise);
+  double squares = 0;
+  double count = 0;
+  for (const auto& frame : problem.moving) {
+    for (const Observation& seen : frame) {
+      if (!seen.valid) continue;
+      squares += seen.offset * seen.offset;
+      count += 1;
+    }
+  }
+  estimate.residual_px = std::sqrt(squares / std::max(1.0, count));
+  // What one parameter takes off a sum of squared normalised residuals, in a linear fit.
+  estimate.readout_gain = std::pow(estimate.readout / readout_noise, 2) / std::max(1.0, count);
+  estimate.solved = estimate.covariance.allFinite() && estimate.covariance_at_rest.allFinite() &&
+                    std::isfinite(estimate.focal_sigma);
+  return estimate;
+}
+
+}  // namespace tagwrench

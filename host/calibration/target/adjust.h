@@ -1,0 +1,75 @@
+// Bundle adjustment of the tags' placement: where each tag sits at rest, from the rest image and
+// pictures of the target in motion.
+//
+// Unknowns  camera_T_tag at rest for each tag; one ink spread for each tag; for every edge point
+//           how far its edge lies off the printed pattern (along its normal, in the tag's plane);
+//           the displacement in every keyframe; the time that the camera takes from its first
+//           row to its last, while the target moves on; the focal length's error, if asked.
+// Data      the offsets of all edge points in the rest image and in all keyframes, px.
+// Prior     the edges lie about the pattern grown by the ink spread, with a scatter that is
+//           estimated. It gives the scale, and all that the rest image can tell about the planes;
+//           the rest comes from parallax, which knows nothing of the print.
+//
+// Gauss-Newton. The points, one number each, are eliminated first, then the keyframes, six numbers
+// each (Schur complements), which leaves the few numbers that are wanted and their information
+// matrix. Compare Triggs et al., "Bundle adjustment - a modern synthesis", 2000, sections 6 and 9.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host/calibration/target/keyframes.h"
+#include "host/tracker/target.h"
+
+namespace tagwrench {
+
+/// What is known before the motion, and what after it, of the same parameters.
+struct TargetEstimate {
+  std::vector<Eigen::Isometry3d> camera_T_tag;  ///< at rest
+  std::vector<double> ink_spread;               ///< of each tag, m
+  /// Of all tags' motions at rest (6 numbers each: m, rad, camera axes), the focal length taken as
+  /// given.
+  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd covariance_at_rest;  ///< the same from the rest image alone
+  double readout = 0;                  ///< from the first row to the last, s
+  double readout_sigma = 0;            ///< s
+  /// By how much of an edge's variance the fit would be worse without the read-out time.
+  double readout_gain = 0;
+  double focal_ratio = 1;    ///< that fits best, to the camera's
+  double focal_sigma = 0;    ///< of the ratio
+  double noise_px = 0;       ///< of one edge in one keyframe
+  double residual_px = 0;    ///< RMS over all edges of all keyframes, outliers included
+  double print_scatter = 0;  ///< of the edges about the pattern, m
+  int points = 0;            ///< edge points in use
+  bool solved = false;       ///< false: the equations had no solution
+};
+
+/// The rest image and where the tags are in it, nearly right.
+struct TargetAtRest {
+  CameraModel camera;
+  RestImage image;
+  std::vector<TagPattern> patterns;
+  std::vector<Eigen::Isometry3d> camera_T_tag;
+};
+
+class TargetAdjuster {
+ public:
+  explicit TargetAdjuster(TargetAtRest rest);
+  ~TargetAdjuster();
+  TargetAdjuster(const TargetAdjuster&) = delete;
+  TargetAdjuster& operator=(const TargetAdjuster&) = delete;
+
+  /// `frames` carry displacements of the platform whose origin at rest is the midpoint of the given
+  /// tag centres. `progress` is told the share that is done, 0..1; false from it gives up (not
+  /// solved).
+  TargetEstimate adjust(const std::vector<Keyframe>& frames,
+                        const std::function<bool(double)>& progress = {});
+
+ private:
+  struct Problem;
+  std::unique_ptr<Problem> problem_;
+};
+
+}  // namespace tagwrench

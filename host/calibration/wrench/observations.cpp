@@ -1,0 +1,343 @@
+#include "host/calibration/wrench/observations.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "host/calibration/wrench/baseline.h"
+#include "host/calibration/wrench/load.h"
+#include "host/core/algebra/decompositions.h"
+#include "host/core/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr std::size_t kMostFrames = 1500;  // of pushes and movements in a fit
+// A hand leans and sways at half a hertz or so: what is closer together than this is off alike, and
+// would be taken for more than it is.
+constexpr double kPushEvery = 1.0;  // s
+// One lag is sought for all axes, but each mode of the platform follows its load at a delay of its
+// own, 2 zeta / omega: with a twentieth of critical damping 0.2 ms at 90 Hz, 1 ms at 15 Hz.
+constexpr double kAxisLag = 1e-3;    // s
+constexpr double kNoRelation = 0.3;  // mean R^2
+constexpr const char* kFeatures[] = {"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
+
+/// Rows of a trial as they come.
+struct Rows {
+  std::vector<double> time;
+  std::vector<Vector6> value, sigma;
+  std::vector<int> step;
+
+  void add(double t, const Vector6& v, const Vector6& s, int of_step) {
+    if (!time.empty() && t <= time.back()) return;  // a rest that is both last and first
+    time.push_back(t);
+    value.push_back(v);
+    sigma.push_back(s);
+    step.push_back(of_step);
+  }
+  static Eigen::MatrixXd matrix(const std::vector<Vector6>& rows) {
+    Eigen::MatrixXd m(static_cast<Eigen::Index>(rows.size()), 6);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      m.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
+    return m;
+  }
+  static Eigen::VectorXd vector(const std::vector<double>& v) {
+    return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
+  }
+};
+
+class Collector {
+ public:
+  Collector(const WrenchPlan& plan, const std::vector<StepRecord>& records, double gain_sigma)
+      : plan_(plan), records_(records), gain_sigma_(gain_sigma) {
+    for (const StepRecord& record : records)
+      baselines_.try_emplace(record.zero, plan, records, record.zero);
+  }
+
+  WrenchData collect() {
+    find_lag();
+    const std::size_t stride = 1 + frames_of_movement() / kMostFrames;
+    for (const StepRecord& record : records_) {
+      const Baseline& baseline = baselines_.at(record.zero);
+      if (record.frames.empty() || baseline.empty()) continue;
+      for (const TrackedFrame& f : record.frames) data_.path.push_back({f.time, f.displacement});
+      if (is_hold(record))
+        add_hold(record, baseline);
+      else
+        add_movement(record, baseline, stride);
+    }
+    finish_trial();
+    const bool loads = std::any_of(data_.observations.begin(), data_.observations.end(),
+                                   [](const Observation& o) { return !o.wrench.isZero(); });
+    if (!loads) {
+      throw ConfigError(
+          "no step with a load was recorded, only rests; do the steps that were skipped");
+    }
+    data_.zero_in_use = records_.front().zero;
+    return std::move(data_);
+  }
+
+ private:
+  const PlanStep& step_of(const StepRecord& record) const {
+    return plan_.steps[static_cast<std::size_t>(record.step)];
+  }
+  bool is_hold(const StepRecord& record) const {
+    const StepKind kind = step_of(record).kind;
+    return kind == StepKind::rest || kind == StepKind::mass;
+  }
+  std::size_t frames_of_movement() const {
+    std::size_t n = 0;
+    for (const StepRecord& record : records_) n += is_hold(record) ? 0 : record.frames.size();
+    return n;
+  }
+
+  Observation begin(const StepRecord& record, double time) const {
+    Observation o;
+    o.time = time;
+    o.step = record.step;
+    o.zero = record.zero;
+    return o;
+  }
+
+  void add_hold(const StepRecord& record, const Baseline& baseline) {
+    const RecordMean mean = mean_of(record);
+    Observation o = begin(record, mean.time);
+    o.displacement = mean.displacement - baseline.drift(mean.time);
+    o.displacement_covariance = mean.covariance;
+    const bool mass = step_of(record).kind == StepKind::mass;
+    if (mass) {
+      o.displacement_covariance += baseline.drift_covariance(mean.time);
+      set_hanging(plan_, record.step, mean.displacement, o);
+    }
+    data_.observations.push_back(o);
+
+    for (const TrackedFrame& f : record.frames) add_reading(record.step, baseline, f);
+    if (plan_.reference != ReferenceKind::masses) {
+      for (const ReferenceSample& r : record.readings)
+        reference_.add(r.time, wrench_of(record, baseline, r), r.sigma, record.step);
+      return;
+    }
+    Vector6 sigma = Vector6::Zero();
+    if (mass) {
+      const KnownLoad known = expected_load(plan_, record.step);
+      sigma = known.covariance.diagonal().cwiseSqrt();
+    }
+    for (const TrackedFrame* f : {&record.frames.front(), &record.frames.back()})
+      reference_.add(f->time, o.wrench, sigma, record.step);
+  }
+
+  /// What a movement showed at a frame, or a push around one, and what the reference said then.
+  struct Said {
+    const TrackedFrame* frame;
+    Vector6 displacement;
+    Matrix6 covariance;
+    Vector6 value;   ///< counted from the rests
+    Vector6 change;  ///< of it, within kAxisLag
+    Vector6 noise;
+  };
+
+  /// What the reference says, counted from the rests: n x 6, at `times` of frames.
+  static Eigen::MatrixXd values_at(const StepRecord& record, const Baseline& baseline,
+                                   const Eigen::VectorXd& times, double lag) {
+    const Eigen::VectorXd read = reading_times(record);
+    Eigen::MatrixXd values(read.size(), 6);
+    for (Eigen::Index i = 0; i < read.size(); ++i) {
+      const ReferenceSample& r = record.readings[static_cast<std::size_t>(i)];
+      values.row(i) = (r.value - baseline.reading(r.time)).transpose();
+    }
+    return study::reference_at(times, lag, read, values, kLongestGap);
+  }
+
+  std::vector<Said> said_during(const StepRecord& record, const Baseline& baseline,
+                                std::size_t stride) const {
+    const Eigen::VectorXd times = frame_times(record);
+    const double lag = data_.lag.value;
+    const Eigen::MatrixXd values = values_at(record, baseline, times, lag);
+    const Eigen::MatrixXd changes = values_at(record, baseline, times, lag - kAxisLag / 2) -
+                                    values_at(record, baseline, times, lag + kAxisLag / 2);
+    const bool push = step_of(record).kind == StepKind::push;
+    const double reach = push ? kPushWindow : 0;
+    double next = times[0] + reach;
+    std::vector<Said> out;
+    for (Eigen::Index i = 0; i < times.size(); i += static_cast<Eigen::Index>(stride)) {
+      if (times[i] < next || times[i] + reach > times[times.size() - 1]) continue;
+      const Said said = said_around(record, i, reach, values, changes);
+      if (!said.value.allFinite() || !said.change.allFinite()) continue;
+      if (push) next = times[i] + kPushEvery;
+      out.push_back(said);
+    }
+    return out;
+  }
+
+  Said said_around(const StepRecord& record, Eigen::Index middle, double reach,
+                   const Eigen::MatrixXd& values, const Eigen::MatrixXd& changes) const {
+    const auto frame = [&](Eigen::Index i) -> const TrackedFrame& {
+      return record.frames[static_cast<std::size_t>(i)];
+    };
+    const double time = frame(middle).time;
+    Eigen::Index from = middle, to = middle + 1;
+    while (from > 0 && time - frame(from - 1).time < reach) --from;
+    while (to < values.rows() && frame(to).time - time < reach) ++to;
+    Eigen::VectorXd weight(to - from);
+    for (Eigen::Index i = from; i < to; ++i) {
+      const double off = i == middle ? 0 : (frame(i).time - time) / reach;
+      weight[i - from] = 0.5 + 0.5 * std::cos(std::numbers::pi * off);
+    }
+    weight /= weight.sum();
+    Said said{.frame = &frame(middle),
+              .displacement = Vector6::Zero(),
+              .covariance = Matrix6::Zero(),
+              .value = values.middleRows(from, to - from).transpose() * weight,
+              .change = changes.middleRows(from, to - from).transpose() * weight,
+              .noise = record.readings.front().sigma * weight.norm()};
+    for (Eigen::Index i = from; i < to; ++i) {
+      said.displacement += weight[i - from] * frame(i).displacement;
+      said.covariance += weight[i - from] * weight[i - from] * frame(i).covariance;
+    }
+    // What the lag may be off shifts the value along its slope.
+    const Vector6 slope = data_.lag.sigma / kAxisLag * said.change;
+    said.noise = (said.noise.cwiseAbs2() + slope.cwiseAbs2()).cwiseSqrt();
+    return said;
+  }
+
+  /// What the platform's own displacement says of the values: without noise and what is faster than
+  /// the springs follow, which an error that many observations share would otherwise explain.
+  static Eigen::MatrixXd smooth(const std::vector<Said>& said) {
+    const auto n = static_cast<Eigen::Index>(said.size());
+    Eigen::MatrixXd X(n, 7);
+    Eigen::MatrixXd V(n, 6);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Said& s = said[static_cast<std::size_t>(i)];
+      X.row(i) << s.displacement.transpose(), 1;
+      V.row(i) = s.value.transpose();
+    }
+    for (Eigen::Index c = 0; c < 6; ++c) X.col(c) /= std::max(X.col(c).norm(), 1e-12);
+    return X * least_squares(X, V).x;
+  }
+
+  void set_load(int step, const Vector6& value, const Vector6& noise, const Vector6& displacement,
+                Observation& o) const {
+    if (plan_.reference == ReferenceKind::load_cell)
+      set_push(plan_, step, {value[0], noise[0], gain_sigma_}, displacement, o);
+    else
+      set_six_axis(plan_, value, noise, o);
+  }
+
+  void add_movement(const StepRecord& record, const Baseline& baseline, std::size_t stride) {
+    for (const ReferenceSample& r : record.readings)
+      reference_.add(r.time, wrench_of(record, baseline, r), r.sigma, record.step);
+    for (const TrackedFrame& f : record.frames) add_reading(record.step, baseline, f);
+    const std::vector<Said> said = said_during(record, baseline, stride);
+    const Eigen::MatrixXd smoothed = smooth(said);
+    for (std::size_t i = 0; i < said.size(); ++i) {
+      const Said& s = said[i];
+      Observation o = begin(record, s.frame->time);
+      o.displacement = s.displacement - baseline.drift(s.frame->time);
+      o.displacement_covariance = s.covariance;
+      set_load(record.step, s.value, s.noise, s.displacement, o);
+      Observation change;
+      set_load(record.step, s.change, s.noise, s.displacement, change);
+      o.wrench_covariance.diagonal() += change.wrench.cwiseAbs2();
+      Observation shared;
+      set_load(record.step, smoothed.row(static_cast<Eigen::Index>(i)).transpose(), s.noise,
+               s.displacement, shared);
+      o.common = std::move(shared.common);
+      o.products = std::move(shared.products);
+      data_.observations.push_back(std::move(o));
+    }
+  }
+
+  void add_reading(int step, const Baseline& baseline, const TrackedFrame& f) {
+    readings_.add(f.time, f.displacement - baseline.drift(f.time) - baseline.displacement(),
+                  f.covariance.diagonal().cwiseSqrt(), step);
+  }
+
+  /// What a reading stands for, about the platform origin at rest.
+  Vector6 wrench_of(const StepRecord& record, const Baseline& baseline,
+                    const ReferenceSample& r) const {
+    const Vector6 value = r.value - baseline.reading(r.time);
+    if (plan_.reference == ReferenceKind::six_axis) return six_axis_wrench(plan_, value);
+    if (step_of(record).kind != StepKind::push) return Vector6::Zero();
+    const auto frame =
+        std::lower_bound(record.frames.begin(), record.frames.end(), r.time + data_.lag.value,
+                         [](const TrackedFrame& f, double t) { return f.time < t; });
+    const TrackedFrame& at = frame == record.frames.end() ? record.frames.back() : *frame;
+    Observation o;
+    set_push(plan_, record.step, {value[0], 0, 0}, at.displacement, o);
+    return o.wrench;
+  }
+
+  static Eigen::VectorXd frame_times(const StepRecord& record) {
+    Eigen::VectorXd t(static_cast<Eigen::Index>(record.frames.size()));
+    for (Eigen::Index i = 0; i < t.size(); ++i)
+      t[i] = record.frames[static_cast<std::size_t>(i)].time;
+    return t;
+  }
+  static Eigen::VectorXd reading_times(const StepRecord& record) {
+    Eigen::VectorXd t(static_cast<Eigen::Index>(record.readings.size()));
+    for (Eigen::Index i = 0; i < t.size(); ++i)
+      t[i] = record.readings[static_cast<std::size_t>(i)].time;
+    return t;
+  }
+
+  void find_lag() {
+    std::vector<study::Stretch> stretches;
+    for (const StepRecord& record : records_) {
+      const Baseline& baseline = baselines_.at(record.zero);
+      if (is_hold(record) || record.frames.empty() || baseline.empty()) continue;
+      study::Stretch s;
+      s.time = frame_times(record);
+      s.features.resize(s.time.size(), 6);
+      for (Eigen::Index i = 0; i < s.time.size(); ++i)
+        s.features.row(i) = record.frames[static_cast<std::size_t>(i)].displacement.transpose();
+      s.reference_time = reading_times(record);
+      s.reference.resize(s.reference_time.size(), 6);
+      for (Eigen::Index i = 0; i < s.reference_time.size(); ++i)
+        s.reference.row(i) =
+            wrench_of(record, baseline, record.readings[static_cast<std::size_t>(i)]).transpose();
+      stretches.push_back(std::move(s));
+    }
+    if (stretches.empty()) return;
+    data_.lag = study::estimate_lag(stretches);
+    if (data_.lag.known && data_.lag.explained >= kNoRelation) return;
+    throw ConfigError(
+        "what the reference said has nothing to do with how the platform moved, at no lag; is it "
+        "the instrument that this sensor was pushed with, and on the same clock?");
+  }
+
+  void finish_trial() {
+    study::Trial& trial = data_.trial;
+    trial.name = plan_.name;
+    trial.time = Rows::vector(readings_.time);
+    trial.features = Rows::matrix(readings_.value);
+    trial.feature_sigma = Rows::matrix(readings_.sigma);
+    trial.feature_names.assign(std::begin(kFeatures), std::end(kFeatures));
+    trial.step = Eigen::Map<const Eigen::VectorXi>(
+        readings_.step.data(), static_cast<Eigen::Index>(readings_.step.size()));
+    trial.reference_time = Rows::vector(reference_.time);
+    trial.reference = Rows::matrix(reference_.value);
+    trial.reference_sigma = Rows::matrix(reference_.sigma);
+    trial.held = plan_.reference == ReferenceKind::masses;
+  }
+
+  const WrenchPlan& plan_;
+  const std::vector<StepRecord>& records_;
+  double gain_sigma_;
+  std::map<int, Baseline> baselines_;
+  Rows readings_;
+  Rows reference_;
+  WrenchData data_;
+};
+
+}  // namespace
+
+WrenchData collect(const WrenchPlan& plan, const std::vector<StepRecord>& records,
+                   double cell_gain_sigma) {
+  if (records.empty()) throw ConfigError("nothing was recorded; do at least one step with a load");
+  return Collector(plan, records, cell_gain_sigma).collect();
+}
+
+}  // namespace tagwrench

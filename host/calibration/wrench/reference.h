@@ -1,0 +1,41 @@
+// The instrument that tells the load during a calibration: a load cell, a six-axis sensor, or the
+// simulated ones.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "host/core/types.h"
+
+namespace tagwrench {
+
+struct ReferenceReading {
+  TimePoint time{};
+  Duration time_sigma{};
+  std::array<double, 6> value{};  ///< N of one axis; or N and N m of six, the reference's own axes
+  std::array<double, 6> sigma{};  ///< one standard deviation of the noise, steps included
+  std::uint8_t axes = 0;          ///< 1 or 6
+  bool saturated = false;
+};
+
+class Reference {
+ public:
+  Reference() = default;
+  Reference(const Reference&) = delete;
+  Reference& operator=(const Reference&) = delete;
+  virtual ~Reference() = default;
+
+  /// Readable when service() has something to do; -1: call it with every frame.
+  virtual int poll_fd() const noexcept = 0;
+  virtual void service() noexcept = 0;
+  /// Takes the next reading; false if there is none yet.
+  virtual bool next(ReferenceReading& reading) noexcept = 0;
+  /// Relative standard deviation of its calibration, common to all readings.
+  virtual double gain_sigma() const noexcept { return 0; }
+  /// One line for people: what it is.
+  virtual std::string description() const = 0;
+  /// One line about what has gone wrong since the last call (silent, unplugged); empty if nothing.
+  virtual std::string trouble() = 0;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,377 @@
+#include "host/commands/calibrate_camera_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "host/app/input.h"
+#include "host/calibration/camera/collector.h"
+#include "host/calibration/print/board_spec.h"
+#include "host/commands/events.h"
+#include "host/commands/exit_status.h"
+#include "host/commands/today.h"
+#include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
+#include "host/core/os/termination.h"
+#include "host/core/tell.h"
+#include "host/sensor/sensor_edit.h"
+#include "host/source/images.h"
+
+namespace tagwrench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kViewsFromCamera = 20;
+constexpr int kViewsFromFolders = 60;
+constexpr Duration kSayEvery = std::chrono::seconds(2);
+constexpr double kGuessedFocal = 1.25;  // of the image's width
+
+/// The sensor.yaml that is edited, and where the result goes.
+struct Record {
+  std::string text;
+  std::string target;
+  SensorConfig sensor;
+  bool known = false;  ///< there was a --sensor; else the sensor is the paper's
+};
+
+SectionEdit camera_section(const CameraModel& camera, const CameraFit& fit) {
+  const auto& [k1, k2, p1, p2, k3] = camera.distortion;
+  return {
+      "camera",
+      {{"width", fmt::format("{}", camera.width_px)},
+       {"height", fmt::format("{}", camera.height_px)},
+       {"fx", fmt::format("{:.3f}", camera.fx_px)},
+       {"fy", fmt::format("{:.3f}", camera.fy_px)},
+       {"cx", fmt::format("{:.3f}", camera.cx_px)},
+       {"cy", fmt::format("{:.3f}", camera.cy_px)},
+       {"distortion", fmt::format("[{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]", k1, k2, p1, p2, k3)},
+       {"mirrored", fmt::format("{}", camera.mirrored)},
+       {"calibrated",
+        fmt::format("{{date: {}, views: {}, rms_px: {:.4f}}}", today(), fit.used, fit.rms_px)}}};
+}
+
+Record open_record(const CalibrateCameraOptions& options) {
+  Record record;
+  record.known = !options.sensor.empty();
+  record.target = options.out.empty() ? options.sensor : options.out;
+  if (record.target.empty()) {
+    throw ConfigError(
+        "calibrate camera: no file to write; name the sensor.yaml to edit with --sensor, or a new "
+        "one with --out");
+  }
+  if (record.known) {
+    record.text = read_text(options.sensor);
+    record.sensor = load_sensor(options.sensor, WrenchCalibration::ignore);
+  } else {
+    const std::string paper = paper_sensor_yaml();
+    record.text =
+        "# The camera is measured; target and springs are the paper's: change what differs.\n" +
+        paper.substr(paper.find('\n') + 1);
+    record.sensor = parse_sensor(record.text, "the built-in sensor");
+  }
+  std::error_code error;
+  if (!record.known && std::filesystem::is_regular_file(record.target, error)) {
+    throw ConfigError(fmt::format(
+        "{}: is there already, and --out makes a whole new sensor.yaml; write the camera into it "
+        "with --sensor {}, or name a new file",
+        record.target, record.target));
+  }
+  check_replaceable(record.target);
+  check_editable(record.text, {camera_section(record.sensor.camera, {})},
+                 record.known ? options.sensor : record.target);
+  return record;
+}
+
+/// The camera as known so far, for frames of this size.
+CameraModel camera_for(const Record& record, const SourceFormat& format) {
+  CameraModel camera = record.sensor.camera;
+  if (record.known) {
+    if (camera.width_px == format.width && camera.height_px == format.height) return camera;
+    throw ConfigError(fmt::format(
+        "{}: frames are {}x{}, but sensor.yaml's camera is {}x{}; ask the camera for that size, or "
+        "set width and height in sensor.yaml",
+        format.description, format.width, format.height, camera.width_px, camera.height_px));
+  }
+  camera = {};
+  camera.width_px = format.width;
+  camera.height_px = format.height;
+  camera.fx_px = camera.fy_px = kGuessedFocal * format.width;
+  return camera;
+}
+
+/// Every picture of the folders; nothing if stopped by a signal.
+std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& options,
+                                               const std::vector<std::string>& folders,
+                                               const BoardSpec& board, const Record& record) {
+  std::vector<std::unique_ptr<ImagesSource>> sources;
+  std::size_t all = 0;
+  for (const std::string& folder : folders) {
+    sources.push_back(std::make_unique<ImagesSource>(folder, true));
+    all += sources.back()->count();
+    const SourceFormat& first = sources.front()->format();
+    const SourceFormat& format = sources.back()->format();
+    if (format.width != first.width || format.height != first.height) {
+      throw ConfigError(fmt::format(
+          "{}: its pictures are {}x{}, those of {} are {}x{}; give pictures of one camera and size",
+          folder, format.width, format.height, folders.front(), first.width, first.height));
+    }
+  }
+  auto collector =
+      std::make_unique<ViewCollector>(board, camera_for(record, sources.front()->format()), false);
+  std::size_t seen = 0;
+  TimePoint said = Clock::now();
+  for (const auto& source : sources) {
+    for (Frame frame;;) {
+      if (termination_requested()) return nullptr;
+      const ReadStatus status = source->read(frame);
+      if (status == ReadStatus::end) break;
+      ++seen;
+      if (status == ReadStatus::frame)
+        collector->look(frame.image, source->path_of(frame.sequence));
+      if (Clock::now() - said < kSayEvery) continue;
+      said = Clock::now();
+      tell(fmt::format("{} of {} pictures, {} views", seen, all, collector->views().size()));
+    }
+    if (const std::string bad = source->unusable(); !bad.empty()) tell(bad);
+  }
+  tell(
+      fmt::format("{} pictures, {} different views of the board", seen, collector->views().size()));
+  collector->thin_out(options.views.value_or(kViewsFromFolders));
+  return collector;
+}
+
+/// Says what to do next, once per change.
+class Guide {
+ public:
+  void say(Taken taken, const ViewCollector& collector, int wanted) {
+    if (taken == Taken::yes) {
+      const std::size_t count = collector.views().size();
+      const std::vector<std::string> missing = collector.coverage().missing();
+      std::string line = fmt::format("view {} of {} taken", count, wanted);
+      const std::string need = listed(missing);
+      if (need != need_) line += need.empty() ? "; nothing is missing" : "; still wanted: " + need;
+      need_ = need;
+      complete_ = missing.empty() && static_cast<int>(count) >= wanted;
+      tell(line);
+    }
+    const std::string hint = hint_for(taken, collector.last_look());
+    frames_ = hint == hint_ ? frames_ + 1 : 1;
+    hint_ = hint;
+    if (frames_ == kFramesBeforeHint && !hint.empty() && hint != said_) {
+      tell(hint);
+      said_ = hint;
+    }
+    if (taken == Taken::yes) said_.clear();
+  }
+  bool complete() const { return complete_; }
+
+ private:
+  static constexpr int kFramesBeforeHint = 15;
+
+  static std::string hint_for(Taken taken, Look look) {
+    if (taken == Taken::moving) return "hold the board still for a moment";
+    if (taken == Taken::alike) return "seen from here already: move or tilt the board";
+    if (taken == Taken::no) return fmt::format("the picture is {}", words(look));
+    return {};
+  }
+
+  std::string need_;
+  std::string hint_;
+  std::string said_;
+  int frames_ = 0;
+  bool complete_ = false;
+};
+
+/// In how many views each of the 3 x 3 regions of the image holds corners, in reading order.
+std::vector<int> views_of_regions(const ViewCollector& collector) {
+  std::vector<int> counts(9);
+  const CameraModel& camera = collector.camera();
+  for (const CameraView& view : collector.views()) {
+    std::array<bool, 9> here{};
+    for (const BoardCorner& corner : view.corners) {
+      const double x = corner.pixel.x() * 3 / camera.width_px;
+      const double y = corner.pixel.y() * 3 / camera.height_px;
+      const auto column = static_cast<std::size_t>(std::clamp(x, 0.0, 2.0));
+      here[3 * static_cast<std::size_t>(std::clamp(y, 0.0, 2.0)) + column] = true;
+    }
+    for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += here[i] ? 1 : 0;
+  }
+  return counts;
+}
+
+/// Where the board is in the image as the camera delivers it.
+std::vector<TagCorners> outline_of_board(const ViewCollector& collector, int width) {
+  if (collector.last_look() != Look::board) return {};
+  std::vector<std::array<double, 2>> px;
+  for (const BoardCorner& corner : collector.last_corners()) {
+    const double x = corner.pixel.x();
+    px.push_back({collector.mirrored() ? width - 1 - x : x, corner.pixel.y()});
+  }
+  return outline_of(px);
+}
+
+void tell_events(Events& events, const ViewCollector& collector, int wanted, const Frame& frame,
+                 bool taken) {
+  if (!events.on()) return;
+  const std::size_t views = collector.views().size();
+  if (taken || views == 0) {
+    events.coverage({{"regions", views_of_regions(collector)},
+                     {"views", views},
+                     {"wanted", wanted},
+                     {"missing", collector.coverage().missing()}});
+    events.progress(static_cast<double>(views) / std::max(1, wanted));
+  }
+  events.picture(frame.image, outline_of_board(collector, frame.image.width));
+  events.live(
+      fmt::format("{} of {} views; the board is {}", views, wanted,
+                  collector.last_look() == Look::board ? "seen" : words(collector.last_look())));
+}
+
+/// Until the views are complete, time is up, or a signal comes: then nothing.
+std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& options,
+                                              const BoardSpec& board, const Record& record,
+                                              const UniqueFd& stop) {
+  const Input input =
+      open_input({options.sensor, options.source, false, WrenchCalibration::ignore});
+  FrameSource& source = *input.source;
+  tell("source: " + source.format().description);
+  tell(
+      "show the board: whole and sharp, in every part of the picture, tilted each way; Ctrl-C "
+      "gives up");
+  const int wanted = options.views.value_or(kViewsFromCamera);
+  auto collector =
+      std::make_unique<ViewCollector>(board, camera_for(record, source.format()), true);
+  Guide guide;
+  Events events(options.events);
+  const TimePoint end = options.seconds
+                            ? Clock::now() + std::chrono::duration_cast<Duration>(
+                                                 std::chrono::duration<double>(*options.seconds))
+                            : TimePoint::max();
+  while (!guide.complete() && static_cast<int>(collector->views().size()) < kMostCameraViews &&
+         Clock::now() < end) {
+    Frame frame;
+    const Next next = next_frame(source, stop, frame);
+    if (next == Next::stopped) return nullptr;
+    if (next == Next::end) break;
+    if (next != Next::frame) continue;
+    const std::string name = fmt::format("view {}", collector->views().size() + 1);
+    const Taken taken = collector->look(frame.image, name);
+    guide.say(taken, *collector, wanted);
+    tell_events(events, *collector, wanted, frame, taken == Taken::yes);
+  }
+  return collector;
+}
+
+/// What else in sensor.yaml was measured through the old camera.
+std::string stale(const SensorConfig& sensor) {
+  std::vector<std::string> parts;
+  const auto placed = [](const Tag& tag) { return tag.platform_T_tag.has_value(); };
+  if (std::any_of(sensor.target.tags.begin(), sensor.target.tags.end(), placed))
+    parts.emplace_back("the tags' places");
+  if (sensor.rest.camera_T_platform) parts.emplace_back("the rest pose");
+  return listed(parts);
+}
+
+void report(const CameraFit& fit, const std::vector<CameraView>& views, const Coverage& coverage,
+            const Record& record) {
+  const CameraModel& now = fit.camera;
+  const CameraModel& old = record.sensor.camera;
+  const auto& s = fit.sigma;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!fit.views[i].used) {
+      tell(fmt::format("dropped {}: reprojection error {:.3f} px stands out from the others'",
+                       views[i].name, fit.views[i].rms_px));
+    }
+  }
+  tell(fmt::format(
+      "fx {:.2f} +- {:.2f}, fy {:.2f} +- {:.2f}, cx {:.2f} +- {:.2f}, cy {:.2f} +- {:.2f} px",
+      now.fx_px, s[0], now.fy_px, s[1], now.cx_px, s[2], now.cy_px, s[3]));
+  const auto& [k1, k2, p1, p2, k3] = now.distortion;
+  tell(fmt::format(
+      "distortion k1 {:.4f} +- {:.4f}, k2 {:.4f} +- {:.4f}, p1 {:.5f} +- {:.5f}, p2 {:.5f} "
+      "+- {:.5f}, k3 {:.4f}{}",
+      k1, s[4], k2, s[5], p1, s[6], p2, s[7], k3,
+      k3 == 0 ? " (fixed: it does not help)" : fmt::format(" +- {:.4f}", s[8])));
+  tell(fmt::format(
+      "reprojection error {:.3f} px RMS over {} views, {} dropped; corners in {} of 9 regions, "
+      "tilts to {:.0f} degrees",
+      fit.rms_px, fit.used, views.size() - static_cast<std::size_t>(fit.used), coverage.regions(),
+      coverage.largest_tilt() * 57.29578));
+  if (const std::vector<std::string> missing = coverage.missing(); !missing.empty())
+    tell("it would be better still with " + listed(missing));
+  if (!record.known) return;
+  tell(fmt::format("before: fx {:.2f} ({:+.2f} %), fy {:.2f} ({:+.2f} %), cx {:.2f}, cy {:.2f} px",
+                   old.fx_px, 100 * (now.fx_px / old.fx_px - 1), old.fy_px,
+                   100 * (now.fy_px / old.fy_px - 1), old.cx_px, old.cy_px));
+  if (const std::string parts = stale(record.sensor); !parts.empty())
+    tell(fmt::format(
+        "{} in sensor.yaml came from the camera before: run `tagwrench calibrate target`", parts));
+}
+
+std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
+                                       const BoardSpec& board, const Record& record,
+                                       const UniqueFd& stop) {
+  if (!options.folders.empty()) return look_at_folders(options, options.folders, board, record);
+  if (options.source.empty())
+    throw ConfigError(
+        "calibrate camera: nothing to look at; give --source v4l2:/dev/videoN or --images DIR");
+  const Spec spec = split_spec(options.source);
+  if (spec.kind == "sim") {
+    throw ConfigError(
+        "--source sim: the simulated sensor has no board to show; use v4l2:/dev/videoN or "
+        "images:DIR");
+  }
+  if (spec.kind == "images" && !spec.argument.empty())
+    return look_at_folders(options, {spec.argument}, board, record);
+  return look_at_camera(options, board, record, stop);
+}
+
+}  // namespace
+
+int calibrate_camera(const CalibrateCameraOptions& options) {
+  const BoardSpec board = parse_board(options.board);
+  const Record record = open_record(options);
+  const UniqueFd stop = termination_fd();
+  std::unique_ptr<ViewCollector> collector = collect(options, board, record, stop);
+  if (!collector) {
+    tell("stopped; nothing was written");
+    return kExitStopped;
+  }
+  collector->check();
+  if (collector->mirrored() != record.sensor.camera.mirrored) {
+    tell(fmt::format("the camera's image is {}: writing mirrored: {}",
+                     collector->mirrored() ? "mirrored" : "not mirrored", collector->mirrored()));
+  }
+  const std::vector<CameraView>& views = collector->views();
+  check_views(views, collector->coverage());
+  const int width = collector->camera().width_px;
+  const int height = collector->camera().height_px;
+  CameraFit fit = fit_camera(views, width, height);
+  fit.camera.mirrored = collector->mirrored();
+  Coverage coverage(width, height);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (fit.views[i].used) coverage.add(views[i].corners, fit.views[i].pose);
+  }
+  check_fit(fit, coverage);
+  if (termination_requested()) {
+    tell("stopped; nothing was written");
+    return kExitStopped;
+  }
+  write_sensor(record.text, {camera_section(fit.camera, fit)}, record.target);
+  report(fit, views, coverage, record);
+  tell("written: " + record.target);
+  if (!record.sensor.calibration.empty())
+    tell(
+        "the calibration in newtons was made with the lens as it was described; run `tagwrench "
+        "calibrate wrench` again");
+  return 0;
+}
+
+}  // namespace tagwrench

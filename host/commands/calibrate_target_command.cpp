@@ -1,0 +1,246 @@
+#include "host/commands/calibrate_target_command.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <limits>
+#include <system_error>
+
+#include "host/app/input.h"
+#include "host/calibration/target/recorder.h"
+#include "host/calibration/target/verdict.h"
+#include "host/commands/events.h"
+#include "host/commands/exit_status.h"
+#include "host/commands/zero_command.h"
+#include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
+#include "host/core/os/termination.h"
+#include "host/core/tell.h"
+#include "host/sensor/appearance_file.h"
+#include "host/sensor/sensor_edit.h"
+#include "host/tracker/hint_text.h"
+#include "host/tracker/rotation.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kMostKeyframes = 150;
+constexpr double kSecondsFromCamera = 30;
+constexpr Duration kAdviseEvery = std::chrono::seconds(2);
+
+/// Says what to do, and every two seconds how far it is.
+class MotionGuide {
+ public:
+  void say(const TargetRecorder& record, const Track& track) {
+    if (track.hint == Hint::moved_while_learning)
+      tell("the platform moved: hands off until the rest is learned");
+    if (is_trouble(track.hint)) tell(hint_text(track.hint, track.details));
+    if (record.rest_known() && !told_to_move_) {
+      told_to_move_ = true;
+      tell("rest learned; now tilt and push the platform slowly, every way");
+    }
+    if (Clock::now() - said_ < kAdviseEvery) return;
+    said_ = Clock::now();
+    if (!record.rest_known()) {
+      tell(fmt::format("{} frames; waiting for all tags, at rest", record.counts().frames));
+      return;
+    }
+    const Vector6 range = record.range();
+    tell(fmt::format(
+        "{} frames, {} different pictures; x {:.2f} y {:.2f} z {:.2f} mm, about x {:.1f} y {:.1f} "
+        "z "
+        "{:.1f} degrees{}",
+        record.counts().frames, record.keyframes().size(), range[0] * 1e3, range[1] * 1e3,
+        range[2] * 1e3, range[3] * 57.29578, range[4] * 57.29578, range[5] * 57.29578,
+        track.status == Status::ok ? "" : "; the tags are not held"));
+  }
+
+ private:
+  bool told_to_move_ = false;
+  TimePoint said_ = Clock::now();
+};
+
+/// Of the time of a calibration, seeing takes the first part, the adjustment the rest.
+constexpr double kSeeingPart = 0.7;
+
+void tell_events(Events& events, const TargetRecorder& record, const Track& track,
+                 const Frame& frame, double part) {
+  if (!events.on()) return;
+  events.progress(kSeeingPart * std::min(1.0, part));
+  events.picture(frame.image, {track.corners.data(), track.corner_count});
+  if (!record.rest_known()) {
+    events.live("hands off: the rest is learned");
+    return;
+  }
+  const Vector6 range = record.range();
+  events.coverage({{"range", std::vector<double>(range.begin(), range.end())},
+                   {"keyframes", record.keyframes().size()},
+                   {"wanted", kLeastKeyframes}});
+  events.live(track.status == Status::ok ? "tilt and push the platform slowly, every way"
+                                         : "the tags are not held");
+}
+
+/// Until the source ends, enough was seen (true) or a signal came (false).
+bool watch(FrameSource& source, const CalibrateTargetOptions& options, const UniqueFd& stop,
+           TargetRecorder& record, Events& events) {
+  const bool ends = split_spec(options.source).kind == "images";
+  const double seconds = options.seconds.value_or(
+      ends || options.frames ? std::numeric_limits<double>::infinity() : kSecondsFromCamera);
+  std::optional<TimePoint> first;
+  MotionGuide guide;
+  while (!options.frames || record.counts().frames < *options.frames) {
+    Frame frame;
+    const Next next = next_frame(source, stop, frame);
+    if (next == Next::stopped) return false;
+    if (next == Next::end) break;
+    if (next != Next::frame) continue;
+    if (!first) first = frame.capture_time;
+    const double elapsed = std::chrono::duration<double>(frame.capture_time - *first).count();
+    if (elapsed >= seconds) break;
+    const Track track = record.add(frame);
+    guide.say(record, track);
+    tell_events(events, record, track, frame, elapsed / seconds);
+  }
+  if (const std::string bad = source.unusable(); !bad.empty()) tell(bad);
+  return true;
+}
+
+std::string list(const Eigen::Vector3d& v, int digits) {
+  return fmt::format("[{:.{}f}, {:.{}f}, {:.{}f}]", v.x(), digits, v.y(), digits, v.z(), digits);
+}
+
+SectionEdit target_section(const TargetEstimate& estimate, const TargetDescription& target) {
+  const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+  const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
+  std::string tags;
+  for (std::size_t t = 0; t < target.tags.size(); ++t) {
+    const Eigen::Isometry3d pose = platform.inverse() * estimate.camera_T_tag[t];
+    tags += fmt::format(
+        "{}{{id: {}, position_mm: {}, rotation_rad: {},\n  position_sigma_mm: {}, "
+        "rotation_sigma_rad: {}}}",
+        t == 0 ? "[" : ",\n ", target.tags[t].id, list(pose.translation() * 1e3, 6),
+        list(rotation_to_vector(pose.linear()), 7), list(sigmas[t].head<3>() * 1e3, 6),
+        list(sigmas[t].tail<3>(), 7));
+  }
+  return {"target", {{"tags", tags + "]"}}};
+}
+
+/// Beside the sensor.yaml, whatever links to it. Not .png: the folder may be one of frames.
+fs::path appearance_of(const fs::path& sensor) {
+  std::error_code error;
+  fs::path real = fs::is_symlink(sensor, error) ? fs::weakly_canonical(sensor) : sensor;
+  return real += ".rest";
+}
+
+/// As sensor.yaml names it: relative to itself, unless it is known under a link elsewhere.
+std::string appearance_name(const fs::path& sensor, const fs::path& appearance) {
+  const bool beside = appearance.parent_path() == sensor.parent_path();
+  std::string name = "'";
+  for (const char c : (beside ? appearance.filename() : fs::absolute(appearance)).string())
+    name += c == '\'' ? std::string("''") : std::string(1, c);
+  return name + "'";
+}
+
+SectionEdit rest_section(const TargetEstimate& estimate, const RestImage& image,
+                         const std::string& appearance) {
+  const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+  return {"rest",
+          {{"frames", fmt::format("{}", image.frames)},
+           {"position_mm", list(platform.translation() * 1e3, 6)},
+           {"rotation_rad", "[0, 0, 0]"},
+           {"appearance", appearance}}};
+}
+
+SectionEdit camera_section(const TargetEstimate& estimate) {
+  return {"camera", {{"readout_ms", fmt::format("{:.1f}", estimate.readout * 1e3)}}};
+}
+
+/// The keys that may be written, before there are values.
+std::vector<SectionEdit> placeholders() {
+  return {{"camera", {{"readout_ms", "0"}}},
+          {"target", {{"tags", "[]"}}},
+          {"rest",
+           {{"frames", "1"}, {"position_mm", "[]"}, {"rotation_rad", "[]"}, {"appearance", "''"}}}};
+}
+
+/// Both files or neither: the picture belongs to the poses.
+void write(const fs::path& sensor, const std::string& text, const fs::path& appearance,
+           const TargetEstimate& estimate, const SensorConfig& described, const RestImage& image) {
+  std::error_code error;
+  std::optional<std::string> before;
+  if (fs::exists(appearance, error)) before = read_text(appearance);
+  save_rest_image(appearance, image);
+  std::vector<SectionEdit> edits = {
+      target_section(estimate, described.target),
+      rest_section(estimate, image, appearance_name(sensor, appearance))};
+  if (readout_is_clear(estimate)) edits.push_back(camera_section(estimate));
+  // What read at the old rest says nothing about the new one.
+  const std::vector<YamlEntry> no_zero = without_zero(described);
+  if (!no_zero.empty()) edits.push_back({"wrench", no_zero});
+  try {
+    write_sensor(text, edits, sensor);
+  } catch (...) {
+    if (before) {
+      write_atomically(appearance, *before);
+    } else {
+      fs::remove(appearance, error);
+    }
+    throw;
+  }
+}
+
+int stopped() {
+  tell("stopped; nothing was written");
+  return kExitStopped;
+}
+
+}  // namespace
+
+int calibrate_target(const CalibrateTargetOptions& options) {
+  const fs::path sensor_file = options.out.empty() ? options.sensor : options.out;
+  const fs::path appearance = appearance_of(sensor_file);
+  const std::string text = read_text(options.sensor);
+  check_replaceable(sensor_file);
+  check_replaceable(appearance);
+  const UniqueFd stop = termination_fd();
+  const Input input = open_input({options.sensor, options.source, true, WrenchCalibration::ignore});
+  check_editable(text, placeholders(), options.sensor);
+  check_size(input);
+  const SensorConfig& sensor = input.sensor;
+  Events events(options.events);
+  TargetRecorder record(sensor.camera, sensor.target, sensor.rest, kMostKeyframes);
+  tell("source: " + input.source->format().description);
+  tell(fmt::format("hands off until {} frames at rest are taken", sensor.rest.frames));
+  if (!watch(*input.source, options, stop, record, events)) return stopped();
+  check_record(record, sensor.target, sensor.rest);
+
+  tell(fmt::format("adjusting to {} pictures", record.keyframes().size()));
+  TimePoint said = Clock::now();
+  const TargetEstimate estimate =
+      TargetAdjuster(record.at_rest()).adjust(record.keyframes(), [&](double share) {
+        events.progress(kSeeingPart + (1 - kSeeingPart) * share);
+        if (Clock::now() - said >= kAdviseEvery) {
+          said = Clock::now();
+          tell(fmt::format("{:.0f} %", 100 * share));
+        }
+        return !termination_requested();
+      });
+  if (termination_requested()) return stopped();
+  check_estimate(estimate, sensor.camera);
+  write(sensor_file, text, appearance, estimate, sensor, record.at_rest().image);
+  for (const std::string& line : describe(record, estimate, sensor.target, sensor.camera))
+    tell(line);
+  if (readout_is_clear(estimate)) tell("the shutter rolls: camera.readout_ms is written too");
+  tell(fmt::format("written: {} and {}", sensor_file.string(), appearance.string()));
+  if (!sensor.calibration.empty())
+    tell(
+        "the calibration in newtons was made with the target as it was; run `tagwrench calibrate "
+        "wrench` again");
+  return 0;
+}
+
+}  // namespace tagwrench

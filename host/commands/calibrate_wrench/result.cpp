@@ -1,0 +1,192 @@
+#include "host/commands/calibrate_wrench/result.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "host/calibration/analysis/trial_csv.h"
+#include "host/commands/zero_command.h"
+#include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
+#include "host/core/sha256.h"
+#include "host/sensor/sensor_edit.h"
+#include "host/wrench/zero.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kLittle = 0.5;  // of the range
+
+/// As sensor.yaml names it: relative to itself where they share a folder.
+std::string name_from(const fs::path& sensor, const fs::path& file) {
+  const fs::path folder = fs::absolute(sensor).lexically_normal().parent_path();
+  const fs::path full = fs::absolute(file).lexically_normal();
+  const fs::path written = full.parent_path() == folder ? full.filename() : full;
+  std::string name = "'";
+  for (const char c : written.string()) name += c == '\'' ? std::string("''") : std::string(1, c);
+  return name + "'";
+}
+
+/// How well the loads of the held-out predictions were known themselves, rms, N and N m.
+Vector6 known_to(const WrenchData& data, const WrenchFit& fit) {
+  Vector6 sum = Vector6::Zero();
+  for (const HeldOut& h : fit.held_out) {
+    const Observation& o = data.observations[h.observation];
+    sum += o.wrench_covariance.diagonal();
+    for (const CommonError& error : o.common) sum += error.effect.cwiseAbs2();
+  }
+  if (!fit.held_out.empty()) sum /= static_cast<double>(fit.held_out.size());
+  return sum.cwiseSqrt();
+}
+
+std::string axis_line(int i, const AxisFit& axis, double range, double reference, double inside) {
+  const double milli = 1e3;
+  const char* name_of_axis = kWrenchAxes[static_cast<std::size_t>(i)];
+  const char* unit = i < 3 ? "mN" : "mN m";
+  if (axis.state != AxisState::calibrated) {
+    return fmt::format("{}    NOT calibrated, {}: {}", name_of_axis, name(axis.state), axis.reason);
+  }
+  return fmt::format("{} {:9.1f} {:4} {:9.2f} {:4} {:6.2f} % {:9.2f} {:4} {:8.0f} %", name_of_axis,
+                     milli * axis.largest, unit, milli * axis.held_out_rmse, unit,
+                     100 * axis.held_out_rmse / range, milli * reference, unit, 100 * inside);
+}
+
+/// Axes of which the loads reached less than half of the range; empty: none.
+std::string little_loaded(const WrenchFit& fit, const Vector6& range) {
+  std::string axes;
+  for (int i = 0; i < 6; ++i) {
+    const AxisFit& axis = fit.axis[static_cast<std::size_t>(i)];
+    const bool little = axis.largest < kLittle * range[i] && range[i] < kUnknownRange;
+    if (axis.state != AxisState::calibrated || !little) continue;
+    const double scale = i < 3 ? 1 : 1e3;
+    axes += fmt::format("{}{} {:.2f} of {:.2f} {}", axes.empty() ? "" : ", ",
+                        kWrenchAxes[static_cast<std::size_t>(i)], scale * axis.largest,
+                        scale * range[i], i < 3 ? "N" : "mN m");
+  }
+  if (axes.empty()) return {};
+  return fmt::format(
+      "loaded to less than half of the range: {}; beyond that it is the model's word", axes);
+}
+
+/// All that were tried, the best of each kind, in one line.
+std::string trials_line(const std::vector<ModelTrial>& trials) {
+  std::string tried;
+  std::string_view adopted = "linear";
+  for (const ModelTrial& trial : trials) {
+    if (trial.adopted) adopted = name(trial.features.kind);
+    const bool best = std::none_of(trials.begin(), trials.end(), [&](const ModelTrial& t) {
+      return t.features.kind == trial.features.kind && t.score < trial.score;
+    });
+    if (!best) continue;
+    tried += fmt::format("{}{} {:.2f} +- {:.2f}", tried.empty() ? "" : ", ",
+                         name(trial.features.kind), trial.score, trial.score_sigma);
+  }
+  return fmt::format("model: {} (held-out squared error, linear = 1: {})", adopted, tried);
+}
+
+}  // namespace
+
+CalibrationFiles files_of(const fs::path& calibration) {
+  fs::path data = calibration;
+  data.replace_extension(".data.csv");
+  return {calibration, data, fs::path(calibration) += ".partial",
+          fs::path(calibration) += ".before"};
+}
+
+void check_some_axis(const WrenchFit& fit) {
+  std::string reasons;
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (fit.axis[i].state == AxisState::calibrated) return;
+    reasons += fmt::format("{}{} ({})", i == 0 ? "" : ", ", kWrenchAxes[i], fit.axis[i].reason);
+  }
+  throw ConfigError(fmt::format(
+      "calibration: no axis is known from these steps: {}; the calibration in force stays; take "
+      "the steps again, with --force",
+      reasons));
+}
+
+std::string what_is_lost(const CalibrationFiles& files, const WrenchFit& fit) {
+  std::error_code none;
+  if (!fs::exists(files.calibration, none)) return {};
+  std::string lost;
+  try {
+    const CalibrationRecord before = read_calibration(files.calibration).record;
+    for (std::size_t i = 0; before.axis && i < 6; ++i) {
+      const bool knew = (*before.axis)[i].state == AxisState::calibrated;
+      if (knew && fit.axis[i].state != AxisState::calibrated)
+        lost += fmt::format("{}{}", lost.empty() ? "" : " ", kWrenchAxes[i]);
+    }
+  } catch (const ConfigError&) {
+    return {};  // it is no calibration, and --force was given
+  }
+  if (lost.empty()) return {};
+  return fmt::format("the calibration before knew {} by loads, this one does not; it is kept: {}",
+                     lost, files.before.string());
+}
+
+void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
+                       const fs::path& sensor_file, const SensorConfig& sensor,
+                       const WrenchData& data, Calibration calibration) {
+  const std::string csv = study::trial_to_csv(data.trial);
+  calibration.record.data_file = files.data.filename().string();
+  calibration.record.data_sha256 = sha256_hex(csv);
+  const fs::path fresh = fs::path(files.calibration) += ".new";
+  save_calibration(fresh, calibration);
+  std::error_code none;
+  try {
+    read_calibration(fresh);
+  } catch (const ConfigError& unusable) {
+    fs::remove(fresh, none);
+    throw ConfigError(fmt::format(
+        "calibration: what came of these steps cannot be used ({}); the calibration in force "
+        "stays; take the steps again, with --force",
+        unusable.what()));
+  }
+  std::vector<YamlEntry> entries = {{"calibration", name_from(sensor_file, files.calibration)}};
+  for (const YamlEntry& entry : without_zero(sensor)) entries.push_back(entry);
+  if (fs::exists(files.calibration, none))
+    write_atomically(files.before, read_text(files.calibration));
+  if (fs::exists(files.data, none))
+    write_atomically(fs::path(files.data) += ".before", read_text(files.data));
+  write_atomically(files.data, csv);
+  fs::rename(fresh, files.calibration);
+  write_sensor(sensor_text, {{"wrench", entries}}, sensor_file);
+}
+
+std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,
+                                  const WrenchFit& fit, const Vector6& range,
+                                  const Vector6& known) {
+  std::vector<std::string> lines = {
+      "     loads up to   error held out   of range   loads known to   within 95 %"};
+  const Vector6 reference = known_to(data, fit);
+  for (int i = 0; i < 6; ++i) {
+    const auto axis = static_cast<std::size_t>(i);
+    lines.push_back(axis_line(i, fit.axis[axis], range[i], reference[i], fit.inside_95[axis]));
+  }
+  if (const std::string little = little_loaded(fit, known); !little.empty())
+    lines.push_back(little);
+  lines.push_back(
+      "error held out: rms, each step predicted by the others. The load's own uncertainty is in it "
+      "(loads known to: rms), so where the two are alike the reference limits, not the sensor");
+  lines.push_back(
+      "within 95 %: how many of these errors their stated 95 % interval holds; 90 to 99 % is good");
+  if (!fit.trials.empty()) lines.push_back(trials_line(fit.trials));
+  if (data.lag.known) {
+    // The study counts from the reference to the reading; people ask how late the reference is.
+    lines.push_back(fmt::format("the reference comes {:.1f} +- {:.1f} ms after the camera",
+                                -1e3 * data.lag.value, 1e3 * data.lag.sigma));
+    if (const std::string warning = study::lag_warning(data.lag, -0.2, 0.2); !warning.empty())
+      lines.push_back(warning);
+  }
+  for (const std::string& missing : fit.missing)
+    lines.push_back("completed from the spring model: " + missing);
+  for (const std::string& warning : fit.warnings) lines.push_back(warning);
+  lines.push_back(
+      fmt::format("{} loads and rests of plan {}", data.observations.size(), plan.name));
+  return lines;
+}
+
+}  // namespace tagwrench

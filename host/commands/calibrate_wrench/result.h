@@ -1,0 +1,45 @@
+// What a calibration has found: the fit, its files, and a table for people.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "host/calibration/wrench/observations.h"
+#include "host/sensor/calibration_file.h"
+#include "host/sensor/sensor_config.h"
+#include "host/wrench/fit.h"
+
+namespace tagwrench {
+
+struct CalibrationFiles {
+  std::filesystem::path calibration;
+  std::filesystem::path data;      ///< beside it
+  std::filesystem::path progress;  ///< beside it
+  std::filesystem::path before;    ///< what was in `calibration` until now
+};
+
+/// calibration.json -> calibration.data.csv, calibration.json.partial, calibration.json.before.
+CalibrationFiles files_of(const std::filesystem::path& calibration);
+
+/// Refuses a fit that knows no axis: springs as they were described are no calibration. Throws
+/// ConfigError with every axis' reason.
+void check_some_axis(const WrenchFit& fit);
+
+/// What the calibration in the file knows by loads and this fit does not, in one line; empty:
+/// nothing, or there is none.
+std::string what_is_lost(const CalibrationFiles& files, const WrenchFit& fit);
+
+/// Writes data and calibration, and names it in sensor.yaml, whose text is `sensor_text`. An
+/// earlier calibration is kept as `before`, and its data likewise. Throws ConfigError or
+/// std::runtime_error; then the old calibration is in force.
+void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
+                       const std::filesystem::path& sensor_file, const SensorConfig& sensor,
+                       const WrenchData& data, Calibration calibration);
+
+/// One line per axis and one for each thing to be said. `range`: full load, N and N m; `known`:
+/// the sensor's own, beyond kUnknownRange where nobody has told it.
+std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,
+                                  const WrenchFit& fit, const Vector6& range, const Vector6& known);
+
+}  // namespace tagwrench

@@ -1,0 +1,235 @@
+#include "host/commands/calibrate_wrench/run.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+
+#include "host/commands/calibrate_wrench/keys.h"
+#include "host/commands/calibrate_wrench/simulated_person.h"
+#include "host/core/os/termination.h"
+#include "host/core/tell.h"
+#include "host/tracker/hint_text.h"
+#include "host/tracker/tracker.h"
+
+namespace tagwrench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr Duration kLiveEvery = std::chrono::milliseconds(200);
+constexpr int kPatience_ms = 200;
+
+double clock_seconds(TimePoint time) {
+  return std::chrono::duration<double>(time.time_since_epoch()).count();
+}
+
+ReferenceSample to_sample(const ReferenceReading& reading) {
+  ReferenceSample out;
+  out.time = clock_seconds(reading.time);
+  for (int i = 0; i < 6; ++i) {
+    out.value[i] = reading.value[static_cast<std::size_t>(i)];
+    out.sigma[i] = reading.sigma[static_cast<std::size_t>(i)];
+  }
+  out.saturated = reading.saturated;
+  return out;
+}
+
+/// Lines for people on standard error; where that is a terminal, one of them lives.
+class Telling {
+ public:
+  void line(const std::string& text) {
+    wipe();
+    tell(text);
+  }
+  void live(const WrenchGuide& guide) {
+    if (!terminal_ || Clock::now() - shown_ < kLiveEvery) return;
+    shown_ = Clock::now();
+    wipe();
+    std::string text = guide.live();
+    winsize size{};  // a line that wraps could not be wiped
+    if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1)
+      text.resize(std::min<std::size_t>(text.size(), size.ws_col - 1u));
+    [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
+    open_ = true;
+  }
+  void wipe() {
+    constexpr std::string_view kWipe = "\r\x1b[K";
+    if (open_) {
+      [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kWipe.data(), kWipe.size());
+    }
+    open_ = false;
+  }
+
+ private:
+  bool terminal_ = ::isatty(STDERR_FILENO) != 0;
+  bool open_ = false;
+  TimePoint shown_{};
+};
+
+class Runner {
+ public:
+  Runner(const GuideRun& run, WrenchGuide& guide)
+      : run_(run),
+        guide_(guide),
+        source_(*run.at->input.source),
+        tracker_(run.at->input.sensor.camera, run.at->input.sensor.target,
+                 run.at->input.sensor.rest),
+        keys_(run.events->on() ? Keys::From::program : Keys::From::terminal) {
+    if (run.at->bench)
+      person_.emplace(*run.at->bench, *run.plan, run.at->input.sensor.wrench.range);
+  }
+
+  GuideEnd run() {
+    if (keys_.there() && !run_.events->on())
+      tell("keys: s skips a step, r does the last one again, q stops");
+    while (!end_ && !guide_.done()) {
+      speak();
+      wait();
+      take_keys();
+      take_readings();
+      if (!end_) take_frame();
+      keep();
+    }
+    speak();
+    tell_.wipe();
+    if (const std::string bad = source_.unusable(); !bad.empty()) tell(bad);
+    return guide_.failed() ? GuideEnd::failed : end_.value_or(GuideEnd::done);
+  }
+
+ private:
+  void wait() {
+    if (termination_requested()) end_ = GuideEnd::stopped;
+    if (source_.poll_fd() < 0) return;
+    std::array<pollfd, 4> fds{
+        {{source_.poll_fd(), POLLIN, 0},
+         {run_.stop->get(), POLLIN, 0},
+         {run_.reference != nullptr ? run_.reference->poll_fd() : -1, POLLIN, 0},
+         {keys_.poll_fd(), POLLIN, 0}}};
+    ::poll(fds.data(), fds.size(), kPatience_ms);
+    ready_ = fds[0].revents != 0;
+  }
+
+  void take_keys() {
+    for (char key; (key = keys_.next()) != 0;) {
+      if (guide_.done()) return;
+      if (key == 's') guide_.skip();
+      if (key == 'r') guide_.redo();
+      if (key == 'q') end_ = GuideEnd::stopped;
+    }
+  }
+
+  void take_readings() {
+    if (run_.reference == nullptr) return;
+    run_.reference->service();
+    for (ReferenceReading reading; run_.reference->next(reading);) {
+      if (run_.recorder != nullptr) run_.recorder->reading(reading, run_.plan->cell_channel);
+      guide_.reading(to_sample(reading));
+    }
+    if (const std::string trouble = run_.reference->trouble(); !trouble.empty()) say(trouble);
+  }
+
+  void take_frame() {
+    if (source_.poll_fd() >= 0 && !ready_) return;
+    Frame frame;
+    switch (source_.read(frame)) {
+      case ReadStatus::frame:
+        break;
+      case ReadStatus::end:
+        end_ = GuideEnd::ended;
+        return;
+      case ReadStatus::disconnected:
+        if (run_.recorder != nullptr) run_.recorder->disconnected(source_.detail());
+        tell_.line(source_.detail());
+        return;
+      case ReadStatus::reconnected:
+        if (run_.recorder != nullptr) run_.recorder->reconnected(source_.detail());
+        tell_.line(source_.detail());
+        return;
+      default:
+        return;
+    }
+    const Region decoded = frame.readable();
+    Track track = tracker_.track(frame);
+    if (track.needs_whole_frame && source_.complete(frame)) track = tracker_.track(frame);
+    source_.want(track.wanted);
+    if (run_.recorder != nullptr) run_.recorder->frame(frame, decoded, source_.raw(), track);
+    const bool news = track.hint != last_hint_ || is_trouble(track.hint);
+    if (track.hint != Hint::none && news) say(hint_text(track.hint, track.details));
+    if (track.hint != Hint::none) last_hint_ = track.hint;
+    const double time = clock_seconds(frame.capture_time);
+    if (!first_time_) first_time_ = time;
+    if (run_.seconds && time - *first_time_ > *run_.seconds) {
+      end_ = GuideEnd::stopped;
+      return;
+    }
+    if (person_) person_->look_at(guide_);
+    guide_.frame(time, track);
+    if (!guide_.done()) tell_.live(guide_);
+    tell_events(frame, track);
+  }
+
+  void tell_events(const Frame& frame, const Track& track) {
+    if (!run_.events->on()) return;
+    const std::size_t done = guide_.records().size() + guide_.skipped().size();
+    const Vector6 covered = guide_.coverage().covered();
+    run_.events->progress(static_cast<double>(done) /
+                          static_cast<double>(std::max<std::size_t>(1, run_.plan->steps.size())));
+    run_.events->coverage({{"axes", std::vector<double>(covered.begin(), covered.end())}});
+    run_.events->picture(frame.image, {track.corners.data(), track.corner_count});
+    if (!guide_.done()) run_.events->live(guide_.live());
+  }
+
+  void speak() {
+    for (GuideLine line; guide_.next(line);) {
+      const bool warning = line.kind == GuideLine::Kind::warning;
+      if (warning && run_.events->on()) {
+        run_.events->line("warning", line.text);
+      } else {
+        say((line.kind == GuideLine::Kind::task ? "> " : "") + line.text);
+      }
+    }
+  }
+
+  /// What people are told is in the recording too.
+  void say(const std::string& line) {
+    tell_.line(line);
+    if (run_.recorder != nullptr) run_.recorder->note(line);
+  }
+
+  /// What was accepted is not lost, whatever comes.
+  void keep() {
+    if (run_.recorder != nullptr) {
+      run_.recorder->follow(guide_.records());
+      if (const std::string trouble = run_.recorder->trouble(); !trouble.empty())
+        tell_.line(trouble + "; the calibration goes on, the recording has ended");
+    }
+    if (guide_.records().size() == kept_ && guide_.skipped().size() == skipped_) return;
+    kept_ = guide_.records().size();
+    skipped_ = guide_.skipped().size();
+    if (kept_ > 0) save_progress(run_.progress, run_.of, {guide_.records(), guide_.skipped()});
+  }
+
+  const GuideRun& run_;
+  WrenchGuide& guide_;
+  FrameSource& source_;
+  Tracker tracker_;
+  Keys keys_;
+  Telling tell_;
+  std::optional<SimulatedPerson> person_;
+  std::optional<GuideEnd> end_;
+  std::optional<double> first_time_;
+  Hint last_hint_ = Hint::none;
+  bool ready_ = true;
+  std::size_t kept_ = 0;
+  std::size_t skipped_ = 0;
+};
+
+}  // namespace
+
+GuideEnd run_guide(const GuideRun& run, WrenchGuide& guide) { return Runner(run, guide).run(); }
+
+}  // namespace tagwrench

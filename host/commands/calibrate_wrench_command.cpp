@@ -1,0 +1,321 @@
+#include "host/commands/calibrate_wrench_command.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <system_error>
+
+#include "host/app/recording_sensor.h"
+#include "host/calibration/wrench/plan_config.h"
+#include "host/commands/calibrate_wrench/checks.h"
+#include "host/commands/calibrate_wrench/recorder.h"
+#include "host/commands/calibrate_wrench/references.h"
+#include "host/commands/calibrate_wrench/replay.h"
+#include "host/commands/calibrate_wrench/result.h"
+#include "host/commands/calibrate_wrench/run.h"
+#include "host/commands/exit_status.h"
+#include "host/commands/hands_off.h"
+#include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
+#include "host/core/os/termination.h"
+#include "host/core/sha256.h"
+#include "host/core/tell.h"
+#include "host/sensor/sensor_edit.h"
+#include "host/wrench/zero.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kRecordingFailed = 1, kAttempts = 3;  // attempts of the simulated person
+
+int list_plans() {
+  for (const ReadyPlan& ready : ready_plans()) {
+    const WrenchPlan plan = parse_plan(ready.text, ready.name);
+    std::fputs(fmt::format("{:18} {} steps: {}; about {} minutes\n", ready.name, plan.steps.size(),
+                           plan.about, plan.minutes)
+                   .c_str(),
+               stdout);
+  }
+  return 0;
+}
+
+/// Full load per axis: the sensor's, or where its sensor.yaml tells none the paper's.
+Vector6 full_load(const SensorConfig& sensor) {
+  const Vector6 usual = (Vector6() << 1, 1, 2.5, 0.016, 0.016, 0.009).finished();
+  return (sensor.wrench.range.array() < kUnknownRange).select(sensor.wrench.range, usual);
+}
+
+/// What is known before: the springs as described, or the calibration in force.
+Matrix6 known_stiffness(const SensorConfig& sensor, const std::string& file) {
+  if (sensor.spring_stiffness) return *sensor.spring_stiffness;
+  if (!sensor.calibration.empty()) return load_sensor(file).wrench.K;
+  throw ConfigError(fmt::format(
+      "{}: wrench: has no springs, so that nobody knows what a load should do; describe them "
+      "roughly, wrench: {{springs: {{centres_mm: ..., axial_n_per_mm: ..., lateral_n_per_mm: "
+      "...}}}}",
+      file));
+}
+
+std::string now_utc() {
+  return fmt::format(
+      "{:%Y-%m-%dT%H:%M:%SZ}",
+      fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
+}
+
+/// Of what a measurement would have to begin anew for.
+std::string sensor_sha256(const SensorConfig& sensor) {
+  return sha256_of(identity_of(sensor.camera, sensor.target, sensor.rest));
+}
+
+/// What was measured, and what is said of it.
+struct Measured {
+  std::vector<StepRecord> records = {};
+  std::string reference;
+  double gain_sigma = 0;  ///< relative, of a load cell
+  std::string notes;
+  std::string date = {};  ///< UTC
+};
+
+Calibration calibration_of(const WrenchPlan& plan, const SensorConfig& sensor,
+                           const Measured& measured, const WrenchData& data, const WrenchFit& fit) {
+  Calibration out;
+  out.sensor = identity_of(sensor.camera, sensor.target, sensor.rest);
+  out.model = fit.model;
+  CalibrationRecord& record = out.record;
+  record.date = measured.date;
+  record.software = std::string("tagwrench ") + TAGWRENCH_VERSION;
+  record.plan = plan.name;
+  record.reference = measured.reference;
+  record.notes = measured.notes;
+  if (data.lag.known) record.lag = {data.lag.value, data.lag.sigma};
+  record.axis = fit.axis;
+  record.inside_95 = fit.inside_95;
+  record.missing = fit.missing;
+  record.warnings = fit.warnings;
+  record.trials = fit.trials;
+  return out;
+}
+
+/// What is calibrated, and where to.
+struct Subject {
+  CalibrationFiles files;
+  std::string sensor_text;
+  const SensorConfig& sensor;
+  Matrix6 stiffness;  ///< known before
+  Vector6 range;      ///< N and N m
+};
+
+void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject,
+                   const WrenchPlan& plan, const Measured& measured) {
+  WrenchData data = collect(plan, measured.records, measured.gain_sigma);
+  const WrenchFit fit = fit_wrench(data.observations, data.path,
+                                   {.prior = subject.stiffness,
+                                    .require_all = options.require_all,
+                                    .zero_in_use = data.zero_in_use});
+  check_some_axis(fit);
+  const std::string poorer = what_is_lost(subject.files, fit);
+  add_predictions(plan, fit, data);
+  data.trial.sensor = sensor_sha256(subject.sensor);
+  write_calibration(subject.files, subject.sensor_text, options.sensor, subject.sensor, data,
+                    calibration_of(plan, subject.sensor, measured, data, fit));
+  std::error_code none;
+  fs::remove(subject.files.progress, none);
+  for (const std::string& line :
+       describe(plan, data, fit, subject.range, subject.sensor.wrench.range))
+    tell(line);
+  if (!poorer.empty()) tell(poorer);
+  tell(fmt::format("written: {}, {} and wrench.calibration in {}",
+                   subject.files.calibration.string(), subject.files.data.string(),
+                   options.sensor));
+}
+
+void check_sensor(const Input& input, const std::string& sensor_text, const std::string& file) {
+  check_editable(sensor_text, {{"wrench", {{"calibration", "''"}}}}, file);
+  check_size(input);
+  check_appearance(input);
+}
+
+int say_stopped(GuideEnd end, const WrenchGuide& guide, const fs::path& progress) {
+  if (end == GuideEnd::failed) tell(guide.failure());
+  if (end == GuideEnd::ended) tell("the source has ended before the plan");
+  tell(guide.records().empty()
+           ? "stopped; nothing was measured, and the calibration in force stays"
+           : fmt::format("stopped after {} steps, which are kept in {}; --resume goes on; the "
+                         "calibration in force stays",
+                         guide.records().size(), progress.string()));
+  return kExitStopped;
+}
+
+/// Ends a recording. False: it is not whole.
+bool end_recording(CalibrationRecorder& recorder, const std::string& file) {
+  const std::string trouble = recorder.finish();
+  const record::WriterState state = recorder.state();
+  tell(fmt::format("recording {}: {} frames, {:.3g} MB{}", file, state.frames,
+                   1e-6 * static_cast<double>(state.bytes),
+                   state.lost_frames > 0
+                       ? fmt::format("; the disk was too slow for {} of them; --keep region keeps "
+                                     "less",
+                                     state.lost_frames)
+                       : ""));
+  if (!trouble.empty()) tell(trouble);
+  return trouble.empty() && state.lost_frames == 0 && state.lost_others == 0;
+}
+
+int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles& files) {
+  const std::string text = plan_text(options.plan);
+  const WrenchPlan plan = parse_plan(text, options.plan);
+  const std::string sensor_text = read_text(options.sensor);
+  check_replaceable(options.sensor);
+  check_files(files, options);
+  check_source(options);
+  BenchInput at =
+      open_at_bench({options.sensor, options.source, /*fast=*/options.emulated_cell.empty(),
+                     WrenchCalibration::ignore});
+  const SensorConfig& sensor = at.input.sensor;
+  check_sensor(at.input, sensor_text, options.sensor);
+
+  const Subject subject{files, sensor_text, sensor, known_stiffness(sensor, options.sensor),
+                        full_load(sensor)};
+  check_plan(plan, subject.range, options.require_all);
+  const ProgressOf of{sha256_hex(text), sensor_sha256(sensor)};
+  WrenchGuide guide(plan, {.stiffness = subject.stiffness,
+                           .range = subject.range,
+                           .attempts = at.bench ? kAttempts : 0});
+  if (options.resume) {
+    const Progress progress = load_progress(files.progress, of, plan);
+    check_resumable(sensor, plan, progress, files.progress);
+    guide.resume(progress.records, progress.skipped);
+    tell(fmt::format("going on: {} steps are done", progress.records.size()));
+  }
+  const std::unique_ptr<Reference> reference =
+      open_reference(plan,
+                     {options.board, options.cells, options.optoforce, options.counts_per_unit,
+                      options.emulated_cell},
+                     at.bench.get(), at.time_zero);
+  tell("source: " + at.input.source->format().description);
+  if (reference) tell("reference: " + reference->description());
+  if (!rest_is_calibrated(sensor)) {
+    tell(
+        "this sensor's rest is learned anew at every start; run `tagwrench calibrate target` first "
+        "if `check`, `zero` and --resume shall work: newtons hold for the target as it was");
+  }
+  Measured measured{.reference = reference  ? reference->description()
+                                 : at.bench ? "simulated masses"
+                                            : "masses",
+                    .gain_sigma = reference ? reference->gain_sigma() : 0,
+                    .notes = options.notes};
+
+  const UniqueFd stop = termination_fd();
+  std::optional<CalibrationRecorder> recorder;
+  if (options.record) {
+    record::Head head = recording_head(at.input, options.record->keep);
+    put_into(head, {options.plan, text, measured.reference, measured.gain_sigma, measured.notes});
+    recorder.emplace(record::WriterOptions{.path = options.record->file,
+                                           .lossless = at.input.source->poll_fd() < 0},
+                     head);
+  }
+  Events events(options.events);
+  const GuideEnd end = run_guide({&at, reference.get(), recorder ? &*recorder : nullptr, &stop,
+                                  &plan, files.progress, of, options.seconds, &events},
+                                 guide);
+  const bool recorded = !recorder || end_recording(*recorder, options.record->file);
+  if (end != GuideEnd::done) return say_stopped(end, guide, files.progress);
+  measured.records = guide.records();
+  measured.date = now_utc();
+  fit_and_write(options, subject, plan, measured);
+  return recorded ? 0 : kRecordingFailed;
+}
+
+/// The plan that is given, which must ask for the same steps, or the recording's own.
+WrenchPlan plan_of_recording(const CalibrateWrenchOptions& options,
+                             const RecordedCalibration& recorded) {
+  if (recorded.plan_yaml.empty()) {
+    throw ConfigError(fmt::format(
+        "--source {}: holds no calibration; record one with `tagwrench calibrate wrench --record "
+        "FILE`",
+        options.source));
+  }
+  WrenchPlan its = parse_plan(recorded.plan_yaml, recorded.plan);
+  if (options.plan.empty()) return its;
+  WrenchPlan ours = parse_plan(plan_text(options.plan), options.plan);
+  const bool same = ours.reference == its.reference && ours.cell_channel == its.cell_channel &&
+                    std::equal(ours.steps.begin(), ours.steps.end(), its.steps.begin(),
+                               its.steps.end(), [](const PlanStep& a, const PlanStep& b) {
+                                 return a.kind == b.kind && a.visit == b.visit;
+                               });
+  if (!same) {
+    throw ConfigError(fmt::format(
+        "--plan {}: asks for other steps than the recording's plan, {}; correct its numbers only, "
+        "or leave --plan out",
+        options.plan, recorded.plan));
+  }
+  return ours;
+}
+
+/// As known_stiffness(); of a sensor without springs what the recorded one began with.
+Matrix6 stiffness_before(const SensorConfig& sensor, const record::RecordingReader& recording) {
+  if (sensor.spring_stiffness) return *sensor.spring_stiffness;
+  return recorded_sensor(recording.head(), recording.path().string()).wrench.K;
+}
+
+/// The loads of an earlier calibration once more.
+int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFiles& files) {
+  check_replay_options(options);
+  const std::string sensor_text = read_text(options.sensor);
+  check_replaceable(options.sensor);
+  check_files(files, options);
+  record::RecordingReader recording(split_spec(options.source).argument);
+  const RecordedCalibration recorded = calibration_in(recording.head());
+  const WrenchPlan plan = plan_of_recording(options, recorded);
+  const std::vector<AcceptedStep> steps = accepted_steps(recording, plan);
+  Input input =
+      open_input({options.sensor, options.source, /*fast=*/true, WrenchCalibration::ignore});
+  const SensorConfig& sensor = input.sensor;
+  check_sensor(input, sensor_text, options.sensor);
+  const SensorConfig then =
+      recorded_sensor(recording.head(), recording.path().string(), WrenchCalibration::ignore);
+  const std::string other = difference(identity_of(then.camera, then.target, then.rest),
+                                       identity_of(sensor.camera, sensor.target, sensor.rest));
+  if (!other.empty())
+    tell(fmt::format("recorded with another sensor.yaml ({}); --sensor counts", other));
+  const Subject subject{files, sensor_text, sensor, stiffness_before(sensor, recording),
+                        full_load(sensor)};
+  check_plan(plan, subject.range, options.require_all);
+  tell("source: " + input.source->format().description);
+  tell(fmt::format("plan {}, {}: {} steps were accepted", plan.name, recorded.reference,
+                   steps.size()));
+  if (const std::string missing = not_recorded(steps, plan); !missing.empty())
+    tell("not in the recording: " + missing);
+
+  fit_and_write(options, subject, plan,
+                {.records = replay_steps(input, recording, steps, plan),
+                 .reference = recorded.reference,
+                 .gain_sigma = recorded.gain_sigma,
+                 .notes = options.notes.empty() ? recorded.notes : options.notes,
+                 .date = recording.head().created});
+  return 0;
+}
+
+}  // namespace
+
+int calibrate_wrench(const CalibrateWrenchOptions& options) {
+  if (options.list_plans) return list_plans();
+  if (!options.show_plan.empty()) {
+    std::fputs(plan_text(options.show_plan).c_str(), stdout);
+    return 0;
+  }
+  const CalibrationFiles files =
+      files_of(options.out.empty() ? fs::path(options.sensor).parent_path() / "calibration.json"
+                                   : fs::path(options.out));
+  return split_spec(options.source).kind == "recording" ? calibrate_again(options, files)
+                                                        : calibrate_live(options, files);
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,259 @@
+#include "host/commands/check_command.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <numbers>
+
+#include "host/board/cell_calibration.h"
+#include "host/commands/check_text.h"
+#include "host/commands/emulated_cell.h"
+#include "host/commands/events_option.h"
+#include "host/core/config_error.h"
+#include "host/core/os/termination.h"
+#include "host/core/tell.h"
+#include "host/tracker/rotation.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr int kOff = 1;
+constexpr Duration kPatience = std::chrono::seconds(20);
+constexpr Duration kPatienceForMass = std::chrono::seconds(60);
+constexpr Duration kLeastPush = std::chrono::seconds(8);
+constexpr double kKnownScale = 0.004;  // standard deviation at which pushing may end
+constexpr double kShortest = 1e-9;     // of a direction
+
+Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
+
+command_line::Check finite() {
+  constexpr double kMax = std::numeric_limits<double>::max();
+  return command_line::number(-kMax, kMax, "a number", "NUMBER");
+}
+
+int stopped() {
+  tell("stopped");
+  return kOff;
+}
+
+/// Prints the findings; whether all are fine.
+bool print(const std::vector<InSituFinding>& findings) {
+  bool fine = true;
+  for (const InSituFinding& finding : findings) {
+    std::cout << text(finding) << '\n';
+    // One tag alone cannot be compared, ever: that is no fault of today.
+    const bool by_design = finding.subject == Subject::tags && finding.fault == Fault::not_known;
+    fine = fine && (finding.fine() || by_design);
+  }
+  std::cout.flush();
+  return fine;
+}
+
+/// M = r x F, where r is where the point has gone with the platform; and what is not known of mass,
+/// point and direction.
+void set_known(const CheckOptions& options, const Vector6& displacement, ProofLoad& load) {
+  const Eigen::Vector3d point = vector3(options.at_mm) * 1e-3;
+  const double force = *options.mass_g * 1e-3 * link::kStandardGravity;
+  const Eigen::Vector3d f = force * vector3(options.gravity).normalized();
+  const Eigen::Vector3d r =
+      displacement.head<3>() + rotation_from_vector(displacement.tail<3>()) * point;
+  load.known << f, r.cross(f);
+  const double turn = options.direction_sigma_deg * std::numbers::pi / 180;
+  const double shift = options.at_sigma_mm * 1e-3;
+  const double size = options.mass_sigma_percent * 1e-2;
+  Matrix6 covariance = size * size * load.known * load.known.transpose();
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d e = Eigen::Vector3d::Unit(i);
+    Vector6 turned, shifted;
+    turned << e.cross(f), r.cross(e.cross(f));
+    shifted << Eigen::Vector3d::Zero(), e.cross(f);
+    covariance +=
+        turn * turn * turned * turned.transpose() + shift * shift * shifted * shifted.transpose();
+  }
+  load.known_covariance = covariance;
+}
+
+/// The simulated hand on the cell, for as long as anyone has patience with it.
+void simulated_push(sim::Bench& bench, const Vector6& range, const ReferenceLine& line) {
+  constexpr double kShare = 0.6;  // of what the weakest axis bears
+  constexpr int kStrokes = 8;
+  Vector6 of_newton;
+  of_newton << line.direction, line.point.cross(line.direction);
+  const double most = 1 / of_newton.cwiseAbs().cwiseQuotient(range).maxCoeff();
+  bench.push(line.point, line.direction, kShare * most,
+             std::chrono::duration<double>(kPatience).count(), kStrokes);
+}
+
+/// How far the wrench must go before the load is taken to be there, of the range.
+double least_change(const CheckOptions& options, const Vector6& range) {
+  ProofLoad load;
+  set_known(options, Vector6::Zero(), load);
+  return 0.3 * load.known.cwiseQuotient(range).cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+CheckCommand::CheckCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
+          "check", "say line by line whether a calibrated sensor still measures what it did")) {
+  verb_.add_option("--sensor", options_.sensor, "sensor.yaml of this sensor").required();
+  verb_
+      .add_option("--source", options_.source,
+                  "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
+      .required();
+  add_events_option(verb_, options_.events);
+  add_load_options();
+}
+
+void CheckCommand::add_load_options() {
+  const auto vector = [&](const char* name, std::vector<double>& value, const char* help) {
+    return verb_.add_option(name, value, help).delimiter(',').expected(3).check(finite());
+  };
+  command_line::Option mass =
+      verb_.add_option("--mass-g", options_.mass_g, "a known mass to hang on, g")
+          .check(command_line::range(0.1, 1e5));
+  command_line::Option at =
+      vector("--at", options_.at_mm,
+             "x,y,z: where a load takes hold, mm, platform frame (origin between the tags, "
+             "axes as the camera's)");
+  vector("--gravity", options_.gravity,
+         "x,y,z: which way masses pull, camera axes; 0,0,-1 when the camera looks up");
+  verb_
+      .add_option("--mass-sigma-percent", options_.mass_sigma_percent,
+                  "how well the mass is known, 1 standard deviation")
+      .check(command_line::range(0.0, 50.0));
+  verb_.add_option("--at-sigma-mm", options_.at_sigma_mm, "how well the point is known")
+      .check(command_line::range(0.0, 50.0));
+  command_line::Option board = verb_.add_option(
+      "--board", options_.board, "a load cell of this board to push with: its port, or auto");
+  command_line::Option direction =
+      vector("--direction", options_.direction,
+             "x,y,z: of the force on the platform when the cell is pushed");
+  verb_
+      .add_option("--cells", options_.cells,
+                  "calibration file of its load cells; without it the one kept for this board")
+      .needs(board);
+  verb_.add_option("--channel", options_.channel, "of the load cell")
+      .check(command_line::range(0, 3))
+      .needs(board);
+  verb_
+      .add_option("--emulated-cell", options_.emulated_cell,
+                  "with --source sim and an emulated board: the pipe that the board reads its "
+                  "orders from, so that its cell feels the simulated hand")
+      .needs(board);
+  mass.needs(at);
+  board.needs(at);
+  board.needs(direction);
+  direction.needs(board);
+  mass.excludes(board);
+}
+
+int CheckCommand::run() const {
+  if (!(vector3(options_.gravity).norm() > kShortest))
+    throw ConfigError("--gravity: has no length; give a direction such as 0,0,-1");
+  if (!options_.direction.empty() && !(vector3(options_.direction).norm() > kShortest))
+    throw ConfigError("--direction: has no length; give a direction such as 0,0,-1");
+  const UniqueFd stop = termination_fd();
+  std::unique_ptr<RunBoard> board;
+  if (!options_.board.empty()) {
+    BoardOptions board_options;
+    board_options.port = options_.board == "auto" ? "" : options_.board;
+    board_options.cells_file = options_.cells;
+    board = std::make_unique<RunBoard>(board_options);
+    if (!board->connected()) return stopped();
+  }
+  BenchInput at;
+  const InputOptions from{options_.sensor, options_.source, /*fast=*/!board};
+  if (board && options_.emulated_cell.empty()) {
+    at.input = open_input(from);  // a board has its own time
+  } else {
+    at = open_at_bench(from);
+  }
+  if (!options_.emulated_cell.empty() && !at.bench) {
+    throw ConfigError(
+        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
+                    options_.source));
+  }
+  Input& input = at.input;
+  check_size(input);
+  check_calibrated_rest(input.sensor, "check");
+  if (board && !board->settle_light(input, stop)) return stopped();
+  HandsOff hands_off(input.sensor, std::chrono::seconds(2),
+                     options_.mass_g ? kPatienceForMass : kPatience);
+  Events events(options_.events);
+  tell("source: " + input.source->format().description);
+  tell("hands off for some seconds");
+  std::unique_ptr<Output> cell;
+  if (board) {
+    input.sensor.reference = ReferenceLine{options_.channel, vector3(options_.at_mm) * 1e-3,
+                                           vector3(options_.direction).normalized()};
+    cell = board->output(input.sensor, "");
+  }
+  const Seen seen = watch(*input.source, stop, hands_off, events, cell.get());
+  if (seen == Seen::stopped) return stopped();
+  if (const std::string why = why_nothing(seen, hands_off); !why.empty()) {
+    tell(why);
+    return kOff;
+  }
+  bool fine = print(judge(hands_off.result()));
+  if (options_.mass_g) fine = by_mass(at, stop, hands_off, events) && fine;
+  if (board) fine = by_cell(at, stop, *board, *cell) && fine;
+  if (termination_requested()) return stopped();
+  return fine ? 0 : kOff;
+}
+
+bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off,
+                           Events& events) const {
+  ProofLoad load;
+  load.range = at.input.sensor.wrench.range;
+  const Vector6 before = hands_off.result().wrench;
+  hands_off.wait_for_change(least_change(options_, load.range));
+  tell(fmt::format("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest",
+                   *options_.mass_g, options_.at_mm[0], options_.at_mm[1], options_.at_mm[2]));
+  if (at.bench) at.bench->hang(*options_.mass_g * 1e-3, vector3(options_.at_mm) * 1e-3);
+  const Seen loaded = watch(*at.input.source, stop, hands_off, events);
+  InSituFinding scale{.subject = Subject::scale, .fault = Fault::not_known};
+  if (loaded == Seen::enough && hands_off.result().held) {
+    load.measured = hands_off.result().wrench - before;
+    load.measured_covariance = hands_off.wrench_sigma().cwiseAbs2().asDiagonal();
+    set_known(options_, hands_off.displacement(), load);
+    scale = judge(load);
+  }
+  return loaded != Seen::stopped && print({scale});
+}
+
+/// Until the scale is known well, or patience is lost.
+bool CheckCommand::by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard& board,
+                           Output& cell) const {
+  const SensorConfig& sensor = at.input.sensor;
+  Tracker tracker(sensor.camera, sensor.target, sensor.rest);
+  WrenchEstimator wrench(sensor.wrench);
+  std::optional<EmulatedCell> hand;
+  if (!options_.emulated_cell.empty())
+    hand.emplace(options_.emulated_cell, options_.channel, *at.bench, at.time_zero);
+  tell("now push with the load cell, slowly, on and off, for some seconds");
+  if (hand) simulated_push(*at.bench, sensor.wrench.range, *sensor.reference);
+  std::optional<TimePoint> begin;
+  while (true) {
+    Frame frame;
+    const Next next = next_frame(*at.input.source, stop, frame);
+    if (next == Next::stopped) return false;
+    if (next == Next::end) break;
+    if (hand) hand->follow();
+    if (const std::string_view news = cell.service(); !news.empty()) tell(news);
+    if (next != Next::frame) continue;
+    if (!begin) begin = frame.capture_time;
+    Sample sample{.capture_time = frame.capture_time, .latency_origin = frame.latency_origin};
+    const Track track = tracker.track(frame);
+    wrench.estimate(track, sample);
+    cell.send(sample);
+    const Duration pushed = frame.capture_time - *begin;
+    const bool known = board.monitor().scale_sigma() < kKnownScale;
+    if (pushed >= kPatience || (known && pushed >= kLeastPush)) break;
+  }
+  return print({judge(board.monitor())});
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,159 @@
+#include "host/commands/events.h"
+
+#include <fcntl.h>
+#include <turbojpeg.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <exception>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "host/core/json/json_text.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr Duration kLiveEventEvery = std::chrono::milliseconds(100);
+constexpr Duration kPictureEventEvery = std::chrono::milliseconds(200);
+constexpr int kPictureQuality = 70;
+
+std::string base64(std::span<const std::uint8_t> bytes) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t three = 0;
+    for (std::size_t j = 0; j < 3; ++j) three = three << 8 | (j < left ? bytes[i + j] : 0U);
+    for (std::size_t j = 0; j < 4; ++j)
+      text += j <= left ? kDigits[three >> (18 - 6 * j) & 63U] : '=';
+  }
+  return text;
+}
+
+/// Empty: it could not be made.
+std::string jpeg_in_base64(const ImageView& image) {
+  const std::unique_ptr<void, int (*)(tjhandle)> coder(tjInitCompress(), tjDestroy);
+  if (!coder) return {};
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  const int failed = tjCompress2(coder.get(), image.pixels, image.width, image.stride, image.height,
+                                 TJPF_GRAY, &bytes, &size, TJSAMP_GRAY, kPictureQuality, 0);
+  const std::unique_ptr<unsigned char, void (*)(unsigned char*)> owner(bytes, tjFree);
+  return failed != 0 ? std::string() : base64({bytes, size});
+}
+
+}  // namespace
+
+Events::Events(int fd) noexcept : fd_(fd) {
+  const int flags = fd < 0 ? -1 : ::fcntl(fd, F_GETFL);
+  if (flags < 0 || ::fcntl(fd, F_SETFL, flags | O_NONBLOCK) != 0) {
+    fd_ = -1;
+    return;
+  }
+  ::fcntl(fd, F_SETFD, FD_CLOEXEC);
+}
+
+void Events::line(std::string_view kind, const std::string& text) noexcept {
+  if (!on()) return;
+  try {
+    send({{"line", {{"kind", kind}, {"text", text}}}});
+  } catch (const std::exception&) {
+    return;  // out of memory: untold
+  }
+}
+
+void Events::live(const std::string& text) noexcept {
+  if (!on() || !due(live_, kLiveEventEvery)) return;
+  try {
+    send({{"live", text}});
+  } catch (const std::exception&) {
+    return;
+  }
+}
+
+void Events::progress(double part) noexcept {
+  const int percent = std::isfinite(part) ? static_cast<int>(std::lround(100 * part)) : 0;
+  if (!on() || percent == percent_) return;
+  try {
+    if (send({{"progress", std::clamp(percent, 0, 100) / 100.0}})) percent_ = percent;
+  } catch (const std::exception&) {
+    return;
+  }
+}
+
+void Events::coverage(std::initializer_list<std::pair<const char*, Seen>> seen) noexcept {
+  if (!on()) return;
+  try {
+    nlohmann::json coverage = nlohmann::json::object();
+    for (const auto& [name, value] : seen)
+      std::visit([&, key = name](const auto& v) { coverage[key] = v; }, value);
+    std::string text = dump_json(coverage);
+    if (text == coverage_) return;
+    if (send({{"coverage", coverage}})) coverage_ = std::move(text);
+  } catch (const std::exception&) {
+    return;
+  }
+}
+
+void Events::picture(const ImageView& image, std::span<const TagCorners> tags) noexcept {
+  if (!on() || !rest_.empty() || !due(picture_, kPictureEventEvery)) return;
+  try {
+    nlohmann::json outlines = nlohmann::json::array();
+    for (const TagCorners& tag : tags) outlines.push_back({{"id", tag.id}, {"px", tag.px}});
+    send({{"picture",
+           {{"width", image.width},
+            {"height", image.height},
+            {"tags", std::move(outlines)},
+            {"jpeg", jpeg_in_base64(image)}}}});
+  } catch (const std::exception&) {
+    return;
+  }
+}
+
+bool Events::due(TimePoint& last, Duration every) const noexcept {
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (now - last < every) return false;
+  last = now;
+  return true;
+}
+
+/// Whole lines only: what has begun is ended before anything else is.
+bool Events::send(const nlohmann::json& event) {
+  const auto write_some = [this](std::string_view text) -> std::size_t {
+    const ssize_t written = ::write(fd_, text.data(), text.size());
+    if (written < 0 && errno != EAGAIN && errno != EINTR) fd_ = -1;  // the reader has gone
+    return written < 0 ? 0 : static_cast<std::size_t>(written);
+  };
+  rest_.erase(0, rest_.empty() ? 0 : write_some(rest_));
+  if (!rest_.empty() || !on()) return false;
+  std::string text = dump_json(event);
+  text += '\n';
+  const std::size_t written = write_some(text);
+  if (written > 0) rest_ = text.substr(written);
+  return written > 0;
+}
+
+std::vector<TagCorners> outline_of(std::span<const std::array<double, 2>> corners_px) {
+  if (corners_px.empty()) return {};
+  const auto extreme = [&](double along_x, double along_y) {
+    return *std::max_element(
+        corners_px.begin(), corners_px.end(), [&](const auto& a, const auto& b) {
+          return along_x * a[0] + along_y * a[1] < along_x * b[0] + along_y * b[1];
+        });
+  };
+  TagCorners outline;
+  const std::array<std::array<double, 2>, 4> four = {extreme(-1, -1), extreme(1, -1), extreme(1, 1),
+                                                     extreme(-1, 1)};
+  for (std::size_t i = 0; i < 4; ++i) {
+    outline.px[2 * i] = four[i][0];
+    outline.px[2 * i + 1] = four[i][1];
+  }
+  return {outline};
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,386 @@
+#include "host/commands/run_command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "host/app/input.h"
+#include "host/app/pipeline.h"
+#include "host/commands/count_text.h"
+#include "host/commands/run_input.h"
+#include "host/commands/run_outputs.h"
+#include "host/commands/run_web.h"
+#include "host/core/config_error.h"
+#include "host/core/os/termination.h"
+#include "host/core/tell.h"
+#include "host/output/service_watch.h"
+#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
+#include "host/sensor/zero_options.h"
+#include "host/source/region_source.h"
+
+namespace tagwrench {
+namespace {
+
+/// The program that connected last of those that are connected.
+std::string_view last_program(const SpnavOutput& output) {
+  if (output.programs().empty()) return {};
+  return output.programs().back().name.data();
+}
+
+/// Where wishes come in, for who has a device on his desk.
+std::optional<ControlSocket> control_of(const RunOptions& options) {
+  const std::vector<Spec> specs = output_specs(options);
+  const bool device = (specs.empty() && !options.record) ||
+                      std::any_of(specs.begin(), specs.end(), is_input_device);
+  const bool on_hid = std::any_of(specs.begin(), specs.end(), is_hid_device);
+  const bool pages = has_web(options);
+  if (!device && !on_hid && !pages && options.profiles.empty()) return {};
+  try {
+    const std::string path = control_path(options.name);
+    if (!on_hid || !listens(path)) return ControlSocket(path);
+  } catch (const ConfigError& e) {
+    tell(fmt::format("running without `tagwrench control`: {}", e.what()));
+    return {};
+  }
+  // Two devices with one serial number would be mixed up by whoever opens them by it.
+  throw ConfigError(fmt::format(
+      "--name {}: a bridge of this name runs already; stop it, or give this one another name",
+      options.name));
+}
+
+void check_name(const std::string& name) {
+  const bool usable = !name.empty() && name.size() <= 32 &&
+                      std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                        return std::isalnum(c) != 0 || c == '-' || c == '_';
+                      });
+  if (!usable)
+    throw ConfigError(
+        fmt::format("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name));
+}
+
+/// Says how far the zero went, if it is far enough to be seen.
+void say_zero(const ZeroTracking& zero, const Vector6& range, double band) {
+  constexpr double kSeen = 5e-4;  // of the range
+  const Vector6& moved = zero.moved();
+  double most = 0;
+  for (int i = 0; i < 6; ++i) {
+    if (range[i] > 0 && range[i] < kUnknownRange)
+      most = std::max(most, std::abs(moved[i]) / range[i]);
+  }
+  if (most < kSeen) return;
+  tell(fmt::format(
+      "the zero followed what read while nobody touched: by {:.3g} {:.3g} {:.3g} N, {:.3g} {:.3g} "
+      "{:.3g} mN m, {:.2g} % of the range{}",
+      moved[0], moved[1], moved[2], moved[3] * 1e3, moved[4] * 1e3, moved[5] * 1e3, 100 * most,
+      most > 0.9 * band ? ", about as far as it may: run `tagwrench zero`" : ""));
+}
+
+/// What is recorded of the run, told to all who have something to say.
+Recording& start_recording(const RunOptions& options, const record::Head& head, const Input& input,
+                           const RunLimits& limits, RunBoard* board, Outputs& outputs) {
+  const bool lossless = options.fast && input.source->poll_fd() < 0;
+  auto recording =
+      std::make_unique<Recording>(*options.record, head, lossless, limits.frames, limits.time);
+  Recording& started = *recording;
+  outputs.all.push_back(std::move(recording));
+  if (board != nullptr) board->record_to(started.writer());
+  return started;
+}
+
+/// Ends it, and says so. False: something went wrong.
+bool end_recording(std::unique_ptr<Output> output) {
+  auto& recording = static_cast<Recording&>(*output);
+  const std::string trouble = recording.finish();
+  tell(recording.summary());
+  if (!trouble.empty()) tell(trouble);
+  return trouble.empty();
+}
+
+std::string summary(const RunReport& report, const SensorConfig& sensor) {
+  const double seconds = std::chrono::duration<double>(report.elapsed).count();
+  std::string line =
+      fmt::format("{} in {:.2f} s ({:.1f} Hz), {} with numbers, {} dropped by the source",
+                  count_text(static_cast<std::uint64_t>(report.frames), "frame"), seconds,
+                  seconds > 0 ? report.frames / seconds : 0.0, report.with_numbers, report.dropped);
+  if (report.skipped > 0)
+    line += fmt::format(", {} samples not taken by slow readers", report.skipped);
+  if (report.frames > 0 && report.with_numbers == 0) {
+    line += "; the target was never held: ";
+    if (!report.trouble.empty()) {
+      line += report.trouble;
+    } else if (report.frames <= static_cast<std::uint64_t>(std::max(0, sensor.rest.frames))) {
+      line += fmt::format(
+          "its rest pose is learned from the first {} frames (rest.frames); give it more",
+          sensor.rest.frames);
+    } else {
+      line +=
+          "are the tags in view, in focus and lit, and are family, ids and number of tags those of "
+          "sensor.yaml?";
+    }
+  }
+  return line;
+}
+
+/// What outlives a run that lends its camera.
+struct Session {
+  RunOptions options;
+  std::unique_ptr<ServiceWatch> watch = nullptr;  ///< until the first run takes it
+  WebBridge* web = nullptr;
+  KeptOutputs kept = {};
+  std::uint64_t frames = 0;  ///< of the runs before
+  TimePoint start = std::chrono::steady_clock::now();
+};
+
+/// Pages are told when a run is over, however it ends.
+class WebRun {
+ public:
+  WebRun(WebBridge* web, std::unique_ptr<WebOutput> output, Outputs& outputs)
+      : web_(web), output_(output.get()) {
+    if (output) outputs.all.push_back(std::move(output));
+  }
+  WebRun(const WebRun&) = delete;
+  WebRun& operator=(const WebRun&) = delete;
+  ~WebRun() {
+    if (web_ != nullptr) web_->end_run();
+  }
+  WebOutput* output() const { return output_; }
+
+ private:
+  WebBridge* web_;
+  WebOutput* output_;
+};
+
+/// Where the next run gets its pictures from, if there is one: from where this one does.
+void stay_with(const Input& input, RunOptions& options) {
+  if (options.source.empty() && split_spec(input.spec).kind == "sim") options.sensor.clear();
+  options.source = input.spec;
+}
+
+RunLimits limits_of(const Session& session) {
+  RunLimits limits;
+  const RunOptions& options = session.options;
+  if (options.frames) limits.frames = static_cast<std::uint64_t>(*options.frames) - session.frames;
+  if (options.seconds) {
+    limits.time =
+        std::chrono::duration_cast<Duration>(std::chrono::duration<double>(*options.seconds));
+    if (session.frames > 0)
+      *limits.time -= std::min(*limits.time, std::chrono::steady_clock::now() - session.start);
+  }
+  return limits;
+}
+
+/// A source whose part that is read can be chosen while it runs.
+RegionSource& choose_region(Input& input, bool narrow) {
+  auto region = std::make_unique<RegionSource>(std::move(input.source), narrow);
+  RegionSource& chosen = *region;
+  input.source = std::move(region);
+  return chosen;
+}
+
+std::unique_ptr<WebOutput> begin_web_run(const Session& session, const Input& input,
+                                         RegionSource* source, RunBoard* board, bool desk,
+                                         const Outputs& outputs) {
+  if (session.web == nullptr) return nullptr;
+  WebOutput::Parts parts;
+  parts.source = source;
+  parts.board = board;
+  parts.programs = outputs.programs;
+  return session.web->begin_run(run_facts(session.options, input, board != nullptr, desk), parts);
+}
+
+/// The exit status; nothing: the camera is wanted for something else, and the run goes on after it.
+std::optional<int> run_once(Session& session) {
+  RunOptions& options = session.options;
+  std::unique_ptr<RunBoard> board;
+  if (!options.board.empty()) {
+    BoardOptions board_options;
+    board_options.port = options.board == "auto" ? "" : options.board;
+    board_options.cells_file = options.cells;
+    board = std::make_unique<RunBoard>(board_options);
+    if (!board->connected()) return 0;
+  }
+  // Last of all what does not wait: a camera's frames, the simulated sensor's second at rest.
+  std::optional<Input> found = open_run_input(options, session.watch.get());
+  if (!found) return 0;
+  Input input = std::move(*found);
+  const UniqueFd stop = termination_fd();
+  check_size(input);
+  check_appearance(input);
+  stay_with(input, options);
+  record::Head head;
+  if (options.record) head = recording_head(input, options.record->keep);
+  const bool narrow = options.record && head.keep == record::Keep::region;
+  RegionSource* region = nullptr;
+  if (narrow || session.web != nullptr) region = &choose_region(input, narrow);
+  if (board && !board->settle_light(input, stop)) return 0;
+  Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
+  WrenchEstimator wrench(input.sensor.wrench);
+  const bool many_profiles = !options.profiles.empty();
+  std::optional<ControlSocket> control = control_of(options);
+  const bool has_control = control.has_value();
+  Desk desk(ProfileFiles(options.profiles, default_profile(input.sensor)), std::move(control),
+            many_profiles ? FocusWatch::open() : std::nullopt);
+  const ZeroOptions zero_limits =
+      zero_options(input.sensor, wrench.tool(), !options.no_zero_tracking);
+  ZeroTracking zero(zero_limits);
+  Outputs outputs = open_outputs(options, input, board.get(), session.kept);
+  if (many_profiles && outputs.programs != nullptr)
+    desk.follow_programs([&programs = *outputs.programs] { return last_program(programs); });
+  tell("source: " + input.source->format().description);
+  if (!input.sensor.completed_axes.empty()) {
+    tell(
+        fmt::format("not calibrated, but as the springs are described: {}; their standard "
+                    "deviations say how little is known",
+                    input.sensor.completed_axes));
+  }
+  if (session.watch != nullptr) {
+    session.watch->ready("source: " + input.source->format().description);
+    outputs.all.push_back(std::move(session.watch));
+  }
+
+  const RunLimits limits = limits_of(session);
+  RunReport report;
+  {
+    const WebRun web(session.web,
+                     begin_web_run(session, input, region, board.get(), has_control, outputs),
+                     outputs);
+    DeadMan dead_man(outputs.devices);
+    FrameLog* log = web.output();
+    if (options.record) {
+      Recording& recording = start_recording(options, head, input, limits, board.get(), outputs);
+      if (web.output() != nullptr) web.output()->pass_on_to(&recording);
+      if (log == nullptr) log = &recording;
+    }
+    Pipeline pipeline(*input.source, tracker, wrench, desk, outputs.all, dead_man,
+                      session.web == nullptr ? stop.get() : session.web->end_fd(), log);
+    pipeline.follow_zero(zero);
+    if (web.output() != nullptr) web.output()->follow_skipped(pipeline.so_far().skipped);
+    report = pipeline.run(limits);
+  }
+  session.frames += report.frames;
+  if (report.end == RunReport::End::interrupted && !termination_requested()) {
+    session.kept = keep_outputs(outputs);
+    return {};
+  }
+  std::unique_ptr<Output> recording;
+  if (options.record) {
+    recording = std::move(outputs.all.back());
+    outputs.all.pop_back();
+  }
+  outputs.all.clear();  // neutral, then gone, before anything else is said
+  const bool recorded = recording == nullptr || end_recording(std::move(recording));
+  if (report.end == RunReport::End::output_failed) {
+    if (recorded) tell(report.failure);
+    return 1;
+  }
+  tell(summary(report, input.sensor));
+  say_zero(zero, zero_limits.range, zero_limits.band);
+  if (const std::string unusable = input.source->unusable(); !unusable.empty()) tell(unusable);
+  return recorded ? 0 : 1;
+}
+
+/// One run after the other, as pages want the camera and give it back.
+int run_with_pages(Session& session) {
+  const UniqueFd stop = termination_fd();
+  const std::unique_ptr<WebBridge> web = open_web(session.options, stop);
+  session.web = web.get();
+  for (bool first = true;; first = false) {
+    bool again = false;
+    try {
+      if (const std::optional<int> status = run_once(session)) return *status;
+      again = web->lend_camera(session.kept);
+    } catch (const ConfigError& e) {
+      if (first) throw;
+      tell(e.what());
+      again = web->wait_after(e.what(), session.kept);
+    }
+    if (!again) return 0;
+  }
+}
+
+}  // namespace
+
+int run(const RunOptions& given) {
+  const UniqueFd caught = termination_fd();  // what comes while it is set up ends it in order, too
+  output_specs(given);                       // refused before anything is opened or lit
+  check_name(given.name);
+  const bool pages = has_web(given);
+  Session session{with_own_sensor(given)};
+  session.watch = ServiceWatch::open();
+  if (session.options.record) check_recording(*session.options.record);
+  return pages ? run_with_pages(session) : *run_once(session);
+}
+
+const char* const kSourceHelp =
+    "where frames come from:\n"
+    "  sim | sim:SCENARIO.yaml       the simulated sensor\n"
+    "  v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]\n"
+    "  images:DIR                    PNG, PGM or JPEG in name order, times from DIR/frames.csv\n"
+    "  recording:FILE                what `tagwrench record` made\n"
+    "Without it: a camera that sees the tags, else sim";
+
+const char* const kOutputHelp =
+    "where samples go (repeat it for more than one):\n"
+    "  terminal                      live view\n"
+    "  jsonl:FILE, csv:FILE          one line per frame, - is standard output\n"
+    "  spacemouse                    virtual 6-DOF puck for CAD programs\n"
+    "  wrench                        HID force-torque sensor in N and N m\n"
+    "  joystick                      six-axis joystick for games\n"
+    "  spnav[:PATH]                  the socket of libspnav programs, without any device\n"
+    "  web[:ADDRESS:PORT]            pages for a browser: 127.0.0.1:8137\n"
+    "  gadget[:spacemouse|:wrench]   a USB device of another computer, after `tagwrench gadget "
+    "up`\n"
+    "  reference:FILE                as csv, beside the load cells of --board at the same time\n"
+    "Without it: terminal, and every device that this machine allows";
+
+RunCommand::RunCommand(command_line::Command program)
+    : verb_(program.add_subcommand("run", "track the tags, compute the wrench, feed the outputs")) {
+  verb_.add_option("--sensor", options_.sensor,
+                   "sensor.yaml of this sensor; without it, for a camera, the one "
+                   "in\n~/.config/tagwrench if it is there");
+  verb_.add_option("--source", options_.source, kSourceHelp);
+  verb_.add_option("--output", options_.outputs, kOutputHelp);
+  verb_.add_option("--profile", options_.profiles,
+                   "how pushes become motion: cad, game, research, a file, or a folder of them;\n"
+                   "several: the first is in force until a program's window, a gesture or\n"
+                   "`tagwrench control` chooses another");
+  verb_
+      .add_option("--name", options_.name,
+                  "of the sensor, where there are two: the serial number of its devices")
+      .capture_default_str();
+  verb_.add_option("--frames", options_.frames, "end after N frames")
+      .check(command_line::range(1, kMaxRunFrames));
+  verb_.add_option("--seconds", options_.seconds, "end after S seconds")
+      .check(command_line::seconds());
+  verb_.add_flag("--fast", options_.fast,
+                 "sources that are not live run as fast as they can, no frame dropped");
+  verb_.add_flag("--wait", options_.wait,
+                 "for the camera, if it is not there: what a service wants");
+  verb_.add_flag("--no-zero-tracking", options_.no_zero_tracking,
+                 "the zero does not follow what reads while nobody touches the sensor");
+  verb_.add_option("--board", options_.board,
+                   "serial port of the board that lights the tags and reads load cells:\n"
+                   "a path, usb:VENDOR:PRODUCT[:SERIAL], or auto for the only one");
+  verb_.add_flag(
+      "--open", options_.web.open,
+      "pages as with --output web, but beside the usual outputs, and open in the browser");
+  verb_.add_option("--web-token", options_.web.token_file,
+                   "file with the token that pages need on an address that others reach;\n"
+                   "made where it is not there");
+  verb_.add_option("--recordings", options_.web.recordings,
+                   "folder of what pages record; without it ~/.local/share/tagwrench/recordings");
+  verb_.add_option("--web-pages", options_.web.pages).hidden();
+  verb_.add_option("--cells", options_.cells,
+                   "calibration file of its load cells; without it the one kept for this board");
+}
+
+}  // namespace tagwrench

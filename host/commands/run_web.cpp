@@ -1,0 +1,122 @@
+#include "host/commands/run_web.h"
+
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+
+#include "host/commands/recording.h"
+#include "host/commands/web_place.h"
+#include "host/core/config_error.h"
+#include "host/core/os/config_folder.h"
+#include "host/core/os/uninterrupted.h"
+#include "host/core/tell.h"
+#include "host/source/v4l2_mode.h"
+#include "host/web/bridge/recording_folder.h"
+#include "host/web/server/token_file.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+
+const Spec* web_among(const std::vector<Spec>& specs) {
+  const auto found =
+      std::find_if(specs.begin(), specs.end(), [](const Spec& spec) { return spec.kind == "web"; });
+  return found == specs.end() ? nullptr : &*found;
+}
+
+std::vector<Spec> specs_of(const RunOptions& options) {
+  std::vector<Spec> specs;
+  for (const std::string& text : options.outputs) specs.push_back(split_spec(text));
+  return specs;
+}
+
+/// In the browser of the desktop, where there is one; the shell leaves it to itself, and Ctrl-C in
+/// our terminal too.
+void open_in_browser(const std::string& url) {
+  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
+  std::string shell = "sh", option = "-c", command = "xdg-open \"$0\" >/dev/null 2>&1 </dev/null &",
+              address = url;
+  char* const arguments[] = {shell.data(), option.data(), command.data(), address.data(), nullptr};
+  posix_spawnattr_t own_session;
+  ::posix_spawnattr_init(&own_session);
+  ::posix_spawnattr_setflags(&own_session, POSIX_SPAWN_SETSID);
+  pid_t pid = 0;
+  if (::posix_spawn(&pid, "/bin/sh", nullptr, &own_session, arguments, environ) == 0)
+    uninterrupted([&] { return ::waitpid(pid, nullptr, 0); });
+  ::posix_spawnattr_destroy(&own_session);
+}
+
+/// What a job would cut off.
+bool writes_for_good(const RunOptions& options) {
+  const std::vector<Spec> specs = specs_of(options);
+  return options.record || std::any_of(specs.begin(), specs.end(),
+                                       [](const Spec& spec) { return spec.kind == "reference"; });
+}
+
+}  // namespace
+
+bool has_web(const RunOptions& options) {
+  const std::vector<Spec> specs = specs_of(options);
+  const Spec* web = web_among(specs);
+  if (web != nullptr) parse_web("--output web", web->argument);
+  if (web == nullptr && options.web.open) return true;
+  if (web == nullptr && !options.web.token_file.empty())
+    throw ConfigError("--web-token: is for pages; add --output web:ADDRESS:PORT");
+  if (web == nullptr && !options.web.recordings.empty())
+    throw ConfigError("--recordings: is for pages; add --output web");
+  return web != nullptr;
+}
+
+std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& stop) {
+  const std::vector<Spec> specs = specs_of(options);
+  WebBridgeOptions web;
+  const Spec* spec = web_among(specs);
+  web.server = parse_web("--output web", spec == nullptr ? "" : spec->argument);
+  web.server.pages = options.web.pages.empty() ? built_pages() : fs::path(options.web.pages);
+  bool token_made = false;
+  if (!options.web.token_file.empty()) {
+    const WebToken token = web_token(options.web.token_file);
+    web.server.token = token.text;
+    token_made = token.made;
+  }
+  web.recordings = options.web.recordings.empty() ? usual_recording_folder()
+                                                  : fs::absolute(options.web.recordings);
+  if (const std::string folder = config_folder(); !folder.empty())
+    web.own_profiles = fs::path(folder) / "profiles";
+  auto bridge = std::make_unique<WebBridge>(web, stop.get());
+  tell(fmt::format("pages: {}{}", token_made ? bridge->url_with_token() : bridge->url(),
+                   web.server.token.empty() || token_made
+                       ? ""
+                       : fmt::format("#token=... (the token is in {})", options.web.token_file)));
+  bridge->start();
+  if (options.web.open) open_in_browser(bridge->url_with_token());
+  return bridge;
+}
+
+RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bool desk) {
+  RunFacts facts;
+  facts.name = options.name;
+  facts.format = input.source->format();
+  facts.sensor = input.sensor;
+  const bool is_file = input.sensor_text.empty() && !input.recorded;
+  if (is_file) facts.place.sensor = fs::absolute(input.sensor_name).string();
+  facts.place.source = input.spec;
+  facts.place.board = options.board;
+  facts.place.cells = options.cells;
+  facts.place.calibrated = !input.sensor.calibration.empty();
+  facts.place.kept = writes_for_good(options);
+  const Spec source = split_spec(input.spec);
+  if (source.kind == "v4l2") facts.camera_device = parse_v4l2_spec(source.argument).path;
+  facts.board = board;
+  facts.desk = desk;
+  if (!options.record) facts.head = recording_head(input, record::Keep::raw);
+  return facts;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,70 @@
+#include "host/commands/spnav_command.h"
+
+#include <fmt/format.h>
+#include <sys/prctl.h>
+
+#include <chrono>
+#include <csignal>
+#include <memory>
+#include <utility>
+
+#include "host/core/config_error.h"
+#include "host/core/os/termination.h"
+#include "host/core/tell.h"
+#include "host/output/service_watch.h"
+#include "host/output/spnav_keeper.h"
+#include "host/output/spnav_link.h"
+
+namespace tagwrench {
+namespace {
+
+/// How long a keeper that a bridge has started waits for the next bridge or program.
+constexpr Duration kIdle = std::chrono::minutes(1);
+
+SpnavSockets make_sockets(const std::string& path) {
+  std::optional<SpnavSockets> sockets = listen_spnav(path);
+  if (!sockets) {
+    throw ConfigError(
+        fmt::format("spnav socket {}: it is served already, by `tagwrench spnav` or for `tagwrench "
+                    "run`; choose "
+                    "another path with --socket, or use that one",
+                    path));
+  }
+  return std::move(*sockets);
+}
+
+}  // namespace
+
+SpnavCommand::SpnavCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
+          "spnav",
+          "hold the socket that CAD programs connect to, whatever becomes of "
+          "`tagwrench run`")) {
+  verb_.footer(
+      "`tagwrench run --output spnav[:PATH]` feeds it, and starts one by itself where there is "
+      "none. "
+      "Programs that use libspnav find it when started with SPNAV_SOCKET=PATH.");
+  verb_.add_option("--socket", socket_,
+                   "PATH; without it tagwrench/spnav.sock in $XDG_RUNTIME_DIR, and for root "
+                   "/var/run/spnav.sock if no spacenavd has it");
+  verb_.add_option("--inherited", inherited_).delimiter(',').expected(2).hidden();
+}
+
+int SpnavCommand::run() const {
+  const std::string path = spnav_socket_path(socket_);
+  const bool inherited = !inherited_.empty();
+  ::prctl(PR_SET_NAME, "tw-spnav");  // so that a kill by the bridge's name spares it
+  const UniqueFd stop = termination_fd();
+  SpnavSockets sockets =
+      inherited ? inherited_spnav(path, inherited_[0], inherited_[1]) : make_sockets(path);
+  SpnavKeeperOptions options;
+  if (inherited) options.idle_end = kIdle;
+  tell(fmt::format("spnav: serving {}; programs find it when started with SPNAV_SOCKET={}", path,
+                   path));
+  const std::unique_ptr<ServiceWatch> watch = inherited ? nullptr : ServiceWatch::open();
+  if (watch != nullptr) watch->ready("serving " + path);
+  SpnavKeeper(std::move(sockets), options, stop.get()).run();
+  return 0;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,22 @@
+#include "host/core/tell.h"
+
+#include <unistd.h>
+
+#include <string>
+
+#include "host/core/os/write_soon.h"
+
+namespace tagwrench {
+
+void tell(std::string_view line) noexcept {
+  try {
+    std::string text = "tagwrench: ";
+    for (const char c : line) text += c == '\n' || c == '\r' ? ' ' : c;
+    text += '\n';
+    write_soon(STDERR_FILENO, text, std::chrono::milliseconds(20));
+  } catch (...) {
+    // Out of memory: there is nobody to tell.
+  }
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,71 @@
+#include "host/core/sha256.h"
+
+#include <fmt/format.h>
+#include <openssl/evp.h>
+
+#include <array>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include "host/core/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+using Digest = std::array<unsigned char, EVP_MAX_MD_SIZE>;
+
+[[noreturn]] void no_sha256() {
+  throw std::runtime_error("libcrypto has no SHA-256; install the system's libssl");
+}
+
+std::string hex(const Digest& digest, unsigned int length) {
+  std::string out;
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  for (unsigned int i = 0; i < length; ++i) {
+    out += kDigits[digest[i] >> 4];
+    out += kDigits[digest[i] & 15];
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string sha256_hex(std::span<const std::uint8_t> bytes) {
+  Digest digest{};
+  unsigned int length = 0;
+  if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &length, EVP_sha256(), nullptr) != 1)
+    no_sha256();
+  return hex(digest, length);
+}
+
+std::string sha256_hex(std::string_view text) {
+  return sha256_hex(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+FileSha256 sha256_of_file(const std::filesystem::path& path) {
+  constexpr std::size_t kPart = 1 << 20;
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
+                                                                        &EVP_MD_CTX_free);
+  if (!context || EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) != 1) no_sha256();
+  std::ifstream file(path, std::ios::binary);
+  std::vector<char> part(kPart);
+  FileSha256 out;
+  while (file.read(part.data(), kPart), file.gcount() > 0) {
+    const auto got = static_cast<std::size_t>(file.gcount());
+    if (EVP_DigestUpdate(context.get(), part.data(), got) != 1) no_sha256();
+    out.bytes += got;
+  }
+  if (!file.eof()) {
+    throw ConfigError(fmt::format(
+        "{}: cannot be read; check the path and that it is a readable file", path.string()));
+  }
+  Digest digest{};
+  unsigned int length = 0;
+  if (EVP_DigestFinal_ex(context.get(), digest.data(), &length) != 1) no_sha256();
+  out.hex = hex(digest, length);
+  return out;
+}
+
+}  // namespace tagwrench

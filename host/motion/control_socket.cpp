@@ -1,0 +1,177 @@
+#include "host/motion/control_socket.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+#include <utility>
+
+#include "host/core/config_error.h"
+#include "host/core/os/runtime_folder.h"
+#include "host/core/os/uninterrupted.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr int kPatience_ms = 2000;
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\n";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+sockaddr_un address_of(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof address.sun_path)
+    throw ConfigError(path + ": too long for a socket (at most " +
+                      std::to_string(sizeof address.sun_path - 1) + " bytes); set XDG_RUNTIME_DIR");
+  std::memcpy(address.sun_path, path.data(), path.size());
+  return address;
+}
+
+const sockaddr* generic(const sockaddr_un& address) {
+  return reinterpret_cast<const sockaddr*>(&address);
+}
+
+UniqueFd datagram_socket() {
+  UniqueFd made(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!made)
+    throw ConfigError(std::string("tagwrench control: no socket to be had: ") +
+                      std::strerror(errno) + "; end other programs");
+  return made;
+}
+
+/// Within the time that an answer may take.
+bool is_ready(pollfd& entry) {
+  return uninterrupted([&] { return ::poll(&entry, 1, kPatience_ms); }) > 0;
+}
+
+/// What stands before the separator and what behind; all and nothing where there is none.
+std::pair<std::string_view, std::string_view> split_at(std::string_view text,
+                                                       char separator) noexcept {
+  const auto end = std::find(text.begin(), text.end(), separator);
+  const auto before = static_cast<std::size_t>(end - text.begin());
+  return {text.substr(0, before), end == text.end() ? std::string_view() : text.substr(before + 1)};
+}
+
+bool somebody_listens(const sockaddr_un& address) {
+  const UniqueFd probe = datagram_socket();
+  return ::connect(probe.get(), generic(address), sizeof address) == 0;
+}
+
+}  // namespace
+
+bool listens(const std::string& path) { return somebody_listens(address_of(path)); }
+
+ControlWish parse_wish(std::string_view bytes) noexcept {
+  using Kind = ControlWish::Kind;
+  const std::string_view wish = trimmed(bytes);
+  const auto [line, text] = split_at(wish, '\n');
+  const auto [word, behind] = split_at(line, ' ');
+  const std::string_view name = trimmed(behind);
+  if (word == "try" && !name.empty()) return {Kind::attempt, name, text};
+  if (!text.empty()) return {Kind::unknown, word};
+  if (word == "profile" && !name.empty()) return {Kind::profile, name};
+  if (word == "window") return {Kind::window, name};
+  if (word == "show") return {Kind::show, name};
+  if (!name.empty()) return {Kind::unknown, word};
+  if (word == "zero") return {Kind::zero};
+  if (word == "next") return {Kind::next_profile};
+  if (word == "status") return {Kind::status};
+  if (word == "live") return {Kind::live};
+  if (word == "keep") return {Kind::keep};
+  if (word == "revert") return {Kind::revert};
+  return {Kind::unknown, word};
+}
+
+ControlSocket::ControlSocket(std::string path)
+    : path_(std::move(path)), socket_(datagram_socket()), wish_(kLongestWish) {
+  const sockaddr_un address = address_of(path_);
+  if (::bind(socket_.get(), generic(address), sizeof address) == 0) return;
+  int error = errno;
+  if (error == EADDRINUSE && !somebody_listens(address)) {
+    ::unlink(path_.c_str());
+    if (::bind(socket_.get(), generic(address), sizeof address) == 0) return;
+    error = errno;
+  }
+  socket_.reset();  // or the file of another would be removed at the end
+  throw ConfigError(error == EADDRINUSE
+                        ? path_ + ": another bridge runs on this sensor; stop it first"
+                        : path_ + ": cannot listen: " + std::strerror(error) +
+                              "; set XDG_RUNTIME_DIR to a folder of yours");
+}
+
+ControlSocket::~ControlSocket() {
+  if (socket_) ::unlink(path_.c_str());
+}
+
+ControlWish ControlSocket::next() noexcept {
+  asker_size_ = sizeof asker_;
+  const ssize_t size = ::recvfrom(socket_.get(), wish_.data(), wish_.size(), MSG_TRUNC,
+                                  reinterpret_cast<sockaddr*>(&asker_), &asker_size_);
+  if (size < 0) return {};
+  if (static_cast<std::size_t>(size) > wish_.size())
+    return {ControlWish::Kind::unknown, "too long"};
+  return parse_wish({wish_.data(), static_cast<std::size_t>(size)});
+}
+
+std::string_view ControlSocket::asker() const noexcept {
+  if (asker_size_ <= sizeof(sa_family_t)) return {};
+  return {asker_.sun_path, std::min<std::size_t>(asker_size_, sizeof asker_) - sizeof(sa_family_t)};
+}
+
+void ControlSocket::answer(std::string_view text) noexcept {
+  if (asker_size_ <= sizeof(sa_family_t)) return;  // he has no address
+  // One who does not listen any more is not waited for.
+  [[maybe_unused]] const ssize_t sent =
+      ::sendto(socket_.get(), text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+               reinterpret_cast<const sockaddr*>(&asker_), asker_size_);
+}
+
+ControlClient::ControlClient(const std::string& path) : path_(path), socket_(datagram_socket()) {
+  const sockaddr_un address = address_of(path_);
+  const sa_family_t family = AF_UNIX;  // alone, it asks for a name of the kernel's choice
+  sockaddr own{};
+  own.sa_family = family;
+  if (::bind(socket_.get(), &own, sizeof family) != 0 ||
+      ::connect(socket_.get(), generic(address), sizeof address) != 0)
+    fail();
+}
+
+void ControlClient::fail() const {
+  throw ConfigError(path_ + ": nobody listens (" + std::strerror(errno) +
+                    "); start `tagwrench run` first, as the same user");
+}
+
+std::string ControlClient::ask(std::string_view wish) {
+  const auto send = [&] {
+    return ::send(socket_.get(), wish.data(), wish.size(), MSG_NOSIGNAL) >= 0;
+  };
+  pollfd room{socket_.get(), POLLOUT, 0};  // many ask at once, or it is stopped
+  bool sent = send();
+  if (!sent && errno == EAGAIN && is_ready(room)) sent = send();
+  if (!sent && errno != EAGAIN) fail();
+  pollfd waiting{socket_.get(), POLLIN, 0};
+  std::string answer(ControlSocket::kLongestAnswer, '\0');
+  const ssize_t size =
+      sent && is_ready(waiting) ? ::recv(socket_.get(), answer.data(), answer.size(), 0) : -1;
+  if (size < 0) throw ConfigError(path_ + ": no answer within 2 s; is `tagwrench run` stopped?");
+  answer.resize(static_cast<std::size_t>(size));
+  return answer;
+}
+
+std::string ask(const std::string& path, std::string_view wish) {
+  return ControlClient(path).ask(wish);
+}
+
+std::string control_path(const std::string& sensor) {
+  return runtime_folder() + "/" + sensor + ".control";
+}
+
+}  // namespace tagwrench

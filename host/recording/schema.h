@@ -1,0 +1,78 @@
+// What a recording is: one SQLite 3 file. Anybody's SQLite reads it; this is what they find.
+//
+// PRAGMA application_id is kApplicationId, user_version is kSchemaVersion: a reader refuses others.
+//
+// Order    Everything that happened has a number, `id`, which counts up over all tables. Rows of
+//          frames, tracks and samples that belong to one frame share its id. A sample that has no
+//          frame is the neutral one that the outputs got because none came in time.
+// Time     t_ns and the like are nanoseconds on the clock of the frames: CLOCK_MONOTONIC of live
+//          sources, the folder's or the simulator's own of others. origin_ns (where latency counts
+//          from) and output_ns (the output call) are CLOCK_MONOTONIC always.
+// Numbers  SI unless the name says else; displacement, wrench and corners as in host/core/types.h.
+// NULL
+//          is "not a number" or "none".
+// Blobs    of numbers are little-endian doubles without padding.
+//
+// meta       key, value: created (UTC), software (version), source (one line), width, height,
+//            period_ns, keep (raw, region or none), closed (1 once the writer has ended well), and
+//            what the writer's command adds, such as board
+// files      role (sensor.yaml, appearance, calibration), name as it was called, content: what the
+//            sensor was when recording began
+// frames     seq, t_ns, origin_ns, dropped; fourcc, stride and bytes of the frame as it came
+//            (keep: raw), or CROP and the luminance of the part all_* (keep: region), or
+//            NULL; first_* is the part that was decoded first, all_* what was decoded in the end
+// tracks     status, hint (number of tagwrench::Hint), displacement, covariance (its upper
+//            triangle, row by row, 21 numbers), residual_px, residual_part, blur_px2, tags_held,
+//            corners (for each tag 9 numbers: id, then x, y of four corners, px)
+// samples    as the outputs got them
+// reference  load cells (axes 1, channel) and six-axis sensors (axes 6): counts, value (N, N m),
+//            sigma, each of the `axes` first columns; sigma_ns of the time; lost_before readings
+// events     kind and, as it needs, step, value and text:
+//              note          what people were told
+//              missing       the sample of the same id went out because no frame came
+//              disconnected, reconnected     of the source; text
+//              board         news of the board; text
+//              led           value: level in permille
+//              clock         of the board; text: JSON of its state
+//              button        step: number, value: 1 pressed, 0 let go
+//              mark          of a plan: step, counted from 0; value: 1 or more it begins, 0 it
+//                            ends, -1 the stretch marked before does not count (a bump, or done
+//                            again). Steps that begin with one value count from one rest. Stands
+//                            where the step was accepted; t_ns is that of its first or last frame
+//              lost          value: records that found the buffer full, since the last such event
+#pragma once
+
+namespace tagwrench::record {
+
+inline constexpr int kApplicationId = 0x54575243;  // "TWRC"
+inline constexpr int kSchemaVersion = 1;
+
+inline constexpr const char* kSchema = R"(
+CREATE TABLE meta (key TEXT PRIMARY KEY, value) WITHOUT ROWID;
+CREATE TABLE files (role TEXT PRIMARY KEY, name TEXT, content BLOB);
+CREATE TABLE frames (id INTEGER PRIMARY KEY, seq INTEGER, t_ns INTEGER, origin_ns INTEGER,
+  dropped INTEGER, fourcc TEXT, stride INTEGER,
+  first_x INTEGER, first_y INTEGER, first_width INTEGER, first_height INTEGER,
+  all_x INTEGER, all_y INTEGER, all_width INTEGER, all_height INTEGER, bytes BLOB);
+CREATE TABLE tracks (id INTEGER PRIMARY KEY, status TEXT, hint INTEGER,
+  x REAL, y REAL, z REAL, rx REAL, ry REAL, rz REAL, covariance BLOB,
+  residual_px REAL, residual_part REAL, blur_px2 REAL, tags_held INTEGER, corners BLOB);
+CREATE TABLE samples (id INTEGER PRIMARY KEY, seq INTEGER, t_ns INTEGER, origin_ns INTEGER,
+  output_ns INTEGER, dropped INTEGER, status TEXT,
+  x REAL, y REAL, z REAL, rx REAL, ry REAL, rz REAL,
+  sigma_x REAL, sigma_y REAL, sigma_z REAL, sigma_rx REAL, sigma_ry REAL, sigma_rz REAL,
+  fx REAL, fy REAL, fz REAL, mx REAL, my REAL, mz REAL,
+  sigma_fx REAL, sigma_fy REAL, sigma_fz REAL, sigma_mx REAL, sigma_my REAL, sigma_mz REAL,
+  zero_fx REAL, zero_fy REAL, zero_fz REAL, zero_mx REAL, zero_my REAL, zero_mz REAL,
+  motion_x REAL, motion_y REAL, motion_z REAL, motion_rx REAL, motion_ry REAL, motion_rz REAL,
+  zero_state INTEGER, touched INTEGER);
+CREATE TABLE reference (id INTEGER PRIMARY KEY, t_ns INTEGER, sigma_ns INTEGER, channel INTEGER,
+  axes INTEGER, saturated INTEGER, lost_before INTEGER,
+  counts_0 REAL, counts_1 REAL, counts_2 REAL, counts_3 REAL, counts_4 REAL, counts_5 REAL,
+  value_0 REAL, value_1 REAL, value_2 REAL, value_3 REAL, value_4 REAL, value_5 REAL,
+  sigma_0 REAL, sigma_1 REAL, sigma_2 REAL, sigma_3 REAL, sigma_4 REAL, sigma_5 REAL);
+CREATE TABLE events (id INTEGER PRIMARY KEY, t_ns INTEGER, kind TEXT, step INTEGER, value INTEGER,
+  text TEXT);
+)";
+
+}  // namespace tagwrench::record

@@ -1,0 +1,348 @@
+#include "host/sensor/calibration_file.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "host/core/config_error.h"
+#include "host/core/json/json_text.h"
+#include "host/sensor/calibration_format.h"
+
+namespace tagwrench {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::uintmax_t kLargestFile = 16 << 20;  // a quadratic model has 0.4 MB
+constexpr double kLargest = 1e12;                  // of any number, SI ...
+constexpr double kLargestCovariance = 1e24;        // ... but its square: of N/m^2, 1 N at 1 um
+
+/// Every access checks; every complaint names the file.
+class CalibrationReader {
+ public:
+  explicit CalibrationReader(const std::filesystem::path& path) : path_(path.string()) {
+    std::error_code error;  // a pipe or a device may never end
+    std::ifstream in;
+    if (std::filesystem::is_regular_file(path, error)) {
+      if (std::filesystem::file_size(path, error) > kLargestFile)
+        fail("is too large to be a calibration");
+      in.open(path, std::ios::binary);
+    }
+    if (!in.is_open()) {
+      fail(
+          "cannot be read; run `tagwrench calibrate wrench`, or remove wrench.calibration to use "
+          "springs");
+    }
+    std::ostringstream text;
+    if (!(text << in.rdbuf())) fail("cannot be read; it is empty, or no file");
+    root_ = parse_json(text.str());
+    if (!root_.is_object())
+      fail("is not a JSON object; it was cut short or is another kind of file");
+    if (root_.value("format", json()) != kCalibrationFormat) {
+      fail(fmt::format(
+          "\"format\" is not \"{}\"; it is not a calibration, or one of another version",
+          kCalibrationFormat));
+    }
+  }
+
+  const json& at(const json& object, const std::string& key) const {
+    if (!object.is_object() || !object.contains(key)) fail(fmt::format("\"{}\" is missing", key));
+    return object.at(key);
+  }
+  const json& at(const std::string& key) const { return at(root_, key); }
+  bool has(const std::string& key) const { return root_.contains(key); }
+  static bool has(const json& object, const std::string& key) {
+    return object.is_object() && object.contains(key);
+  }
+
+  double number(const json& value, const std::string& key, double largest = kLargest) const {
+    if (!value.is_number()) fail(fmt::format("\"{}\" must be a number", key));
+    const double out = value.get<double>();
+    if (!std::isfinite(out)) fail(fmt::format("\"{}\" holds a number that is not finite", key));
+    if (std::abs(out) > largest)
+      fail(fmt::format("\"{}\" holds {:g}, which no sensor has; calibrate anew", key, out));
+    return out;
+  }
+
+  std::vector<double> numbers(const json& list, const std::string& key, std::size_t count,
+                              double largest = kLargest) const {
+    const auto refuse = [&] {
+      fail(fmt::format("\"{}\" must have {} number{}", key, count, count == 1 ? "" : "s"));
+    };
+    if (!list.is_array() || list.size() != count) refuse();
+    std::vector<double> out;
+    for (const json& value : list) {
+      if (!value.is_number()) refuse();
+      out.push_back(number(value, key, largest));
+    }
+    return out;
+  }
+
+  Vector6 vector6(const json& list, const std::string& key) const {
+    return Vector6(numbers(list, key, 6).data());
+  }
+
+  Matrix6 matrix6(const std::string& key) const {
+    const json& rows = at(key);
+    if (!rows.is_array() || rows.size() != 6)
+      fail(fmt::format("\"{}\" must be 6 rows of 6 numbers", key));
+    Matrix6 out;
+    for (int r = 0; r < 6; ++r) out.row(r) = vector6(rows[r], key).transpose();
+    return out;
+  }
+
+  std::string text(const json& value, const std::string& key) const {
+    constexpr std::size_t kLongest = 10'000;
+    if (!value.is_string() || value.get_ref<const std::string&>().size() > kLongest)
+      fail(fmt::format("\"{}\" must be a text", key));
+    return value.get<std::string>();
+  }
+
+  std::vector<std::string> texts(const std::string& key) const {
+    std::vector<std::string> out;
+    if (!has(key)) return out;
+    if (!at(key).is_array() || at(key).size() > 1000)
+      fail(fmt::format("\"{}\" must be a list of texts", key));
+    for (const json& value : at(key)) out.push_back(text(value, key));
+    return out;
+  }
+
+  [[noreturn]] void fail(const std::string& message) const {
+    throw ConfigError(fmt::format("{}: {}", path_, message));
+  }
+
+ private:
+  std::string path_;
+  json root_;
+};
+
+SensorIdentity read_sensor(const CalibrationReader& file) {
+  const json& node = file.at("sensor");
+  SensorIdentity sensor;
+  sensor.family = file.text(file.at(node, "family"), "family");
+  const auto integer = [&](const json& value, const char* key) {
+    const double number = file.number(value, key);
+    if (number != std::floor(number) || std::abs(number) > 1e6)
+      file.fail(fmt::format("\"{}\" must be whole numbers", key));
+    return static_cast<int>(number);
+  };
+  const json& ids = file.at(node, "tag_ids");
+  if (!ids.is_array() || ids.size() > kMaxTags)
+    file.fail(fmt::format("\"tag_ids\" must be a list of at most {} ids", kMaxTags));
+  for (const json& id : ids) sensor.tag_ids.push_back(integer(id, "tag_ids"));
+  sensor.tag_size_mm = file.number(file.at(node, "tag_size_mm"), "tag_size_mm");
+  const json& image = file.at(node, "image_px");
+  if (!image.is_array() || image.size() != 2) file.fail("\"image_px\" must be [width, height]");
+  sensor.image_px = {integer(image[0], "image_px"), integer(image[1], "image_px")};
+  if (file.has(node, "lens_px")) {
+    const std::vector<double> lens = file.numbers(node["lens_px"], "lens_px", 4);
+    sensor.lens_px = {lens[0], lens[1], lens[2], lens[3]};
+  }
+  if (file.has(node, "target_sha256"))
+    sensor.target_sha256 = file.text(node["target_sha256"], "target_sha256");
+  return sensor;
+}
+
+/// In units in which its diagonal is one, as forces and torques differ by orders of magnitude.
+void check_covariance(const CalibrationReader& file, const std::string& key,
+                      const Eigen::MatrixXd& covariance) {
+  if ((covariance.diagonal().array() < 0).any())
+    file.fail(fmt::format("\"{}\" has a negative variance on its diagonal", key));
+  const Eigen::VectorXd unit = covariance.diagonal().unaryExpr(
+      [](double variance) { return variance > 0 ? 1 / std::sqrt(variance) : 0.0; });
+  Eigen::MatrixXd scaled = unit.asDiagonal() * covariance * unit.asDiagonal();
+  for (Eigen::Index i = 0; i < unit.size(); ++i) {
+    if (unit[i] == 0 && covariance.row(i).cwiseAbs().maxCoeff() > 0)
+      file.fail(fmt::format("\"{}\" is no covariance: a number without variance varies", key));
+    scaled(i, i) = 1;
+  }
+  const bool symmetric = (scaled - scaled.transpose()).cwiseAbs().maxCoeff() < 1e-6;
+  scaled.diagonal().array() += 1e-6;
+  if (!symmetric || !scaled.allFinite() ||
+      Eigen::LLT<Eigen::MatrixXd>(scaled).info() != Eigen::Success) {
+    file.fail(fmt::format("\"{}\" is no covariance: not positive semidefinite", key));
+  }
+}
+
+FeatureSpec read_features(const CalibrationReader& file, const json& node) {
+  FeatureSpec features;
+  const std::string kind = file.text(file.at(node, "kind"), "kind");
+  int index = 0;
+  while (index < kFeatureKinds && name(static_cast<FeatureKind>(index)) != kind) ++index;
+  if (index == kFeatureKinds) {
+    file.fail(fmt::format("\"kind\" is \"{}\", which this version does not know; update tagwrench",
+                          kind));
+  }
+  features.kind = static_cast<FeatureKind>(index);
+  if (features.kind == FeatureKind::creep) {
+    features.time_constant = file.number(file.at(node, "time_constant_s"), "time_constant_s");
+    if (features.time_constant <= 0) file.fail("\"time_constant_s\" must be greater than 0");
+  }
+  if (features.kind == FeatureKind::hysteresis) {
+    features.play = file.vector6(file.at(node, "play"), "play");
+    if ((features.play.array() < 0).any()) file.fail("\"play\" must not be negative");
+  }
+  return features;
+}
+
+void read_extra(const CalibrationReader& file, const json& node, WrenchModel& model) {
+  const int further = feature_count(model.features.kind) - 6;
+  const json& rows = file.at(node, "extra");
+  if (!rows.is_array() || rows.size() != static_cast<std::size_t>(further))
+    file.fail(fmt::format("\"extra\" must have {} rows of 6 numbers", further));
+  model.extra.resize(6, further);
+  for (int k = 0; k < further; ++k)
+    model.extra.col(k) = file.vector6(rows[static_cast<std::size_t>(k)], "extra");
+}
+
+Eigen::MatrixXd read_lower_triangle(const CalibrationReader& file, const std::string& key,
+                                    int size) {
+  const json& rows = file.at(key);
+  if (!rows.is_array() || rows.size() != static_cast<std::size_t>(size))
+    file.fail(fmt::format("\"{}\" must have {} rows", key, size));
+  Eigen::MatrixXd out(size, size);
+  for (int i = 0; i < size; ++i) {
+    const auto count = static_cast<std::size_t>(i) + 1;
+    const std::vector<double> row =
+        file.numbers(rows[static_cast<std::size_t>(i)], key, count, kLargestCovariance);
+    for (int j = 0; j <= i; ++j) out(i, j) = out(j, i) = row[static_cast<std::size_t>(j)];
+  }
+  check_covariance(file, key, out);
+  return out;
+}
+
+void read_model(const CalibrationReader& file, WrenchModel& model) {
+  model.K = file.matrix6("K");
+  model.B = file.vector6(file.at("B"), "B");
+  model.range = file.vector6(file.at("range"), "range");
+  if ((model.range.array() <= 0).any()) file.fail("\"range\" must be greater than 0 on every axis");
+  if (file.has("covariance")) {
+    model.model_covariance = file.matrix6("covariance");
+    check_covariance(file, "covariance", model.model_covariance);
+  }
+  if (file.has("model")) {
+    model.features = read_features(file, file.at("model"));
+    read_extra(file, file.at("model"), model);
+  }
+  if (file.has("parameter_covariance")) {
+    model.parameter_covariance = read_lower_triangle(file, "parameter_covariance",
+                                                     6 * (feature_count(model.features.kind) + 1));
+  }
+  if (file.has("error")) {
+    const json& error = file.at("error");
+    model.error_at_full_load = file.vector6(file.at(error, "at_full_load"), "at_full_load");
+    model.full_load = file.vector6(file.at(error, "full_load"), "full_load");
+    if ((model.error_at_full_load.array() < 0).any())
+      file.fail("\"at_full_load\" must not be negative");
+    if ((model.full_load.array() <= 0).any()) file.fail("\"full_load\" must be greater than 0");
+  }
+}
+
+AxisFit read_axis(const CalibrationReader& file, const json& node) {
+  AxisFit axis;
+  const std::string state = file.text(file.at(node, "state"), "state");
+  bool known = false;
+  for (const AxisState each :
+       {AxisState::calibrated, AxisState::spring_model, AxisState::not_determined}) {
+    if (state != name(each)) continue;
+    axis.state = each;
+    known = true;
+  }
+  if (!known) file.fail(fmt::format("\"state\" of an axis is \"{}\"", state));
+  axis.reason = file.text(file.at(node, "reason"), "reason");
+  for (const auto& [key, member] : kAxisNumbers)
+    axis.*member = file.number(file.at(node, key), key);
+  return axis;
+}
+
+ModelTrial read_trial(const CalibrationReader& file, const json& node) {
+  ModelTrial trial;
+  trial.features = read_features(file, node);
+  trial.score = file.number(file.at(node, "score"), "score");
+  trial.score_sigma = file.number(file.at(node, "score_sigma"), "score_sigma");
+  const json& adopted = file.at(node, "adopted");
+  if (!adopted.is_boolean()) file.fail("\"adopted\" must be true or false");
+  trial.adopted = adopted.get<bool>();
+  return trial;
+}
+
+CalibrationRecord read_record(const CalibrationReader& file) {
+  CalibrationRecord record;
+  for (const auto& [key, member] : kRecordTexts) {
+    if (file.has(key)) record.*member = file.text(file.at(key), key);
+  }
+  if (file.has("data")) {
+    record.data_file = file.text(file.at(file.at("data"), "file"), "file");
+    record.data_sha256 = file.text(file.at(file.at("data"), "sha256"), "sha256");
+  }
+  if (file.has("lag_s")) {
+    const json& lag = file.at("lag_s");
+    record.lag = {file.number(file.at(lag, "value"), "lag_s"),
+                  file.number(file.at(lag, "sigma"), "lag_s")};
+  }
+  if (file.has("axes")) {
+    const json& axes = file.at("axes");
+    if (!axes.is_array() || axes.size() != 6) file.fail("\"axes\" must have 6 entries");
+    record.axis.emplace();
+    for (std::size_t i = 0; i < 6; ++i) (*record.axis)[i] = read_axis(file, axes[i]);
+  }
+  if (file.has("inside_95")) {
+    const std::vector<double> inside = file.numbers(file.at("inside_95"), "inside_95", 6);
+    record.inside_95.emplace();
+    std::copy(inside.begin(), inside.end(), record.inside_95->begin());
+  }
+  record.missing = file.texts("missing");
+  record.warnings = file.texts("warnings");
+  if (file.has("tried")) {
+    const json& tried = file.at("tried");
+    if (!tried.is_array() || tried.size() > 1000) file.fail("\"tried\" must be a list");
+    for (const json& trial : tried) record.trials.push_back(read_trial(file, trial));
+  }
+  return record;
+}
+
+}  // namespace
+
+Calibration read_calibration(const std::filesystem::path& path) {
+  const CalibrationReader file(path);
+  Calibration out;
+  out.sensor = read_sensor(file);
+  read_model(file, out.model);
+  out.record = read_record(file);
+  return out;
+}
+
+std::string completed_axes(const std::filesystem::path& path) {
+  const CalibrationReader file(path);
+  std::string out;
+  if (!file.has("axes")) return out;
+  const json& axes = file.at("axes");
+  for (std::size_t i = 0; axes.is_array() && i < std::min<std::size_t>(6, axes.size()); ++i) {
+    if (file.has(axes[i], "state") && axes[i]["state"] != name(AxisState::calibrated))
+      out += (out.empty() ? "" : " ") + std::string(kWrenchAxes[i]);
+  }
+  return out;
+}
+
+void load_calibration(const std::string& path, const CameraModel& camera,
+                      const TargetDescription& target, const RestOptions& rest,
+                      WrenchModel& model) {
+  const CalibrationReader file(path);
+  const std::string differs = difference(read_sensor(file), identity_of(camera, target, rest));
+  if (!differs.empty()) {
+    file.fail(fmt::format(
+        "was made for another sensor: {}; run `tagwrench calibrate wrench` for this one", differs));
+  }
+  WrenchModel read;
+  read_model(file, read);
+  read.wrench_origin = model.wrench_origin;
+  read.camera_R_wrench_frame = model.camera_R_wrench_frame;
+  model = read;
+}
+
+}  // namespace tagwrench

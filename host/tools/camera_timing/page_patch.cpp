@@ -1,0 +1,192 @@
+#include "host/tools/camera_timing/page_patch.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "host/core/config_error.h"
+#include "host/web/server/ask.h"
+
+namespace tagwrench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using nlohmann::json;
+
+constexpr int kExchanges = 16;                          // before the first flip
+constexpr auto kSlack = std::chrono::milliseconds(20);  // browsers round their clocks
+constexpr auto kLongestDelay = std::chrono::seconds(1);
+
+const WebOptions& with_page(const WebOptions& options) {
+  const auto page = options.pages / "flip/index.html";
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(page, error)) {
+    throw ConfigError(fmt::format(
+        "--screen web: {} is not there: the pages are not built; `./run web` builds them",
+        page.string()));
+  }
+  return options;
+}
+
+std::optional<double> number(const json& arguments, const char* key) {
+  const auto found = arguments.find(key);
+  if (found == arguments.end() || !found->is_number()) return std::nullopt;
+  return found->get<double>();
+}
+
+bool is_number(const json& arguments, const char* key, std::int64_t wanted) {
+  const auto found = arguments.find(key);
+  return found != arguments.end() && found->is_number_integer() &&
+         found->get<std::int64_t>() == wanted;
+}
+
+}  // namespace
+
+PagePatch::PagePatch(const WebOptions& options)
+    : server_(with_page(options)), news_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+  url_ = server_.url() + "flip/#screen";
+  place_ = fmt::format("a page of {}", server_.url());
+  server_.set_hello({{"type", "hello"}, {"protocol", 1}, {"screen", true}});
+  server_.start(*this);
+}
+
+PagePatch::~PagePatch() { server_.stop(); }
+
+bool PagePatch::wait_for_page(int stop_fd) {
+  while (true) {
+    std::array<pollfd, 2> fds{{{news_.get(), POLLIN, 0}, {stop_fd, POLLIN, 0}}};
+    ::poll(fds.data(), fds.size(), -1);
+    if (fds[1].revents != 0) return false;
+    std::uint64_t news = 0;
+    (void)!::read(news_.get(), &news, sizeof news);
+    const std::lock_guard lock(mutex_);
+    if (!ended_.empty()) return false;
+    if (ready_) return true;
+  }
+}
+
+void PagePatch::show(bool white, TimePoint when) {
+  const TimePoint now = Clock::now();
+  const Duration delay = std::clamp<Duration>(when - now, Duration::zero(), kLongestDelay);
+  const std::lock_guard lock(mutex_);
+  shown_.reset();
+  flip_sent_ = now;
+  ++flip_;
+  if (!page_) return;
+  server_.post([this, page = *page_,
+                order = json{{"type", "flip"},
+                             {"number", flip_},
+                             {"white", white},
+                             {"delay_ms", 1e-6 * static_cast<double>(delay.count())}}] {
+    server_.send(page, order);
+  });
+}
+
+std::optional<TimePoint> PagePatch::shown() {
+  const std::lock_guard lock(mutex_);
+  return shown_;
+}
+
+Duration PagePatch::clock_error() const {
+  const std::lock_guard lock(mutex_);
+  return clock_.error();
+}
+
+std::string PagePatch::ended() {
+  const std::lock_guard lock(mutex_);
+  return ended_;
+}
+
+std::string PagePatch::description() const {
+  return fmt::format("{}, its clock known to {:.2f} ms", place_,
+                     1e-6 * static_cast<double>(clock_error().count()));
+}
+
+void PagePatch::ask(Ask ask) {
+  const std::string trouble = take(ask);
+  server_.answer(ask.page, ask.id, trouble.empty(), trouble);
+  const std::lock_guard lock(mutex_);
+  if (page_ == ask.page && ended_.empty() && (ask.what == "screen" || ask.what == "flipped"))
+    send_time();
+}
+
+/// What is wrong with it; empty: nothing.
+std::string PagePatch::take(const Ask& ask) {
+  const std::lock_guard lock(mutex_);
+  if (!ended_.empty()) return "it is over: " + ended_;
+  if (ask.what == "screen") {
+    if (page_ && *page_ != ask.page) return "another page is the screen; close it there first";
+    page_ = ask.page;
+    return {};
+  }
+  if (page_ != ask.page) return "this page is not the screen";
+  if (ask.what == "time") return take_time(ask);
+  if (ask.what == "flipped") return take_flip(ask);
+  if (ask.what == "leave") {
+    end("somebody ended it at the page");
+    return {};
+  }
+  return fmt::format("'{}' is nothing that a screen can ask", ask.what);
+}
+
+std::string PagePatch::take_time(const Ask& ask) {
+  if (exchange_ == 0 || !is_number(ask.arguments, "number", exchange_))
+    return "nobody asked for the time";
+  const std::optional<double> page_ms = number(ask.arguments, "page_ms");
+  if (!page_ms || !clock_.exchange(exchange_sent_, *page_ms, Clock::now()))
+    return "page_ms must be the page's time in milliseconds";
+  if (!ready_ && clock_.exchanges() < kExchanges) {
+    send_time();
+  } else if (!ready_) {
+    ready_ = true;
+    tell_loop();
+  }
+  return {};
+}
+
+std::string PagePatch::take_flip(const Ask& ask) {
+  if (flip_ == 0 || !is_number(ask.arguments, "number", flip_) || shown_)
+    return "no such flip was ordered";
+  const std::optional<double> page_ms = number(ask.arguments, "page_ms");
+  const std::optional<TimePoint> at = page_ms ? clock_.host_time(*page_ms) : std::nullopt;
+  if (!at) return "page_ms must be the page's time in milliseconds";
+  const Duration slack = clock_.error() + kSlack;
+  if (*at < flip_sent_ - slack || *at > Clock::now() + slack) {
+    end("the page's clock jumps: has its device been asleep?");
+    return ended_;
+  }
+  shown_ = *at;
+  return {};
+}
+
+/// With the mutex held; what is sent may end the page.
+void PagePatch::send_time() {
+  exchange_sent_ = Clock::now();
+  server_.post([this, page = *page_, number = ++exchange_] {
+    server_.send(page, {{"type", "time"}, {"number", number}});
+  });
+}
+
+void PagePatch::page_gone(std::uint64_t page) {
+  const std::lock_guard lock(mutex_);
+  if (page_ == page) end("the page is gone: it was closed, or the network was cut");
+}
+
+void PagePatch::end(std::string why) {
+  if (!ended_.empty()) return;
+  ended_ = std::move(why);
+  tell_loop();
+}
+
+void PagePatch::tell_loop() const {
+  const std::uint64_t one = 1;
+  (void)!::write(news_.get(), &one, sizeof one);
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,68 @@
+// A page that flips, in any browser: a phone or a tablet before the camera is the screen.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "host/core/os/unique_fd.h"
+#include "host/tools/camera_timing/page_clock.h"
+#include "host/tools/camera_timing/screen_measurement.h"
+#include "host/web/server/web_server.h"
+
+namespace tagwrench {
+
+/// Serves host/web/pages/flip and tells it when to flip; the page tells when it has, by its own
+/// clock, which exchanges of messages put on the host's. Messages: host/web/README.md.
+class PagePatch final : public FlipPatch, private AskHandler {
+ public:
+  /// Throws ConfigError: the address cannot be used or needs a token, or the page is not built.
+  explicit PagePatch(const WebOptions& options);
+  ~PagePatch() override;
+
+  /// To be opened in the browser, with "&token=" and the token after it where there is one: in the
+  /// fragment, which no browser sends.
+  std::string url() const { return url_; }
+
+  /// Until a page is ready to flip and its clock is known. False: `stop_fd` was readable, or it
+  /// ended().
+  bool wait_for_page(int stop_fd);
+
+  void show(bool white, TimePoint when) override;
+  std::optional<TimePoint> shown() override;
+  Duration clock_error() const override;
+  std::string ended() override;
+  /// Of the screen, once there is one.
+  std::string description() const;
+
+ private:
+  // The server's thread.
+  void ask(Ask ask) override;
+  void page_gone(std::uint64_t page) override;
+  std::string take(const Ask& ask);
+  std::string take_time(const Ask& ask);
+  std::string take_flip(const Ask& ask);
+  void send_time();
+
+  void end(std::string why);  ///< with the mutex held
+  void tell_loop() const;
+
+  WebServer server_;
+  std::string url_;
+  std::string place_;  ///< for people
+  UniqueFd news_;
+
+  mutable std::mutex mutex_;  // for all below
+  std::optional<std::uint64_t> page_;
+  std::string ended_;
+  PageClock clock_;
+  bool ready_ = false;
+  std::int64_t exchange_ = 0;  ///< number of the one under way
+  TimePoint exchange_sent_{};
+  std::int64_t flip_ = 0;  ///< number of the last order
+  TimePoint flip_sent_{};
+  std::optional<TimePoint> shown_;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,370 @@
+#include "host/tools/design/checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/tools/design/part_checks.h"
+
+namespace tagwrench::hardware {
+namespace {
+
+constexpr double kToMm = 1e3;
+constexpr double kImageMargin_px = 4;
+constexpr double kLeastTag_px = 60;    // of the black square: below, bits and noise suffer
+constexpr double kSpringGap = 0.3e-3;  // between a spring and a line of sight
+constexpr double kFromSolid = 0.3e-3;  // between coils in all, at the stop
+constexpr double kLeastWalls = 2;      // nozzle widths
+constexpr double kNothing = 1e-9;      // rounding
+
+Eigen::Isometry3d moved(const Geometry& g, const Vector6& d) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const double angle = d.tail<3>().norm();
+  if (angle > 0) pose.linear() = Eigen::AngleAxisd(angle, d.tail<3>() / angle).toRotationMatrix();
+  pose.translation() = d.head<3>() + Eigen::Vector3d(0, 0, g.platform);
+  return pose;
+}
+
+/// Distance between the segments a..b and c..d.
+double distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                const Eigen::Vector3d& d) {
+  // Ericson, Real-Time Collision Detection, 5.1.9, minimises the same quadratic.
+  const Eigen::Vector3d u = b - a, v = d - c, w = a - c;
+  const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v), uw = u.dot(w),
+               vw = v.dot(w);
+  const double det = uu * vv - uv * uv;
+  double s = det > 1e-18 ? std::clamp((uv * vw - vv * uw) / det, 0.0, 1.0) : 0.0;
+  double t = (uv * s + vw) / vv;
+  if (t < 0 || t > 1) {
+    t = std::clamp(t, 0.0, 1.0);
+    s = std::clamp((uv * t - uw) / uu, 0.0, 1.0);
+  }
+  return (w + s * u - t * v).norm();
+}
+
+class Checker {
+ public:
+  Checker(const Parameters& p, const Geometry& g) : p_(p), g_(g) {}
+
+  std::vector<Complaint> run() {
+    prints();
+    fits();
+    springs();
+    lens();
+    for (Complaint& complaint : part_complaints(p_, g_)) found_.push_back(std::move(complaint));
+    if (found_.empty()) views();
+    return std::move(found_);
+  }
+
+ private:
+  void say(const char* parameter, std::string message) {
+    found_.push_back({parameter, std::move(message)});
+  }
+
+  void wall(const char* parameter, double thickness) {
+    const double least = kLeastWalls * p_.printing.nozzle;
+    if (thickness < least) {
+      say(parameter,
+          fmt::format("{:.2f} mm is thinner than two lines of the {:.2f} mm nozzle; take {:.2f} mm "
+                      "or more",
+                      kToMm * thickness, kToMm * p_.printing.nozzle, kToMm * least));
+    }
+  }
+
+  void prints() {
+    wall("print.wall_mm", p_.printing.wall);
+    wall("cover.wall_mm", p_.cover.wall);
+    wall("top.plate_mm", p_.top.plate - p_.springs.socket);
+    if (p_.light.diffuser < p_.printing.layer) {
+      say("light.diffuser_mm", fmt::format("{:.2f} mm is less than a layer of {:.2f} mm",
+                                           kToMm * p_.light.diffuser, kToMm * p_.printing.layer));
+    }
+  }
+
+  /// In the plane: lens, springs, LED, walls of the cover.
+  void fits() {
+    const double spring = 0.5 * p_.springs.outer_diameter + p_.printing.clearance;
+    const double half_x = 0.5 * p_.springs.spacing_x, half_y = 0.5 * p_.springs.spacing_y;
+    const double edge_x = std::min(p_.cover.x_to, -p_.cover.x_from);
+    if (half_x + spring + p_.cover.wall > edge_x) {
+      say("springs.spacing_mm",
+          fmt::format("the sockets reach to x = {:.1f} mm, the cover with its wall only to {:.1f} "
+                      "mm; bring the springs together or widen cover.x_mm",
+                      kToMm * (half_x + spring), kToMm * (edge_x - p_.cover.wall)));
+    }
+    if (half_y + spring + p_.cover.wall > p_.cover.y_half) {
+      say("springs.spacing_mm",
+          fmt::format("the sockets reach to y = {:.1f} mm, the cover with its wall only to {:.1f} "
+                      "mm; bring the springs together or widen cover.y_mm",
+                      kToMm * (half_y + spring), kToMm * (p_.cover.y_half - p_.cover.wall)));
+    }
+    if (std::hypot(half_x, half_y) < g_.bore + spring + p_.printing.nozzle) {
+      say("springs.spacing_mm",
+          fmt::format("springs of {:.2f} mm stand in the way of a lens holder of {:.1f} mm; take "
+                      "them {:.1f} mm from the middle at least",
+                      kToMm * p_.springs.outer_diameter, kToMm * p_.camera.lens_diameter,
+                      kToMm * (g_.bore + spring + p_.printing.nozzle)));
+    }
+    const double led = std::abs(p_.light.x) - 0.5 * p_.light.width;
+    if (std::abs(p_.light.y) < g_.bore && led < g_.bore + p_.printing.nozzle) {
+      say("light.position_mm",
+          fmt::format("the LED's seat begins {:.1f} mm from the middle, in the hole for the lens, "
+                      "which ends at {:.1f} mm; move it out",
+                      kToMm * led, kToMm * g_.bore));
+    }
+    const double led_end = led + p_.light.width + p_.cover.wall;
+    if (led_end > (p_.light.x < 0 ? -p_.cover.x_from : p_.cover.x_to)) {
+      say("light.position_mm",
+          fmt::format("the LED's seat leaves less than a wall to the cover's end; move it in by "
+                      "{:.1f} mm or lengthen cover.x_mm",
+                      kToMm * (led_end - (p_.light.x < 0 ? -p_.cover.x_from : p_.cover.x_to))));
+    }
+    if (p_.top.knob && p_.top.knob_diameter < knob_least()) {
+      say("top.knob_mm", fmt::format("{:.1f} mm do not go around the cover and its travel; take "
+                                     "{:.1f} mm or more",
+                                     kToMm * p_.top.knob_diameter, kToMm * knob_least()));
+    }
+    const double lip = p_.printing.clearance;
+    if (g_.plate_x + lip > std::min(-g_.inner_x_from, g_.inner_x_to)) {
+      say("cover.x_mm",
+          fmt::format("the plate on the springs, {:.1f} mm long, does not fit into the shield; "
+                      "make the cover longer at its shorter side",
+                      kToMm * 2 * g_.plate_x));
+    }
+    if (g_.plate_y + lip > g_.inner_y) {
+      say("cover.y_mm",
+          fmt::format("the plate on the springs, {:.1f} mm wide, does not fit into the shield; "
+                      "make the cover wider",
+                      kToMm * 2 * g_.plate_y));
+    }
+    if (p_.stops.gap < std::max(p_.stops.x, p_.stops.y)) {
+      say("stops.gap_mm",
+          fmt::format("the walls are {:.1f} mm from the cover and meet it before the stop screws "
+                      "do; take {:.1f} mm or more",
+                      kToMm * p_.stops.gap, kToMm * std::max(p_.stops.x, p_.stops.y)));
+    }
+    stop_slots();
+  }
+
+  /// What the stop screws reach into.
+  void stop_slots() {
+    const double least = 2 * p_.printing.nozzle;
+    for (const Geometry::StopScrew& screw : g_.stop_screws) {
+      const bool back = screw.along == 0;
+      const double bottom = back ? g_.shield_bottom_x : g_.shield_bottom_y;
+      const double under = screw.at.z() - 0.5 * p_.stops.screw - bottom;
+      if (under < least - kNothing) {
+        say("stops.z_mm",
+            fmt::format("the stop screws sit {:.1f} mm too low for the wall that they go through; "
+                        "lengthen target.lens_distance_mm, or take less travel, a lower "
+                        "cover.ledge_mm or shorter springs",
+                        kToMm * (least - under)));
+        break;
+      }
+    }
+    for (const Geometry::StopScrew& screw : g_.stop_screws) {
+      const bool back = screw.along == 0;
+      const double travel = back ? p_.stops.x : p_.stops.y;
+      const double across = 0.5 * p_.stops.screw + (back ? p_.stops.y : p_.stops.x);
+      const double inner = std::abs(screw.at[screw.along]) - screw.reach - travel;
+      const double beside = std::max(0.0, std::abs(screw.at[1 - screw.along]) - across);
+      if (inner < 0 || std::hypot(inner, beside) < g_.bore + least - kNothing) {
+        say(back ? "stops.x_mm" : "stops.y_mm",
+            fmt::format("at the end of the travel the stop screw, {:.1f} mm deep in the cover, "
+                        "touches the lens; take less travel or a {} cover",
+                        kToMm * (screw.reach + travel), back ? "longer" : "wider"));
+        break;
+      }
+    }
+  }
+
+  double knob_least() const {
+    const double x = std::max(g_.inner_x_to, -g_.inner_x_from);
+    return 2 * (std::hypot(x, g_.inner_y) + p_.printing.wall);
+  }
+
+  void springs() {
+    const double least = g_.spring_clear - deepest();
+    const double solid = g_.spring_solid - 2 * p_.springs.socket;
+    if (!(g_.spring_solid > 0) || g_.spring_solid >= p_.springs.free_length) {
+      say("springs.wire_mm",
+          fmt::format("with {:.2f} mm of wire, {:.2f} mm wide and {:.2f} N/mm the coils would be "
+                      "{:.1f} mm long when closed, of {:.1f} mm in all; check the spring's numbers",
+                      kToMm * p_.springs.wire, kToMm * p_.springs.outer_diameter,
+                      p_.springs.axial / kToMm, kToMm * g_.spring_solid,
+                      kToMm * p_.springs.free_length));
+      return;
+    }
+    if (least - kFromSolid < std::max(0.0, solid)) {
+      say("stops.z_mm",
+          fmt::format(
+              "the springs' coils close after {:.2f} mm, before the stops at {:.2f} mm; take "
+              "less travel or longer springs",
+              kToMm * (p_.springs.free_length - g_.spring_solid - kFromSolid), kToMm * deepest()));
+    }
+    const double sideways =
+        buckling_deflection(g_.spring_clear, p_.springs.outer_diameter - p_.springs.wire);
+    if (deepest() > sideways) {
+      say("springs.free_length_mm",
+          fmt::format("the springs give way sideways when shortened by {:.1f} mm, the stops are at "
+                      "{:.1f} mm; take shorter or wider springs, or less stops.z_mm",
+                      kToMm * sideways, kToMm * deepest()));
+    }
+  }
+
+  /// Most that a spring is shortened over the travel.
+  double deepest() const {
+    double most = 0;
+    for (const Vector6& d : travel_corners(p_, g_)) {
+      for (const Eigen::Vector2d& at : g_.springs) {
+        const Eigen::Vector3d top(at.x(), at.y(), 0);
+        most = std::max(most, -(d.head<3>() + d.tail<3>().cross(top)).z());
+      }
+    }
+    return most;
+  }
+
+  void lens() {
+    double nearest = p_.target.lens_distance;
+    for (const TagPlace& tag : g_.tags)
+      if (!tag.in_mirror)
+        nearest = std::min(nearest, p_.target.lens_distance + tag.platform_T_tag.translation().z());
+    if (nearest < p_.camera.nearest_focus) {
+      say("target.lens_distance_mm",
+          fmt::format("{:.1f} mm is nearer than {} focuses ({:.0f} mm); take a longer distance or "
+                      "another camera",
+                      kToMm * nearest, p_.camera.name, kToMm * p_.camera.nearest_focus));
+    }
+    const double tag_px = p_.camera.image.fx_px * p_.target.tag_size / p_.target.lens_distance;
+    if (tag_px < kLeastTag_px) {
+      say("target.tag_size_mm",
+          fmt::format("tags of {:.2f} mm are {:.0f} px wide at {:.1f} mm, {:.0f} are needed; take "
+                      "larger tags, a shorter target.lens_distance_mm, or a camera of more pixels",
+                      kToMm * p_.target.tag_size, tag_px, kToMm * p_.target.lens_distance,
+                      kLeastTag_px));
+    }
+    const double front = g_.lens_front;
+    double lowest = g_.platform;
+    for (const Eigen::Vector3d& corner : paper_corners_there())
+      lowest = std::min(lowest, corner.z());
+    if (lowest - p_.stops.z < front + 1e-3) {
+      say("target.lens_distance_mm",
+          fmt::format(
+              "at the end of the travel the tags are {:.1f} mm from the lens; take a longer "
+              "distance or less stops.z_mm",
+              kToMm * (lowest - p_.stops.z - front)));
+    }
+  }
+
+  /// Of the real papers at rest, not of mirrored ones.
+  std::vector<Eigen::Vector3d> paper_corners_there() const {
+    Geometry plain = g_;
+    plain.mirror.reset();
+    return paper_corners(p_, plain, Vector6::Zero());
+  }
+
+  void views() {
+    bool outside = false, behind_spring = false, behind_plate = false, behind_cover = false;
+    double most_outside = 0;
+    for (const Vector6& d : travel_corners(p_, g_)) {
+      for (const Eigen::Vector3d& corner : paper_corners(p_, g_, d)) {
+        const Eigen::Vector2d at = seen_at(p_, g_, corner);
+        const double out = std::max({kImageMargin_px - at.x(), kImageMargin_px - at.y(),
+                                     at.x() - (p_.camera.image.width_px - 1 - kImageMargin_px),
+                                     at.y() - (p_.camera.image.height_px - 1 - kImageMargin_px)});
+        if (!(out <= 0)) outside = true;
+        most_outside = std::max(most_outside, out);
+        behind_spring = behind_spring || spring_between(d, corner);
+        behind_cover = behind_cover || cover_between(corner);
+      }
+      behind_plate = behind_plate || plate_between(d);
+    }
+    if (outside) {
+      say("target.lens_distance_mm",
+          fmt::format(
+              "at the end of the travel a tag leaves the picture by {:.0f} px; take a longer "
+              "distance, smaller target.tag_size_mm or less travel in stops",
+              most_outside));
+    }
+    if (behind_spring) {
+      say("springs.spacing_mm", "at the end of the travel a spring hides a tag; move them apart");
+    }
+    if (behind_cover) {
+      say("camera.lens_diameter_mm",
+          "the cover's hole for the lens cuts into the view of the tags; the lens sits too deep: "
+          "lengthen target.lens_distance_mm or shorten the springs");
+    }
+    if (behind_plate) {
+      say("top.plate_mm", "the edge of the plate's opening hides a tag at the end of the travel");
+    }
+  }
+
+  bool spring_between(const Vector6& d, const Eigen::Vector3d& corner) const {
+    const Eigen::Vector3d eye(0, 0, g_.pupil);
+    const Eigen::Isometry3d pose = moved(g_, d);
+    return std::any_of(g_.springs.begin(), g_.springs.end(), [&](const Eigen::Vector2d& at) {
+      const Eigen::Vector3d foot(at.x(), at.y(), g_.cover_top);
+      const Eigen::Vector3d head = pose * Eigen::Vector3d(at.x(), at.y(), 0);
+      return distance(eye, corner, foot, head) < 0.5 * p_.springs.outer_diameter + kSpringGap;
+    });
+  }
+
+  bool cover_between(const Eigen::Vector3d& corner) const {
+    if (g_.cover_top <= g_.pupil) return false;
+    const double share = (g_.cover_top - g_.pupil) / (corner.z() - g_.pupil);
+    return share * corner.head<2>().norm() > g_.bore;
+  }
+
+  /// The plate's opening moves with the tags; only what is behind the plate can be hidden by it.
+  bool plate_between(const Vector6& d) const {
+    const Eigen::Isometry3d platform_T_drawing = moved(g_, d).inverse();
+    const Eigen::Vector3d eye = platform_T_drawing * Eigen::Vector3d(0, 0, g_.pupil);
+    for (const Eigen::Vector3d& there : paper_corners(p_, g_, d)) {
+      const Eigen::Vector3d corner = platform_T_drawing * there;
+      const double plate = g_.plate_bottom - g_.platform;
+      if (corner.z() <= plate) continue;
+      const Eigen::Vector3d through =
+          eye + (plate - eye.z()) / (corner.z() - eye.z()) * (corner - eye);
+      if (std::abs(through.x()) > g_.window_x || std::abs(through.y()) > g_.window_y) return true;
+    }
+    return false;
+  }
+
+  const Parameters& p_;
+  const Geometry& g_;
+  std::vector<Complaint> found_;
+};
+
+}  // namespace
+
+std::vector<Complaint> complaints(const Parameters& parameters, const Geometry& geometry) {
+  return Checker(parameters, geometry).run();
+}
+
+Eigen::Vector2d seen_at(const Parameters& p, const Geometry& g, const Eigen::Vector3d& point) {
+  const CameraModel& camera = p.camera.image;
+  const double away = point.z() - g.pupil;
+  return {camera.cx_px + camera.fx_px * point.x() / away,
+          camera.cy_px + camera.fy_px * point.y() / away};
+}
+
+std::vector<Eigen::Vector3d> paper_corners(const Parameters& p, const Geometry& g,
+                                           const Vector6& displacement) {
+  const Eigen::Isometry3d pose = moved(g, displacement);
+  const double half = 0.5 * p.target.tag_size + p.target.border;
+  std::vector<Eigen::Vector3d> out;
+  for (const TagPlace& tag : g.tags) {
+    for (const double x : {-half, half}) {
+      for (const double y : {-half, half}) {
+        Eigen::Vector3d corner = pose * (tag.platform_T_tag * Eigen::Vector3d(x, y, 0));
+        if (tag.in_mirror && g.mirror)
+          corner -= 2 * (g.mirror->normal.dot(corner) - g.mirror->distance) * g.mirror->normal;
+        out.push_back(corner);
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace tagwrench::hardware

@@ -1,0 +1,238 @@
+#include "host/tools/design/design.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+#include "host/core/algebra/decompositions.h"
+
+namespace tagwrench::study {
+namespace {
+
+constexpr double kShear = 79e9;      // of spring steel, Pa
+constexpr double kEndCoils = 2;      // closed ends
+constexpr double kNearStill = 0.15;  // of the frame rate: an alias that passes for slow motion
+constexpr double kFarForce = 1e9;    // N, beyond what any spring's numbers here make
+constexpr double kSharedEdges = 4;   // standard deviations of the point spread, in a cell
+constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
+
+Eigen::Isometry3d moved(const Vector6& displacement, const Eigen::Vector3d& origin) {
+  const Eigen::Vector3d r = displacement.tail<3>();
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  if (r.norm() > 0)
+    motion.linear() = Eigen::AngleAxisd(r.norm(), r.normalized()).toRotationMatrix();
+  motion.translation() = displacement.head<3>() + origin - motion.linear() * origin;
+  return motion;
+}
+
+bool corner_in_view(const SeenPicture& picture, const Eigen::Vector3d& p) {
+  if (p.z() <= 0) return false;
+  const double u = picture.fx_px * p.x() / p.z() + picture.cx_px;
+  const double v = picture.fy_px * p.y() / p.z() + picture.cy_px;
+  return u >= 0 && v >= 0 && u <= picture.width_px - 1 && v <= picture.height_px - 1;
+}
+
+bool in_view(const Instrument& instrument, const Vector6& displacement) {
+  const Eigen::Isometry3d motion = moved(displacement, instrument.origin);
+  for (const SeenTag& tag : instrument.tags) {
+    const double half = 0.5 * tag.size + tag.border;
+    for (const double x : {-half, half}) {
+      for (const double y : {-half, half}) {
+        const Eigen::Vector3d corner =
+            tag.seen(motion * (tag.camera_T_tag * Eigen::Vector3d(x, y, 0)));
+        if (!corner_in_view(instrument.picture, corner)) return false;
+      }
+    }
+  }
+  return true;
+}
+
+/// Largest force, N, both ways, under which the papers stay in view.
+double force_in_view(const Instrument& instrument, const Vector6& per_newton, double most) {
+  const auto seen = [&](double force) {
+    return in_view(instrument, force * per_newton) && in_view(instrument, -force * per_newton);
+  };
+  if (!seen(0)) return 0;
+  constexpr double kGrowth = 1.01;
+  double force = 1e-3;
+  while (force < most && seen(force)) force *= kGrowth;
+  return std::min(force, most);
+}
+
+/// Largest force, N, at most `most`, under which no spring closes; empty: the springs' numbers do
+/// not go together.
+std::optional<double> force_to_solid(const Instrument& instrument, const Vector6& per_newton,
+                                     double most) {
+  std::optional<double> least;
+  for (const Spring& spring : instrument.springs) {
+    const double room = spring.free_length - solid_length(spring);
+    if (room <= 0) return {};
+    const Eigen::Vector3d r = per_newton.tail<3>();
+    const double closing = std::abs(per_newton.z() + r.cross(spring.top).z());
+    const double force = closing > 0 ? room / closing : most;
+    least = std::min(least.value_or(most), force);
+  }
+  return least;
+}
+
+DesignRow row(const Instrument& instrument, const Design& design, double range, double scale) {
+  const Matrix6 stiffness = scale * instrument.stiffness;
+  const Matrix6 compliance = inverse(stiffness);
+  DesignRow row;
+  row.range = range;
+  row.scale = scale;
+  row.lateral = stiffness(0, 0);
+  row.axial = stiffness(2, 2);
+  row.travel_lateral = range * std::max(compliance(0, 0), compliance(1, 1));
+  row.travel_axial = range * compliance(2, 2);
+  const CountedPixels& counted = instrument.counted;
+  row.counted_x = counted_force(range, counted.travel_x_px(), counted.counts_per_px);
+  row.counted_y = counted_force(range, counted.travel_y_px(), counted.counts_per_px);
+  const Matrix6 covariance =
+      displacement_bound(instrument.tags, instrument.origin, instrument.picture);
+  row.bound = (stiffness * covariance * stiffness.transpose()).diagonal().cwiseSqrt();
+  row.lowest = std::sqrt(scale) * design.modes.front();
+  row.highest = std::sqrt(scale) * design.modes.back();
+  return row;
+}
+
+void warn_of_reach(const Instrument& instrument, Design& design) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Reach& reach = design.reach[axis];
+    if (reach.in_view < instrument.range) {
+      design.warnings.push_back(
+          fmt::format("tags leave the image at {:.2f} N along {}, before the range of {:g} N: the "
+                      "platform tilts as it moves; take stiffer springs, smaller tags or a longer "
+                      "way to the lens",
+                      reach.in_view, kAxes[axis], instrument.range));
+    }
+    if (reach.to_solid && *reach.to_solid < instrument.range) {
+      design.warnings.push_back(
+          fmt::format("springs bottom out at {:.2f} N along {}, before the range of {:g} N: take "
+                      "longer or stiffer springs",
+                      *reach.to_solid, kAxes[axis], instrument.range));
+    }
+  }
+}
+
+void warn_of_springs(const Instrument& instrument, Design& design) {
+  for (const Spring& spring : instrument.springs) {
+    const double solid = solid_length(spring);
+    if (solid < spring.free_length) continue;
+    const double room = spring.free_length / spring.wire - kEndCoils;
+    design.warnings.push_back(fmt::format(
+        "springs: wire of {:.2f} mm wound to {:.2f} mm takes {:.0f} coils for {:.2f} N/mm, {:.1f} "
+        "mm long when closed, but the spring is {:.1f} mm long: with room for {:.0f} at most it "
+        "has "
+        "more than {:.2f} N/mm; measure the rate, or give --coils. Bottoming out is not predicted",
+        1e3 * spring.wire, 1e3 * spring.outer_diameter, solid / spring.wire, 1e-3 * spring.rate,
+        1e3 * solid, 1e3 * spring.free_length, room,
+        1e-3 * spring.rate * active_coils(spring) / room));
+    return;
+  }
+}
+
+void warn_of_modes(const Instrument& instrument, Design& design) {
+  std::string modes;
+  std::string aliases;
+  for (const double mode : design.modes) {
+    const double seen = alias(mode, instrument.frame_rate);
+    if (seen > kNearStill * instrument.frame_rate) continue;
+    modes += fmt::format("{:.1f} ", mode);
+    aliases += fmt::format("{:.1f} ", seen);
+  }
+  if (modes.empty()) return;
+  design.warnings.push_back(
+      fmt::format("the platform rings at {}Hz, which pictures at {:g} Hz show as {}Hz, like loads: "
+                  "change mass, springs or frame rate, or damp it",
+                  modes, instrument.frame_rate, aliases));
+}
+
+void warn_of_cells(const Instrument& instrument, Design& design) {
+  for (const SeenTag& tag : instrument.tags) {
+    const double cell_px = instrument.picture.fx_px * tag.size / tag.cells /
+                           tag.seen(tag.camera_T_tag.translation()).z();
+    if (cell_px > kSharedEdges * instrument.picture.blur_px) continue;
+    design.warnings.push_back(
+        fmt::format("cells of {:.1f} px under a point spread of {:.1f} px: edges run into each "
+                    "other, the bound is too good; take larger cells or a sharper lens",
+                    cell_px, instrument.picture.blur_px));
+    return;
+  }
+}
+
+}  // namespace
+
+double active_coils(const Spring& spring) {
+  return kShear * std::pow(spring.wire, 4) /
+         (8 * std::pow(spring.mean_diameter(), 3) * spring.rate);
+}
+
+double solid_length(const Spring& spring) {
+  const double coils = spring.coils > 0 ? spring.coils : active_coils(spring) + kEndCoils;
+  return coils * spring.wire;
+}
+
+std::array<double, 6> natural_frequencies(const Matrix6& stiffness, const Platform& platform) {
+  const Eigen::Vector3d& c = platform.centre_of_mass;
+  Eigen::Matrix3d cross;
+  cross << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
+  Matrix6 mass;
+  mass << platform.mass * Eigen::Matrix3d::Identity(), -platform.mass * cross,
+      platform.mass * cross,
+      Eigen::Matrix3d(platform.principal_inertia.asDiagonal()) - platform.mass * cross * cross;
+  const Eigen::VectorXd squares = generalized_eigenvalues(stiffness, mass);
+  std::array<double, 6> frequencies{};
+  for (int i = 0; i < squares.size(); ++i) {
+    frequencies[static_cast<std::size_t>(i)] =
+        std::sqrt(std::max(0.0, squares[i])) / (2 * std::numbers::pi);
+  }
+  return frequencies;
+}
+
+double alias(double frequency, double rate) {
+  return std::abs(frequency - rate * std::round(frequency / rate));
+}
+
+std::array<Reach, 3> reach(const Instrument& instrument, double most) {
+  const Matrix6 compliance = inverse(instrument.stiffness);
+  std::array<Reach, 3> result;
+  for (int axis = 0; axis < 3; ++axis) {
+    result[static_cast<std::size_t>(axis)] = {
+        force_in_view(instrument, compliance.col(axis), most),
+        force_to_solid(instrument, compliance.col(axis), most)};
+  }
+  return result;
+}
+
+Design design(const Instrument& instrument, const std::vector<double>& ranges) {
+  Design result;
+  result.counted = counted_steps(instrument.counted);
+  result.bound = displacement_bound(instrument.tags, instrument.origin, instrument.picture)
+                     .diagonal()
+                     .cwiseSqrt();
+  result.modes = natural_frequencies(instrument.stiffness, instrument.platform);
+  // The rows of the table scale with it, so it is looked for until it is found.
+  result.reach = reach(instrument, kFarForce);
+  result.rows.push_back(row(instrument, result, instrument.range, 1));
+  double least = kFarForce;
+  for (const Reach& axis : result.reach) least = std::min(least, axis.least());
+  if (least >= kFarForce) {
+    result.warnings.push_back(fmt::format(
+        "no force up to {:g} N moves the tags out of view: no table of ranges; check the stiffness",
+        kFarForce));
+  } else if (least > 0) {
+    for (const double range : ranges) {
+      result.rows.push_back(row(instrument, result, range, range / least));
+    }
+  }
+  warn_of_reach(instrument, result);
+  warn_of_springs(instrument, result);
+  warn_of_modes(instrument, result);
+  warn_of_cells(instrument, result);
+  return result;
+}
+
+}  // namespace tagwrench::study

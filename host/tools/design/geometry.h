@@ -1,0 +1,91 @@
+// Where everything of a chosen sensor is, how far it moves, and what it bears: from the parameters
+// alone, pure. The drawing takes its heights from here, so that the checks see what is printed.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/core/types.h"
+#include "host/tools/design/parameters.h"
+
+namespace tagwrench::hardware {
+
+/// A plane that reflects: n^T p = d, drawing frame.
+struct Mirror {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double distance = 0;  ///< m
+  /// The piece that the camera needs of it over the whole travel: its middle, and its half size
+  /// along the slope and along y.
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double half_slope = 0, half_y = 0;
+};
+
+struct TagPlace {
+  int id = 0;
+  Eigen::Isometry3d platform_T_tag = Eigen::Isometry3d::Identity();
+  bool in_mirror = false;  ///< seen in Geometry::mirror only
+};
+
+/// Heights above the lower face of the mounting plate (m), unless it says otherwise.
+struct Geometry {
+  double board_bottom = 0, board_top = 0;
+  double lens_front = 0, pupil = 0;
+  double ledge = 0;      ///< top of the cover's lower part
+  double cover_top = 0;  ///< where the springs begin
+  double platform = 0;   ///< origin of the platform frame: the middle of the tags
+  double plate_bottom = 0, plate_top = 0;
+  double shield_bottom_x = 0, shield_bottom_y = 0;  ///< of its walls across x, across y
+  double top = 0;
+  double bottom = 0;  ///< of the whole: below zero where a base holds more than the plate
+
+  double spring_attachment = 0;       ///< where their full length ends, platform frame
+  double spring_clear = 0;            ///< length between the parts that they are glued into
+  double spring_solid = 0;            ///< length with the coils closed
+  double window_x = 0, window_y = 0;  ///< half width of the plate's opening for the tags
+  double inner_x_from = 0, inner_x_to = 0, inner_y = 0;  ///< of the shield; to: open end
+  double bore = 0;                        ///< radius of the cover's hole over the lens
+  double socket = 0;                      ///< radius of the holes that springs are glued into
+  double plate_x = 0, plate_y = 0;        ///< half size of the plate that the springs carry
+  double overhang_x = 0, overhang_y = 0;  ///< most that the ledge stands out from the cover's block
+  double bolt_length = 0;                 ///< of those that hold plate, camera and cover together
+
+  std::vector<TagPlace> tags;
+  std::optional<Mirror> mirror;
+  std::vector<Eigen::Vector2d> springs;     ///< axes
+  std::vector<Eigen::Vector2d> bolts;       ///< through plate, camera and cover
+  std::vector<Eigen::Vector2d> top_screws;  ///< through the roof into the plate
+  /// Where stop screws reach into the cover's face, and the axis (0 x, 1 y) along which they point.
+  struct StopScrew {
+    Eigen::Vector3d at = Eigen::Vector3d::Zero();
+    int along = 0;
+    double reach = 0;   ///< into the cover, at rest
+    double length = 0;  ///< under its head, as sold
+    double head = 0;    ///< distance of the head's seat from the cover's face
+  };
+  std::vector<StopScrew> stop_screws;
+};
+
+Geometry geometry(const Parameters& parameters);
+
+/// The parts to print, by their names in hardware/scad/sensor.scad.
+std::vector<std::string> printed_parts(const Parameters& parameters);
+
+/// Lateral over axial stiffness of a helical spring clamped at both ends, of this length and mean
+/// diameter: as a beam whose bending stiffness is that of the helix and whose coils shear. 1/ratio
+/// = 0.295 (l/D)^2 + 0.385 with steel's Poisson ratio (Haringx; Wahl, Mechanical Springs, ch. on
+/// lateral loading has 1.44 (0.204 (l/D)^2 + 0.265)).
+double lateral_ratio(double length, double mean_diameter);
+
+/// About the platform's origin, camera axes; of the four springs.
+Matrix6 stiffness(const Parameters& parameters, const Geometry& geometry);
+
+/// Largest force or torque along each axis alone, either way, before a stop is met, N and N m.
+Vector6 range(const Parameters& parameters, const Geometry& geometry);
+
+/// Displacements (m, rad) at which a stop is about to be met: 8 corners of the travel, turning
+/// about each axis, and what the largest force or torque along each axis does, both ways.
+std::vector<Vector6> travel_corners(const Parameters& parameters, const Geometry& geometry);
+
+}  // namespace tagwrench::hardware

@@ -1,0 +1,307 @@
+#include "host/tools/reading/reader.h"
+
+#include <fmt/format.h>
+#include <hidapi.h>
+#include <poll.h>
+#include <sys/inotify.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <memory>
+#include <vector>
+
+#include "host/core/config_error.h"
+#include "host/core/os/unique_fd.h"
+#include "host/core/tell.h"
+#include "host/output/text_sink.h"
+#include "host/tools/reading/hid_list.h"
+#include "host/tools/reading/hid_text.h"
+#include "host/tools/reading/reading_stats.h"
+#include "host/tools/reading/reading_text.h"
+#include "host/tools/reading/six_axis.h"
+#include "host/tools/reading/tagwrench_hid.h"
+
+namespace tagwrench {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// hidapi waits on a descriptor that it keeps to itself, so that a signal is seen this much later
+/// at most.
+constexpr Duration kSlice = milliseconds(50);
+constexpr Duration kRefresh = milliseconds(100);
+constexpr Duration kLinePeriod = std::chrono::seconds(1);
+
+TimePoint clock_now() { return std::chrono::steady_clock::now(); }
+
+int whole_ms(Duration time) {
+  const auto left = std::chrono::ceil<milliseconds>(std::max(time, Duration(0)));
+  return static_cast<int>(std::min<std::int64_t>(left.count(), 60'000));
+}
+
+struct CloseHid {
+  void operator()(hid_device* device) const { hid_close(device); }
+};
+using OpenHid = std::unique_ptr<hid_device, CloseHid>;
+
+/// Columns of the terminal that standard output is; 0 if it is none.
+int terminal_columns() {
+  winsize size{};
+  if (::isatty(STDOUT_FILENO) == 0) return 0;
+  const bool known = ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : 80;
+}
+
+/// Where readings go: live lines, JSON or CSV on standard output, and a log file.
+class ReadingSink {
+ public:
+  explicit ReadingSink(const ReadOptions& options)
+      : style_(options.style),
+        columns_(style_ == ReadOptions::Style::people ? terminal_columns() : 0),
+        out_("-", /*lossless=*/style_ != ReadOptions::Style::people) {
+    if (!options.log.empty()) log_.emplace(options.log, /*lossless=*/true);
+  }
+
+  void begin(HidKind kind) {
+    if (begun_) return;
+    begun_ = true;
+    if (style_ == ReadOptions::Style::csv) keep(out_, csv_header(kind));
+    if (log_) keep(*log_, csv_header(kind));
+  }
+  void take(const Reading& reading) noexcept {
+    if (style_ == ReadOptions::Style::json) keep(out_, json_line(buffer_, reading));
+    if (style_ == ReadOptions::Style::csv) keep(out_, csv_line(buffer_, reading));
+    if (log_) keep(*log_, csv_line(buffer_, reading));
+  }
+  /// A live line, if it is time for one; true if there was.
+  bool show(const Reading& reading, const ReadingStats& lately, std::uint64_t missing,
+            TimePoint now) noexcept {
+    if (style_ != ReadOptions::Style::people || now < next_) return false;
+    next_ = now + (columns_ > 0 ? kRefresh : kLinePeriod);
+    std::string_view line = live_line(buffer_, reading, lately, missing);
+    if (columns_ > 0) line = line.substr(0, static_cast<std::size_t>(columns_) - 1);
+    const auto result = columns_ > 0
+                            ? fmt::format_to_n(text_.data(), text_.size(), "\r{}\x1b[K", line)
+                            : fmt::format_to_n(text_.data(), text_.size(), "{}\n", line);
+    keep(out_, {text_.data(), std::min(result.size, text_.size())});
+    open_line_ = columns_ > 0;
+    return true;
+  }
+  /// What is told next begins on a line of its own.
+  void end_line() noexcept {
+    if (open_line_) keep(out_, "\n");
+    open_line_ = false;
+  }
+  const std::string& failure() const noexcept { return failure_; }
+
+ private:
+  void keep(TextSink& sink, std::string_view text) noexcept {
+    if (sink.write(text) == SendStatus::failed && failure_.empty()) failure_ = sink.failure();
+  }
+
+  ReadOptions::Style style_;
+  int columns_;
+  TextSink out_;
+  std::optional<TextSink> log_;
+  bool begun_ = false;
+  bool open_line_ = false;  ///< the terminal's cursor stands behind a live line
+  TimePoint next_{};
+  std::string failure_;
+  ReadingBuffer buffer_{};
+  std::array<char, sizeof(ReadingBuffer) + 8> text_{};
+};
+
+class Reader {
+ public:
+  Reader(const ReadOptions& options, int stop_fd)
+      : options_(options),
+        choice_(options.device),
+        stop_fd_(stop_fd),
+        nodes_changed_(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK)),
+        sink_(options) {
+    // Watched before looking, so that no node comes unseen; udev gives permission after the node is
+    // made.
+    ::inotify_add_watch(nodes_changed_.get(), options.nodes.c_str(), IN_CREATE | IN_ATTRIB);
+  }
+
+  int run() {
+    if (!open() && !options_.wait) throw ConfigError(missing());
+    if (!device_) tell(fmt::format("waiting for a {}", choice_.words()));
+    const TimePoint begin = clock_now();
+    end_ = options_.time ? begin + *options_.time : TimePoint::max();
+    while (!stopped() && clock_now() < end_ && sink_.failure().empty()) {
+      if (!device_) {
+        wait_for_node();
+      } else if (!read()) {
+        lose();
+        if (!options_.wait) break;
+      }
+    }
+    return finish(clock_now() - begin);
+  }
+
+ private:
+  bool stopped() const {
+    pollfd stop{stop_fd_, POLLIN, 0};
+    return ::poll(&stop, 1, 0) > 0;
+  }
+
+  std::string missing() const {
+    return fmt::format(
+        "no {} is plugged in; `tagwrench read --list` says what is, --wait waits for it",
+        choice_.words());
+  }
+
+  /// The device that was read before, or the one that was asked for.
+  std::optional<HidNode> find() const {
+    const std::vector<HidNode> nodes = hid_nodes(options_.hidraw_class);
+    if (!node_) return choice_.among(nodes);
+    const auto again = std::find_if(nodes.begin(), nodes.end(),
+                                    [&](const HidNode& node) { return node.is_again(*node_); });
+    return again == nodes.end() ? std::nullopt : std::optional(*again);
+  }
+
+  /// False if it is not there, or (told once) may not be opened yet and waiting was asked for.
+  bool open() {
+    const std::optional<HidNode> found = find();
+    if (!found) return false;
+    device_.reset(hid_open_path(found->path.c_str()));
+    if (!device_) {
+      std::array<char, TAGWRENCH_TEXT_SIZE> why{};
+      tagwrench_why_not_open(found->path.c_str(), found->vendor, found->product, why.data(),
+                             why.size());
+      if (!options_.wait) throw ConfigError(why.data());
+      if (!refusal_told_) tell(why.data());
+      refusal_told_ = true;
+      return false;
+    }
+    tell(fmt::format("{} {}: {}", node_ ? "back," : "reading", found->label(), found->name));
+    node_ = found;
+    reading_ = {};
+    reading_.kind = found->kind;
+    puck_ = {};
+    refusal_told_ = false;
+    sink_.begin(found->kind);
+    return true;
+  }
+
+  void wait_for_node() {
+    std::array<pollfd, 2> fds{{{nodes_changed_.get(), POLLIN, 0}, {stop_fd_, POLLIN, 0}}};
+    ::poll(fds.data(), fds.size(), whole_ms(end_ - clock_now()));
+    alignas(inotify_event) std::array<char, 4096> events;
+    while (::read(nodes_changed_.get(), events.data(), events.size()) > 0) {
+    }
+    open();
+  }
+
+  /// False if the device is gone.
+  bool read() noexcept {
+    const TimePoint before = clock_now();
+    errno = 0;
+    const int size = hid_read_timeout(device_.get(), report_.data(), report_.size(),
+                                      whole_ms(std::min(kSlice, end_ - before)));
+    if (size < 0) return errno == EINTR || stopped();
+    const TimePoint now = clock_now();
+    if (size > 0) take({report_.data(), static_cast<std::size_t>(size)}, now);
+    // What came last is shown even if nothing comes after it: a release, above all.
+    if (unseen_ && sink_.show(reading_, lately(), all_.missing(), now)) unseen_ = false;
+    return true;
+  }
+
+  void take(std::span<const std::uint8_t> report, TimePoint now) noexcept {
+    reading_.time = now;
+    if (!decode(report)) return;
+    for (ReadingStats* stats : {&all_, &span_}) stats->arrived(now);
+    if (reading_.kind == HidKind::wrench) count_sample();
+    sink_.take(reading_);
+    unseen_ = true;
+    if (now < span_end_) return;
+    last_span_ = span_;
+    span_.next_span();
+    span_end_ = now + kLinePeriod;
+  }
+
+  /// Of the second that has passed, or of the first one so far.
+  const ReadingStats& lately() const noexcept {
+    return last_span_.reports() > 1 ? last_span_ : span_;
+  }
+
+  bool decode(std::span<const std::uint8_t> report) noexcept {
+    if (reading_.kind == HidKind::wrench) {
+      const bool good = tagwrench_decode(report.data(), report.size(), &reading_.wrench) > 0;
+      if (!good) all_.stranger();
+      return good;
+    }
+    const PuckDecoder::Change change = puck_.take(report);
+    reading_.puck = puck_.state();
+    if (change == PuckDecoder::Change::stranger) all_.stranger();
+    return change == PuckDecoder::Change::motion || change == PuckDecoder::Change::buttons;
+  }
+
+  void count_sample() noexcept {
+    reading_.missing = 0;
+    if (reading_.wrench.capture_time_ns == 0) return;  // of no picture: has no sequence
+    const std::uint64_t before = all_.missing();
+    const std::optional<Duration> latency = latency_of(reading_);
+    for (ReadingStats* stats : {&all_, &span_}) stats->sampled(reading_.wrench.sequence, latency);
+    reading_.missing = static_cast<std::uint32_t>(all_.missing() - before);
+  }
+
+  void lose() {
+    device_.reset();
+    unseen_ = false;
+    all_.interrupted();
+    span_.interrupted();
+    lost_ = true;
+    sink_.end_line();
+    tell(fmt::format("{}: gone: unplugged, or the bridge has ended; {}", node_->label(),
+                     options_.wait ? "waiting for it" : "--wait would wait for it"));
+  }
+
+  int finish(Duration time) {
+    sink_.end_line();
+    if (node_) tell(summary(*node_, all_, time));
+    if (!sink_.failure().empty()) {
+      tell(sink_.failure());
+      return 1;
+    }
+    return lost_ && !options_.wait ? 1 : 0;
+  }
+
+  const ReadOptions& options_;
+  HidChoice choice_;
+  int stop_fd_;
+  UniqueFd nodes_changed_;
+  ReadingSink sink_;
+  OpenHid device_;
+  std::optional<HidNode> node_;  ///< the one being read, or that was
+  bool refusal_told_ = false;
+  bool lost_ = false;
+  TimePoint end_{};
+  std::array<std::uint8_t, 256> report_{};
+  Reading reading_;
+  PuckDecoder puck_;
+  ReadingStats all_;
+  ReadingStats span_;  ///< of the second that is running
+  ReadingStats last_span_;
+  bool unseen_ = false;  ///< reading_ has not been shown yet
+  TimePoint span_end_{};
+};
+
+}  // namespace
+
+int list_hid() {
+  const std::vector<HidNode> nodes = hid_nodes(kHidrawClass);
+  if (nodes.empty()) tell("no wrench sensor or 6-DOF device is plugged in");
+  TextSink out("-", /*lossless=*/true);
+  if (out.write(list_text(nodes)) != SendStatus::failed) return 0;
+  tell(out.failure());
+  return 1;
+}
+
+int read_hid(const ReadOptions& options, int stop_fd) { return Reader(options, stop_fd).run(); }
+
+}  // namespace tagwrench

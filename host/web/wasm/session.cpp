@@ -1,0 +1,195 @@
+#include "host/web/wasm/session.h"
+
+#include <algorithm>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "host/core/json/json_text.h"
+#include "host/core/yaml/yaml_reader.h"
+#include "host/sensor/calibration_file.h"
+#include "host/sensor/zero_options.h"
+#include "host/tracker/diagnosis.h"
+#include "host/tracker/hint_text.h"
+#include "host/tracker/rotation.h"
+#include "host/wrench/zero_text.h"
+
+namespace tagwrench {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// A file in the core's own memory, where those who read files find it; gone with this object.
+class MemoryFile {
+ public:
+  MemoryFile(const std::string& sensor, const std::string& named,
+             std::span<const std::uint8_t> bytes) {
+    if (named.empty() || bytes.empty()) return;
+    path_ = fs::path(sensor).parent_path() / named;
+    std::error_code error;
+    if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), error);
+    std::ofstream(path_, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+  }
+  ~MemoryFile() {
+    std::error_code error;
+    if (!path_.empty()) fs::remove(path_, error);
+  }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+ private:
+  fs::path path_;
+};
+
+/// The text at section.key, empty where there is none; what is wrong with it others say.
+std::string named(const std::string& yaml, const char* section, const char* key) {
+  try {
+    const YAML::Node root = YAML::Load(yaml);
+    const YAML::Node node = root.IsMap() ? root[section] : YAML::Node();
+    const YAML::Node value = node.IsMap() ? node[key] : YAML::Node();
+    return value.IsScalar() ? value.Scalar() : "";
+  } catch (const YAML::Exception&) {
+    return "";
+  }
+}
+
+std::span<const std::uint8_t> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+json numbers(const Vector6& v, int first) { return {v[first], v[first + 1], v[first + 2]}; }
+
+json numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+/// 0: not known.
+json known_range(Vector6 range, int first) {
+  for (double& value : range) value = value < kUnknownRange ? value : 0;
+  return numbers(range, first);
+}
+
+json pose(const Eigen::Isometry3d& pose) {
+  return {{"position_mm", numbers(pose.translation() * 1e3)},
+          {"rotation_rad", numbers(rotation_to_vector(pose.linear()))}};
+}
+
+void copy(const Vector6& from, std::array<double, 6>& to) {
+  std::copy(from.data(), from.data() + from.size(), to.begin());
+}
+
+}  // namespace
+
+SensorConfig Session::read(const std::string& yaml, const std::string& name, const Files& files) {
+  const MemoryFile calibration(name, named(yaml, "wrench", "calibration"),
+                               bytes_of(files.calibration));
+  const MemoryFile appearance(name, named(yaml, "rest", "appearance"), files.appearance);
+  return parse_sensor(yaml, name);
+}
+
+Session::Session(const SensorConfig& sensor)
+    : sensor_(sensor),
+      tracker_(sensor.camera, sensor.target, sensor.rest),
+      rest_given_(tracker_.rest().known),
+      wrench_(sensor.wrench),
+      zero_(zero_options(sensor, wrench_.tool(), true)) {}
+
+/// The life of a frame, as in the pipeline.
+const PageSample& Session::track(const Frame& frame) noexcept {
+  const Track track = tracker_.track(frame);
+  Sample sample;
+  sample.sequence = frame.sequence;
+  sample.capture_time = sample.latency_origin = frame.capture_time;
+  wrench_.estimate(track, sample);
+  zero_.follow(sample, wrench_.noise(track));
+  fill(track, sample);
+  note(track);
+  return sample_;
+}
+
+void Session::fill(const Track& track, const Sample& sample) noexcept {
+  sample_ = {};
+  sample_.status = static_cast<double>(sample.status);
+  copy(sample.displacement, sample_.displacement);
+  copy(sample.displacement_sigma, sample_.displacement_sigma);
+  copy(sample.wrench, sample_.wrench);
+  copy(sample.wrench_sigma, sample_.wrench_sigma);
+  copy(sample.zero, sample_.zero);
+  sample_.zero_state = static_cast<double>(sample.zero_state);
+  sample_.tags_held = track.tags_held;
+  sample_.residual_px = track.residual_px;
+  sample_.residual_part = track.residual_part;
+  sample_.blur_px2 = track.blur_px2;
+  const Region& wanted = track.wanted;
+  sample_.wanted = {static_cast<double>(wanted.x), static_cast<double>(wanted.y),
+                    static_cast<double>(wanted.width), static_cast<double>(wanted.height)};
+  sample_.needs_whole_frame = track.needs_whole_frame ? 1 : 0;
+  sample_.tags = track.corner_count;
+  for (std::size_t t = 0; t < track.corner_count; ++t) {
+    sample_.tag[t][0] = track.corners[t].id;
+    std::copy(track.corners[t].px.begin(), track.corners[t].px.end(), sample_.tag[t].begin() + 1);
+  }
+}
+
+/// As the pipeline says it: what was wrong is not, once the target is held.
+void Session::note(const Track& track) noexcept {
+  try {
+    if (const std::string_view line = zero_text(zero_.take_answer()); !line.empty()) {
+      hint_ = line;
+      sample_.news = 1;
+    }
+    if (track.status == Status::ok && trouble_shown_) {
+      trouble_shown_ = false;
+      hint_.clear();
+      sample_.news = 1;
+    }
+    const bool trouble = is_trouble(track.hint);
+    if (track.hint == Hint::none || (track.hint == last_hint_ && !trouble)) return;
+    last_hint_ = track.hint;
+    hint_ = hint_text(track.hint, track.details);
+    trouble_shown_ = trouble_shown_ || (trouble && track.status != Status::ok);
+    sample_.news = 1;
+  } catch (const std::exception&) {
+    return;  // out of memory: unsaid
+  }
+}
+
+std::string Session::description() const {
+  json ids = json::array();
+  for (const Tag& tag : sensor_.target.tags) ids.push_back(tag.id);
+  const Vector6 range = range_through(wrench_.tool(), sensor_.wrench.range);
+  const CameraModel& camera = sensor_.camera;
+  return dump_json(json{{"camera",
+                         {{"width", camera.width_px},
+                          {"height", camera.height_px},
+                          {"mirrored", camera.mirrored},
+                          {"readout_ms", camera.readout * 1e3}}},
+                        {"family", name(sensor_.target.family)},
+                        {"tag_ids", ids},
+                        {"tag_size_mm", sensor_.target.tag_size * 1e3},
+                        {"rest_frames", sensor_.rest.frames},
+                        {"rest_given", rest_given_},
+                        {"appearance", sensor_.rest.appearance.has_value()},
+                        {"calibration", sensor_.calibration},
+                        {"range_n", known_range(range, 0)},
+                        {"range_nm", known_range(range, 3)}});
+}
+
+std::string Session::learned() const {
+  const KnownRest& rest = tracker_.rest();
+  if (!rest.known) return "null";
+  json tags = json::array();
+  for (std::size_t t = 0; t < sensor_.target.tags.size(); ++t) {
+    json tag = pose(rest.platform_T_tag[t]);
+    tag["id"] = sensor_.target.tags[t].id;
+    tags.push_back(tag);
+  }
+  return dump_json(json{{"rest", pose(rest.camera_T_platform)},
+                        {"tags", tags},
+                        {"given", rest_given_},
+                        {"zero_set", !sensor_.zero.date.empty() || !sensor_.zero.set.isZero()}});
+}
+
+}  // namespace tagwrench

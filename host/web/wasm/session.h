@@ -1,0 +1,71 @@
+// A sensor that a page has opened: frame -> displacement -> wrench, as the program's pipeline does
+// it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "host/sensor/sensor_config.h"
+#include "host/tracker/tracker.h"
+#include "host/wrench/estimate.h"
+#include "host/wrench/zero.h"
+
+namespace tagwrench {
+
+/// One sample as numbers, for whoever reads the core's memory: core.ts knows the places too.
+struct PageSample {
+  static constexpr std::size_t kMostTags = 8;
+
+  double status = 0;  ///< as Status counts
+  std::array<double, 6> displacement{}, displacement_sigma{}, wrench{}, wrench_sigma{}, zero{};
+  double zero_state = 0;  ///< as ZeroState counts
+  double tags_held = 0;
+  double residual_px = 0;
+  double residual_part = 0;
+  double blur_px2 = 0;
+  std::array<double, 4> wanted{};  ///< x, y, width, height; zeros: all
+  double needs_whole_frame = 0;
+  double news = 0;  ///< 1: hint() has changed
+  double tags = 0;
+  std::array<std::array<double, 9>, kMostTags> tag{};  ///< id, then x, y of its corners
+};
+
+class Session {
+ public:
+  /// Throws ConfigError. `files` as the sensor's text names them, beside it; empty: not given.
+  struct Files {
+    std::string calibration;
+    std::span<const std::uint8_t> appearance;
+  };
+  static SensorConfig read(const std::string& yaml, const std::string& name, const Files& files);
+
+  explicit Session(const SensorConfig& sensor);
+
+  const PageSample& track(const Frame& frame) noexcept;
+  void ask_zero() noexcept { zero_.ask(); }
+
+  /// What the tracker noticed last, in words; empty when all is well.
+  const std::string& hint() const noexcept { return hint_; }
+  /// What there is to know about the sensor, as JSON.
+  std::string description() const;
+  /// The rest and the tags' places as they are known by now, as JSON; "null" before.
+  std::string learned() const;
+
+ private:
+  void note(const Track& track) noexcept;
+  void fill(const Track& track, const Sample& sample) noexcept;
+
+  SensorConfig sensor_;
+  Tracker tracker_;
+  bool rest_given_;  ///< together with the places of all tags
+  WrenchEstimator wrench_;
+  ZeroTracking zero_;
+  PageSample sample_;
+  std::string hint_;
+  Hint last_hint_ = Hint::none;
+  bool trouble_shown_ = false;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,224 @@
+// Calibrating the target's geometry on the simulated sensor, which shares no maths with it.
+#include <gtest/gtest.h>
+
+#include "host/calibration/target/verdict.h"
+#include "host/core/config_error.h"
+#include "host/tracker/tracker.h"
+#include "tests/unit/calibration/target/target_record.h"
+
+namespace tagwrench {
+namespace {
+
+using test::realistic;
+using test::Recording;
+
+constexpr double kUm = 1e-6;
+constexpr double kMrad = 1e-3;
+constexpr int kFrames = 225;
+
+TargetEstimate adjusted(const Recording& recording) {
+  return TargetAdjuster(recording.record->at_rest()).adjust(recording.record->keyframes());
+}
+
+TEST(TargetFromMotion, PlacementIsRecoveredAndItsSigmaIsHonest) {
+  double squares = 0;
+  int count = 0;
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const Recording recording(realistic(seed), kFrames);
+    ASSERT_TRUE(recording.record->rest_known());
+    check_record(*recording.record, recording.sensor.target, recording.sensor.rest);
+    const TargetEstimate estimate = adjusted(recording);
+    check_estimate(estimate, recording.sensor.camera);
+    const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+    Eigen::Isometry3d true_platform = Eigen::Isometry3d::Identity();
+    true_platform.translation() = recording.truth.rest_position;
+    const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
+    for (std::size_t t = 0; t < 2; ++t) {
+      const Vector6 error = motion_between(true_platform.inverse() * recording.true_tag(t),
+                                           platform.inverse() * estimate.camera_T_tag[t]);
+      EXPECT_LT(error.head<3>().norm(), 10 * kUm) << "seed " << seed << " tag " << t;
+      EXPECT_LT(error.tail<3>().norm(), 2 * kMrad) << "seed " << seed << " tag " << t;
+      const Vector6 absolute = motion_between(recording.true_tag(t), estimate.camera_T_tag[t]);
+      EXPECT_LT(absolute.head<3>().norm(), 10 * kUm) << "seed " << seed << " tag " << t;
+      squares += error.cwiseQuotient(sigmas[t]).squaredNorm();
+      count += 6;
+    }
+    // Motion adds to what the rest image tells.
+    EXPECT_GE(better_known(estimate, 0.9), 2) << "seed " << seed;
+  }
+  // Mean squared normalised error of 48 numbers, pairs of them alike.
+  EXPECT_GT(squares / count, 0.3);
+  EXPECT_LT(squares / count, 2.5);
+}
+
+TEST(TargetFromMotion, ARollingShutterIsMeasuredAndSpoilsNothing) {
+  sim::Scenario scenario = realistic(6);
+  scenario.exposure.rolling_readout = 20e-3;  // s
+  const Recording recording(scenario, kFrames);
+  const TargetEstimate estimate = adjusted(recording);
+  check_estimate(estimate, recording.sensor.camera);
+  EXPECT_NEAR(estimate.readout, 20e-3, 4 * estimate.readout_sigma);  // s
+  EXPECT_LT(estimate.readout_sigma, 0.5e-3);
+  EXPECT_TRUE(readout_is_clear(estimate));
+  EXPECT_NEAR(estimate.focal_ratio, 1, 4 * estimate.focal_sigma);
+  for (std::size_t t = 0; t < 2; ++t) {
+    const Vector6 error = motion_between(recording.true_tag(t), estimate.camera_T_tag[t]);
+    EXPECT_LT(error.head<3>().norm(), 10 * kUm) << "tag " << t;
+    EXPECT_LT(error.tail<3>().norm(), 2 * kMrad) << "tag " << t;
+  }
+}
+
+TEST(TargetFromMotion, AGlobalShutterIsNotTakenForARollingOne) {
+  const Recording recording(realistic(3), kFrames);
+  const TargetEstimate estimate = adjusted(recording);
+  EXPECT_NEAR(estimate.readout, 0, 4 * estimate.readout_sigma);
+  EXPECT_FALSE(readout_is_clear(estimate));
+}
+
+// Errors of the tracker, on all axes, when it is given the tags' places.
+class Follower {
+ public:
+  Follower(const Recording& recording, const Eigen::Isometry3d& platform,
+           const std::vector<Eigen::Isometry3d>& camera_T_tag)
+      : tracker_(recording.sensor.camera, placed(recording, platform, camera_T_tag),
+                 recording.sensor.rest) {}
+
+  void follow(const Frame& frame, const Vector6& truth) {
+    const Track track = tracker_.track(frame);
+    if (track.status != Status::ok || truth.isZero()) return;
+    squares_ += (track.displacement - truth).cwiseAbs2();
+    ++count_;
+  }
+  Vector6 rms() const { return (squares_ / count_).cwiseSqrt(); }
+  int count() const { return count_; }
+
+ private:
+  static TargetDescription placed(const Recording& recording, const Eigen::Isometry3d& platform,
+                                  const std::vector<Eigen::Isometry3d>& camera_T_tag) {
+    TargetDescription target = recording.sensor.target;
+    for (std::size_t t = 0; t < target.tags.size(); ++t)
+      target.tags[t].platform_T_tag = platform.inverse() * camera_T_tag[t];
+    return target;
+  }
+
+  Tracker tracker_;
+  Vector6 squares_ = Vector6::Zero();
+  int count_ = 0;
+};
+
+TEST(TargetFromMotion, DisplacementIsAbsoluteAfterwards) {
+  const sim::Scenario scenario = realistic(5);
+  const Recording recording(scenario, kFrames);
+  const TargetEstimate estimate = adjusted(recording);
+  ASSERT_TRUE(estimate.solved);
+  Follower calibrated(recording, rest_platform(estimate.camera_T_tag), estimate.camera_T_tag);
+  const std::vector<Eigen::Isometry3d> truth = {recording.true_tag(0), recording.true_tag(1)};
+  Follower told(recording, rest_platform(truth), truth);
+  SimulatorSource source(scenario, /*live=*/false);
+  for (int i = 0; i < kFrames; ++i) {
+    Frame frame;
+    source.read(frame);
+    calibrated.follow(frame, source.truth().displacement);
+    told.follow(frame, source.truth().displacement);
+  }
+  ASSERT_GT(calibrated.count(), 150);
+  const Vector6 rms = calibrated.rms();
+  EXPECT_LT(rms[0], 0.5 * kUm);
+  EXPECT_LT(rms[1], 0.5 * kUm);
+  // Along z the tracker's own errors are of this size, even when it is told the truth.
+  EXPECT_LT(rms[2], std::max(1.5 * kUm, 1.15 * told.rms()[2]));
+}
+
+// What a person is told who recorded badly; empty if nothing is wrong.
+std::string complaint(const Recording& recording) {
+  try {
+    check_record(*recording.record, recording.sensor.target, recording.sensor.rest);
+    check_estimate(adjusted(recording), recording.sensor.camera);
+  } catch (const ConfigError& e) {
+    return e.what();
+  }
+  return {};
+}
+
+void expect_complaint(const Recording& recording, const std::string& part) {
+  const std::string line = complaint(recording);
+  EXPECT_NE(line.find(part), std::string::npos) << "no '" << part << "' in: " << line;
+  EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+}
+
+TEST(TargetRefuses, RestAlone) {
+  sim::Scenario scenario = realistic(1);
+  scenario.trajectory.motion = sim::Motion::rest;
+  expect_complaint(Recording(scenario, 15), "do not make a rest of");
+  expect_complaint(Recording(scenario, 60), "hardly moved");
+}
+
+TEST(TargetRefuses, OneAxisAlone) {
+  for (const int axis : {2, 4, 5}) {
+    sim::Scenario scenario = realistic(1);
+    for (int i = 0; i < 6; ++i) {
+      if (i != axis) scenario.trajectory.amplitude[static_cast<std::size_t>(i)] = 1e-6;
+    }
+    expect_complaint(Recording(scenario, 125),
+                     axis == 4 ? "moved in one plane only" : "hardly moved");
+  }
+}
+
+TEST(TargetRefuses, AFocalLengthThatIsWrongByFivePercent) {
+  for (const double ratio : {0.95, 1.05}) {
+    const Recording recording(realistic(2), kFrames, ratio);
+    expect_complaint(recording, "calibrate camera");
+    const TargetEstimate estimate = adjusted(recording);
+    EXPECT_NEAR(estimate.focal_ratio, 1 / ratio, 0.01);
+    EXPECT_NEAR(estimate.focal_ratio, 1 / ratio, 5 * estimate.focal_sigma);
+  }
+}
+
+TEST(TargetRefuses, ASingleTag) {
+  sim::Scenario scenario = realistic(1);
+  scenario.target.tags.pop_back();
+  expect_complaint(Recording(scenario, 5), "one tag alone");
+}
+
+TEST(TargetRefuses, TagsThatAreHidden) {
+  expect_complaint(Recording(realistic(1), 100, 1, 0), "no tag was seen");
+  expect_complaint(Recording(realistic(1), 100, 1, 40), "were held in only");
+}
+
+TEST(TargetRefuses, AMirroredImageThatSensorYamlDoesNotKnow) {
+  sim::Scenario scenario = realistic(1);
+  scenario.camera.mirrored = true;
+  Recording right(scenario, 1);
+  Recording wrong(scenario, 1);
+  const CameraModel plain = [&] {
+    CameraModel camera = wrong.sensor.camera;
+    camera.mirrored = false;
+    return camera;
+  }();
+  wrong.record =
+      std::make_unique<TargetRecorder>(plain, wrong.sensor.target, wrong.sensor.rest, 10);
+  SimulatorSource source(scenario, /*live=*/false);
+  for (int i = 0; i < 10; ++i) {
+    Frame frame;
+    source.read(frame);
+    wrong.record->add(frame);
+  }
+  expect_complaint(wrong, "mirrored");
+}
+
+TEST(ViewSpan, ATiltTurnsTheViewAndATurnAboutTheLensDoesNot) {
+  Eigen::Isometry3d rest = Eigen::Isometry3d::Identity();
+  rest.translation().z() = 20e-3;  // m
+  std::vector<Keyframe> frames(1);
+  frames[0].displacement[3] = 0.1;  // rad
+  EXPECT_NEAR(view_span(frames, rest).widest, 0.1, 1e-3);
+  EXPECT_NEAR(view_span(frames, rest).narrowest, 0.0, 1e-9);
+  // The platform swings about the lens: what the lens sees turns with it.
+  frames[0].displacement << 20e-3 * std::sin(0.1), 0, 20e-3 * (std::cos(0.1) - 1), 0, 0.1, 0;
+  EXPECT_NEAR(view_span(frames, rest).widest, 0.0, 1e-9);
+  frames[0].displacement << 0, 0, 1e-3, 0, 0, 0.3;
+  EXPECT_NEAR(view_span(frames, rest).widest, 0.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace tagwrench

@@ -1,0 +1,14 @@
+// The sensors of hardware/sensors.
+#pragma once
+
+#include <string>
+
+#include "host/tools/design/hardware_config.h"
+
+namespace tagwrench::hardware {
+
+inline Parameters published(const std::string& name) {
+  return load_hardware(std::string(TAGWRENCH_SENSORS) + "/" + name + ".yaml");
+}
+
+}  // namespace tagwrench::hardware

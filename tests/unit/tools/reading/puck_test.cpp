@@ -1,0 +1,91 @@
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include "host/output/hid_report.h"
+#include "host/tools/reading/six_axis.h"
+
+namespace tagwrench {
+namespace {
+
+using Change = PuckDecoder::Change;
+using Counts = std::array<std::int16_t, 6>;
+
+Change take(PuckDecoder& decoder, const std::vector<std::uint8_t>& report) {
+  return decoder.take(report);
+}
+
+TEST(Puck, ACombinedReportHasSixAxes) {
+  PuckDecoder decoder;
+  const Change change = take(decoder, {1, 0x5e, 0x01, 0xa2, 0xfe, 1, 0, 0xff, 0xff, 0, 0, 0, 1});
+  EXPECT_EQ(change, Change::motion);
+  EXPECT_EQ(decoder.state().counts, (Counts{350, -350, 1, -1, 0, 256}));
+  EXPECT_EQ(decoder.layout(), PuckLayout::combined);
+}
+
+TEST(Puck, WhatTheBridgesOwnSpaceMouseSendsIsRead) {
+  const Counts sent{1, -2, 3, -4, 5, -350};
+  PuckDecoder decoder;
+  EXPECT_EQ(decoder.take(spacemouse_report(sent)), Change::motion);
+  EXPECT_EQ(decoder.state().counts, sent);
+}
+
+TEST(Puck, SplitReportsKeepTheOtherHalf) {
+  PuckDecoder decoder;
+  EXPECT_EQ(take(decoder, {1, 10, 0, 20, 0, 30, 0}), Change::motion);
+  EXPECT_EQ(take(decoder, {2, 0xff, 0xff, 0xfe, 0xff, 0xfd, 0xff}), Change::motion);
+  EXPECT_EQ(decoder.state().counts, (Counts{10, 20, 30, -1, -2, -3}));
+  EXPECT_EQ(decoder.layout(), PuckLayout::split);
+  EXPECT_EQ(take(decoder, {1, 0, 0, 0, 0, 0, 0}), Change::motion);
+  EXPECT_EQ(decoder.state().counts, (Counts{0, 0, 0, -1, -2, -3}));
+}
+
+TEST(Puck, ButtonsOfOneToFourBytesAreBits) {
+  PuckDecoder decoder;
+  EXPECT_EQ(take(decoder, {3, 0x02}), Change::buttons);
+  EXPECT_EQ(decoder.state().buttons, 0x02u);
+  EXPECT_EQ(take(decoder, {3, 0x01, 0x80}), Change::buttons);
+  EXPECT_EQ(decoder.state().buttons, 0x8001u);
+  EXPECT_EQ(take(decoder, {3, 0, 0, 0, 0x80, 0xff, 0xff}), Change::buttons);
+  EXPECT_EQ(decoder.state().buttons, 0x80000000u);
+}
+
+TEST(Puck, ShortReportsChangeNothing) {
+  PuckDecoder decoder;
+  take(decoder, {1, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0});
+  for (const auto& report : {std::vector<std::uint8_t>{}, {1}, {1, 9, 9, 9, 9, 9}, {2, 9}, {3}}) {
+    EXPECT_EQ(take(decoder, report), Change::stranger);
+  }
+  EXPECT_EQ(decoder.state().counts, (Counts{1, 2, 3, 4, 5, 6}));
+}
+
+TEST(Puck, OtherReportsAreNone) {
+  PuckDecoder decoder;
+  EXPECT_EQ(take(decoder, {23, 80, 1}), Change::none);  // the battery
+  EXPECT_EQ(decoder.state().counts, Counts{});
+}
+
+TEST(Puck, AnyBytesMayCome) {
+  std::mt19937 random(8);
+  PuckDecoder decoder;
+  int motions = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    std::vector<std::uint8_t> report(random() % 20);
+    for (std::uint8_t& byte : report) byte = static_cast<std::uint8_t>(random());
+    if (!report.empty()) report[0] %= 5;
+    motions += decoder.take(report) == Change::motion ? 1 : 0;
+  }
+  EXPECT_GT(motions, 100);
+}
+
+TEST(Puck, ModelsAreKnownByTheirId) {
+  ASSERT_NE(puck_model(0x046d, 0xc626), nullptr);
+  EXPECT_EQ(puck_model(0x046d, 0xc626)->name, "SpaceNavigator");
+  EXPECT_EQ(puck_model(0x046d, 0xc626)->layout, PuckLayout::split);
+  EXPECT_EQ(puck_model(0x256f, 0xc62e)->layout, PuckLayout::combined);
+  EXPECT_EQ(puck_model(0x256f, 0xc650), nullptr);  // a mouse
+}
+
+}  // namespace
+}  // namespace tagwrench
