@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "host/commands/analyze_command.h"
-#include "host/commands/bandwidth_command.h"
 #include "host/commands/board/command.h"
 #include "host/commands/calibrate_command.h"
+#include "host/commands/camera_timing_command.h"
 #include "host/commands/certificate_command.h"
 #include "host/commands/check_command.h"
 #include "host/commands/control_command.h"
@@ -32,8 +32,8 @@
 #include "host/commands/zero_command.h"
 #include "host/core/command_line/command_line.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/blas_threads.h"
-#include "host/core/tell.h"
 
 namespace tagwrench {
 namespace {
@@ -60,8 +60,8 @@ constexpr Declared (*kCommands[])(command_line::Command) = {
     // setting up
     declare<CalibrateCommand>, declare<TagsCommand>, declare<BoardCommand>,
     // how good it is
-    declare<AnalyzeCommand>, declare<BandwidthCommand>, declare<CheckCommand>, declare<ZeroCommand>,
-    declare<CertificateCommand>, declare<DesignCommand>,
+    declare<AnalyzeCommand>, declare<CameraTimingCommand>, declare<CheckCommand>,
+    declare<ZeroCommand>, declare<CertificateCommand>, declare<DesignCommand>,
     // at the desk
     declare<ControlCommand>, declare<SpnavCommand>, declare<GadgetCommand>, declare<DoctorCommand>,
     declare<ManualCommand>};
@@ -101,10 +101,10 @@ int main(int argc, char** argv) {
   try {
     return dispatch(argc, argv);
   } catch (const ConfigError& e) {
-    tell(e.what());
+    log_info(e.what());
     return kUnusable;
   } catch (const std::exception& e) {
-    tell(std::string("failed: ") + e.what());
+    log_info(std::string("failed: ") + e.what());
     return kFailed;
   }
 }

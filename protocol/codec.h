@@ -12,7 +12,7 @@ namespace link {
 constexpr uint8_t kProtocolMajor = 1;
 constexpr uint8_t kProtocolMinor = 0;
 
-constexpr uint8_t kMostCells = 4;
+constexpr uint8_t kMaxCells = 4;
 constexpr uint8_t kIdBytes = 8;
 constexpr uint32_t kBaud = 500000;
 
@@ -73,7 +73,7 @@ struct HelloRequest {
 
 struct Configure {
   uint16_t host_timeout_ms;
-  CellInput cells[kMostCells];
+  CellInput cells[kMaxCells];
   uint8_t cell_count;  ///< of `cells`; the others are off
   uint8_t cell_rate_sps;
   uint8_t adc_mask;
@@ -174,7 +174,7 @@ struct Status {
   uint16_t unknown_kinds;
   uint16_t overruns;
   uint16_t dropped_reports;
-  uint16_t cell_rate_centihertz[kMostCells];
+  uint16_t cell_rate_centihertz[kMaxCells];
   uint8_t cell_count;  ///< of cell_rate_centihertz
   uint16_t stack_free_bytes;
   uint32_t longest_loop_us;
@@ -199,7 +199,7 @@ struct Fault {
   uint32_t time_us;
 };
 
-/// encode() writes a whole body (kind, sequence, message) to `body`, kMostBodyBytes of room, and
+/// encode() writes a whole body (kind, sequence, message) to `body`, kMaxBodyBytes of room, and
 /// returns its length. Every message of these types fits; strings and ids that are too long are
 /// cut. Reports are encoded by hand (codec_board.cpp), byte for byte what nanopb makes of them.
 uint8_t encode(const HelloRequest& message, uint8_t sequence, uint8_t* body);

@@ -118,7 +118,7 @@ uint8_t encode(const Status& message, uint8_t sequence, uint8_t* body) {
   writer.varint(tagwrench_link_Status_overruns_tag, message.overruns);
   writer.varint(tagwrench_link_Status_dropped_reports_tag, message.dropped_reports);
   writer.packed(tagwrench_link_Status_cell_rate_centihertz_tag, message.cell_rate_centihertz,
-                message.cell_count < kMostCells ? message.cell_count : kMostCells);
+                message.cell_count < kMaxCells ? message.cell_count : kMaxCells);
   writer.varint(tagwrench_link_Status_stack_free_bytes_tag, message.stack_free_bytes);
   writer.varint32(tagwrench_link_Status_longest_loop_us_tag, message.longest_loop_us);
   return writer.count();

@@ -6,27 +6,27 @@
 namespace tagwrench {
 namespace link {
 
-static_assert(tagwrench_link_HelloRequest_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_Configure_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_Led_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_Tare_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_SetId_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_Hello_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_Capabilities_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_CellSample_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_AdcSample_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_ButtonEvent_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_TimeReply_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_Status_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_Answer_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_TareResult_size <= kMostMessageBytes, "fits");
-static_assert(tagwrench_link_Fault_size <= kMostMessageBytes, "fits");
+static_assert(tagwrench_link_HelloRequest_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_Configure_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_Led_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_Tare_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_SetId_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_Hello_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_Capabilities_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_CellSample_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_AdcSample_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_ButtonEvent_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_TimeReply_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_Status_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_Answer_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_TareResult_size <= kMaxMessageBytes, "fits");
+static_assert(tagwrench_link_Fault_size <= kMaxMessageBytes, "fits");
 
 uint8_t encode_body(Kind kind, uint8_t sequence, const pb_msgdesc_t& fields, const void* message,
                     uint8_t* body) {
   body[0] = static_cast<uint8_t>(kind);
   body[1] = sequence;
-  pb_ostream_t stream = pb_ostream_from_buffer(body + kHeaderBytes, kMostMessageBytes);
+  pb_ostream_t stream = pb_ostream_from_buffer(body + kHeaderBytes, kMaxMessageBytes);
   pb_encode(&stream, &fields, message);
   return static_cast<uint8_t>(kHeaderBytes + stream.bytes_written);
 }

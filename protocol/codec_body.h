@@ -9,8 +9,8 @@
 namespace tagwrench {
 namespace link {
 
-/// Writes header and message to `body`, kMostBodyBytes of room, and returns the length. `message`
-/// is the generated struct of `fields`, which cannot be longer than kMostMessageBytes.
+/// Writes header and message to `body`, kMaxBodyBytes of room, and returns the length. `message`
+/// is the generated struct of `fields`, which cannot be longer than kMaxMessageBytes.
 uint8_t encode_body(Kind kind, uint8_t sequence, const pb_msgdesc_t& fields, const void* message,
                     uint8_t* body);
 

@@ -16,7 +16,7 @@ uint8_t encode(const HelloRequest& message, uint8_t sequence, uint8_t* body) {
 uint8_t encode(const Configure& message, uint8_t sequence, uint8_t* body) {
   tagwrench_link_Configure wire = {};
   wire.host_timeout_ms = message.host_timeout_ms;
-  const uint8_t cells = message.cell_count < kMostCells ? message.cell_count : kMostCells;
+  const uint8_t cells = message.cell_count < kMaxCells ? message.cell_count : kMaxCells;
   wire.cells_count = cells;
   for (uint8_t i = 0; i < cells; ++i) {
     wire.cells[i] = static_cast<tagwrench_link_CellInput>(message.cells[i]);

@@ -7,7 +7,7 @@ namespace {
 constexpr uint8_t kDelimiter = 0;
 /// A COBS code byte of 0xFF stands for 254 bytes without a zero after them. No frame of ours is
 /// that long, so every block but the last is followed by the zero that it stands for.
-static_assert(kMostBodyBytes + kCrcBytes < 254, "a frame has blocks of any length");
+static_assert(kMaxBodyBytes + kCrcBytes < 254, "a frame has blocks of any length");
 
 /// In bytes, step by step: what an 8-bit machine and its compiler are fast at.
 inline uint16_t crc_add(uint16_t crc, uint8_t byte) {
@@ -31,7 +31,7 @@ uint16_t crc16(const uint8_t* bytes, uint8_t count) {
 }
 
 uint8_t write_frame(const uint8_t* body, uint8_t count, uint8_t* frame) {
-  if (count < kHeaderBytes || count > kMostBodyBytes) return 0;
+  if (count < kHeaderBytes || count > kMaxBodyBytes) return 0;
   uint16_t crc = kCrcStart;
   uint8_t* code = frame;  // of the present block: will hold its length
   uint8_t* end = frame + 1;

@@ -11,19 +11,19 @@
 namespace tagwrench {
 namespace link {
 
-constexpr uint8_t kMostMessageBytes = 80;
+constexpr uint8_t kMaxMessageBytes = 80;
 constexpr uint8_t kHeaderBytes = 2;  ///< kind, sequence
 constexpr uint8_t kCrcBytes = 2;
-constexpr uint8_t kMostBodyBytes = kHeaderBytes + kMostMessageBytes;
+constexpr uint8_t kMaxBodyBytes = kHeaderBytes + kMaxMessageBytes;
 /// On the wire: one COBS code byte, body, CRC, delimiter. A body this short needs no second code
 /// byte.
-constexpr uint8_t kMostFrameBytes = 1 + kMostBodyBytes + kCrcBytes + 1;
+constexpr uint8_t kMaxFrameBytes = 1 + kMaxBodyBytes + kCrcBytes + 1;
 
 /// CRC-16/IBM-3740: polynomial 0x1021, initial value 0xFFFF, not reflected; of "123456789" 0x29B1.
 uint16_t crc16(const uint8_t* bytes, uint8_t count);
 
-/// Writes the frame of a body to `frame` (kMostFrameBytes of room) and returns its length,
-/// delimiter included; 0 if the body is longer than kMostBodyBytes or shorter than its header. The
+/// Writes the frame of a body to `frame` (kMaxFrameBytes of room) and returns its length,
+/// delimiter included; 0 if the body is longer than kMaxBodyBytes or shorter than its header. The
 /// body may stand at frame + 1.
 uint8_t write_frame(const uint8_t* body, uint8_t count, uint8_t* frame);
 
@@ -59,7 +59,7 @@ class FrameReader {
   void store(uint8_t byte);
   Received finish();
 
-  uint8_t body_[kMostBodyBytes + kCrcBytes] = {};
+  uint8_t body_[kMaxBodyBytes + kCrcBytes] = {};
   uint8_t body_bytes_ = 0;  ///< of the last good frame
   uint8_t count_ = 0;       ///< decoded so far
   uint8_t left_ = 0;        ///< bytes until the next COBS code byte

@@ -6,7 +6,7 @@
 namespace tagwrench {
 namespace firmware {
 
-constexpr uint8_t kMostAdcChannels = 2;
+constexpr uint8_t kMaxAdcChannels = 2;
 
 class Adc {
  public:
@@ -21,7 +21,7 @@ class Adc {
   }
 
  private:
-  uint16_t sequence_[kMostAdcChannels] = {};  ///< of the next one
+  uint16_t sequence_[kMaxAdcChannels] = {};  ///< of the next one
 };
 
 }  // namespace firmware

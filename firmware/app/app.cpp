@@ -137,7 +137,7 @@ link::Result App::configure(uint32_t now_us) {
   link::Configure wanted;
   if (!link_.read(wanted)) return link::Result::malformed;
   if (!in_range(wanted)) return link::Result::out_of_range;
-  for (uint8_t i = wanted.cell_count; i < link::kMostCells; ++i)
+  for (uint8_t i = wanted.cell_count; i < link::kMaxCells; ++i)
     wanted.cells[i] = link::CellInput::off;
   host_timeout_ms_ = wanted.host_timeout_ms;
   status_period_ms_ = wanted.status_period_ms;

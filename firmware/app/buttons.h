@@ -6,7 +6,7 @@
 namespace tagwrench {
 namespace firmware {
 
-constexpr uint8_t kMostButtons = 2;
+constexpr uint8_t kMaxButtons = 2;
 
 class Buttons {
  public:
@@ -24,7 +24,7 @@ class Buttons {
     uint32_t last_us;   ///< when the last edge was seen
     uint32_t event_us;
   };
-  Button buttons_[kMostButtons] = {};
+  Button buttons_[kMaxButtons] = {};
 };
 
 }  // namespace firmware

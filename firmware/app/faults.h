@@ -9,7 +9,7 @@ namespace firmware {
 class Faults {
  public:
   void raise(link::FaultCode code, uint8_t channel, uint32_t now_us) {
-    if (count_ == kMost) {
+    if (count_ == kMax) {
       ++lost_;
       return;
     }
@@ -27,8 +27,8 @@ class Faults {
 
  private:
   /// One for each cell at once, and one more.
-  static constexpr uint8_t kMost = link::kMostCells + 1;
-  link::Fault waiting_[kMost] = {};
+  static constexpr uint8_t kMax = link::kMaxCells + 1;
+  link::Fault waiting_[kMax] = {};
   uint8_t count_ = 0;
   uint8_t lost_ = 0;
 };

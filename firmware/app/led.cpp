@@ -11,20 +11,20 @@ namespace {
 /// pulses keeps step with that. Heat is in permille steps above the sustained level.
 constexpr uint8_t kStepShift = 6;
 constexpr uint32_t kStepsPerSecond = 1000000ul >> kStepShift;
-constexpr uint32_t kMostSteps = 8 * kStepsPerSecond;  ///< at once: no overflow
-constexpr int32_t kMostHeat =
+constexpr uint32_t kMaxSteps = 8 * kStepsPerSecond;  ///< at once: no overflow
+constexpr int32_t kMaxHeat =
     static_cast<int32_t>(kStepsPerSecond / 1000.0 * (1000 - kSustainedPermille) * kFullTimeMs);
 /// Cool enough for full light again.
-constexpr int32_t kCool = kMostHeat / 2;
+constexpr int32_t kCool = kMaxHeat / 2;
 /// Of light that is limited and yet too much (orders that begin their pulses anew all the time),
 /// this much is borne, then it is dark.
-constexpr int32_t kGrace = kMostHeat / 20;
+constexpr int32_t kGrace = kMaxHeat / 20;
 /// Half of the pattern's bits shine.
 constexpr uint16_t kPatternPermille = 500;
 /// Of a bit that shines, when limited.
 constexpr uint16_t kLimitedBitPermille = 1000ul * kSustainedPermille / kPatternPermille;
 
-constexpr uint32_t kMostAheadUs = 60000000;
+constexpr uint32_t kMaxAheadUs = 60000000;
 /// An edge is queued at least this long before its time, which is longer than queueing it takes,
 constexpr uint32_t kLeadUs = 500;
 /// and no earlier than this, so that a change of the limit is soon seen.
@@ -104,7 +104,7 @@ void LedDriver::begin_pulses(uint32_t now_us) {
   skip_ = 0;
   state_ = command_.pattern_seed;
   next_us_ = command_.start_us;
-  if (next_us_ - now_us <= kMostAheadUs) return;
+  if (next_us_ - now_us <= kMaxAheadUs) return;
   const uint32_t periods = (now_us - next_us_) / command_.period_us + 1;
   next_us_ += periods * command_.period_us;
   if (command_.mode == link::LedMode::pattern)
@@ -113,12 +113,12 @@ void LedDriver::begin_pulses(uint32_t now_us) {
 
 void LedDriver::poll(uint32_t now_us, Faults& faults) {
   const int32_t heat = account(now_us);
-  if (limited_ ? heat < kCool : heat >= kMostHeat) {
+  if (limited_ ? heat < kCool : heat >= kMaxHeat) {
     limited_ = !limited_;
     drive();
     if (limited_) faults.raise(link::FaultCode::led_limited, 0, now_us);
   }
-  if (heat >= kMostHeat + kGrace) off();
+  if (heat >= kMaxHeat + kGrace) off();
   if (command_.mode < link::LedMode::strobe) return;
   // Catching up takes time: what is due, the next call sees.
   if (skip_ != 0) {
@@ -137,13 +137,13 @@ uint16_t LedDriver::light_permille() const {
 int32_t LedDriver::account(uint32_t now_us) {
   uint32_t steps = (now_us - accounted_us_) >> kStepShift;
   accounted_us_ += steps << kStepShift;
-  if (steps > kMostSteps) steps = kMostSteps;
+  if (steps > kMaxSteps) steps = kMaxSteps;
   int32_t heat = board::kept_heat();
   if (steps == 0) return heat;
   heat += static_cast<int32_t>(steps) *
           (static_cast<int16_t>(light_permille()) - static_cast<int16_t>(kSustainedPermille));
   if (heat < 0) heat = 0;
-  if (heat > kMostHeat + kGrace) heat = kMostHeat + kGrace;
+  if (heat > kMaxHeat + kGrace) heat = kMaxHeat + kGrace;
   board::keep_heat(heat);
   if (command_.mode == link::LedMode::off) return heat;
   on_time_steps_ = static_cast<uint16_t>(on_time_steps_ + steps);

@@ -5,14 +5,14 @@ namespace firmware {
 namespace {
 
 /// A poll that is fed without end must come to its end.
-constexpr uint8_t kMostBytesAtOnce = 2 * link::kMostFrameBytes;
+constexpr uint8_t kMaxBytesAtOnce = 2 * link::kMaxFrameBytes;
 
 }  // namespace
 
 bool Link::receive() {
-  if (board::serial_room() < kMostAnswerBytes) return false;
+  if (board::serial_room() < kMaxAnswerBytes) return false;
   board::SerialByte byte;
-  for (uint8_t i = 0; i < kMostBytesAtOnce && board::serial_take(byte); ++i) {
+  for (uint8_t i = 0; i < kMaxBytesAtOnce && board::serial_take(byte); ++i) {
     const link::Received received = reader_.take(byte.value);
     if (received == link::Received::frame) {
       received_us_ = byte.time_us;
@@ -48,7 +48,7 @@ void Link::answer_time() {
     reply.previous_sent_us = sent_us;
     reply.previous_valid = true;
   }
-  uint8_t frame[link::kMostFrameBytes];
+  uint8_t frame[link::kMaxFrameBytes];
   previous_answered_ = post(frame, encode(reply, sequence_, frame + 1), true);
   previous_request_ = reply.request_sequence;
 }

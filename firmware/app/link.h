@@ -11,8 +11,8 @@ class Link {
  public:
   /// On the wire, of a sample (CellSample has at most 22 bytes of message), and of an answer
   /// (TimeReply: 18).
-  static constexpr uint8_t kMostSampleBytes = 1 + link::kHeaderBytes + 22 + link::kCrcBytes + 1;
-  static constexpr uint8_t kMostAnswerBytes = 1 + link::kHeaderBytes + 18 + link::kCrcBytes + 1;
+  static constexpr uint8_t kMaxSampleBytes = 1 + link::kHeaderBytes + 22 + link::kCrcBytes + 1;
+  static constexpr uint8_t kMaxAnswerBytes = 1 + link::kHeaderBytes + 18 + link::kCrcBytes + 1;
 
   /// Takes bytes that have come, up to the end of one frame. True: that frame is a good one, and
   /// kind() and the others speak of it until the next call. Takes nothing while there is no room
@@ -27,12 +27,12 @@ class Link {
   /// Sends the whole report or, if there is no room for it, drops and counts it and returns false.
   template <class Message>
   bool send(const Message& message) {
-    uint8_t frame[link::kMostFrameBytes];
+    uint8_t frame[link::kMaxFrameBytes];
     return post(frame, encode(message, sequence_, frame + 1), false);
   }
   /// Is there room for a sample, and for the longest report?
-  bool has_room() const { return board::serial_room() >= kMostSampleBytes; }
-  bool roomy() const { return board::serial_room() >= link::kMostFrameBytes; }
+  bool has_room() const { return board::serial_room() >= kMaxSampleBytes; }
+  bool roomy() const { return board::serial_room() >= link::kMaxFrameBytes; }
 
   void answer(link::Result result);
   /// Answers a TimeRequest, whose arrival the board has stamped.

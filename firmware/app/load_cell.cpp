@@ -11,10 +11,10 @@ constexpr uint32_t kSilentUs = 1000000;
 constexpr uint32_t kRateWindowUs = 1000000;
 
 /// Both ends of 24 bits; an HX711 stays there when its input is beyond its range.
-constexpr int32_t kMostCounts = 0x7FFFFF;
-constexpr int32_t kLeastCounts = -0x800000;
+constexpr int32_t kMaxCounts = 0x7FFFFF;
+constexpr int32_t kMinCounts = -0x800000;
 
-constexpr uint16_t kMostTareConversions = 1000;
+constexpr uint16_t kMaxTareConversions = 1000;
 constexpr uint8_t kLowBits = 12;
 
 }  // namespace
@@ -31,7 +31,7 @@ void LoadCells::configure(const link::CellInput* inputs, uint8_t rate_sps, uint3
 
 link::Result LoadCells::tare(uint8_t mask, uint16_t conversions) {
   if (mask == 0 || (mask >> board::kTraits.cells) != 0 || conversions == 0 ||
-      conversions > kMostTareConversions)
+      conversions > kMaxTareConversions)
     return link::Result::out_of_range;
   for (uint8_t i = 0; i < board::kTraits.cells; ++i) {
     const State state = cells_[i].state;
@@ -39,7 +39,7 @@ link::Result LoadCells::tare(uint8_t mask, uint16_t conversions) {
       return link::Result::not_ready;
   }
   for (uint8_t i = 0; i < board::kTraits.cells; ++i) {
-    if (mask >> i & 1) cells_[i].tare = Mean{0, 0, kMostCounts, kLeastCounts, 0, conversions};
+    if (mask >> i & 1) cells_[i].tare = Mean{0, 0, kMaxCounts, kMinCounts, 0, conversions};
   }
   return link::Result::ok;
 }
@@ -78,7 +78,7 @@ void LoadCells::take(const board::Conversion& conversion, Link& link, Faults& fa
   cell.rate_count = static_cast<uint16_t>(cell.rate_count + conversion.lost);
   measure_rate(cell, conversion.time_us);
   add(cell.tare, conversion.counts);
-  const bool saturated = conversion.counts >= kMostCounts || conversion.counts <= kLeastCounts;
+  const bool saturated = conversion.counts >= kMaxCounts || conversion.counts <= kMinCounts;
   link.send(link::CellSample{conversion.channel, conversion.counts, conversion.time_us,
                              cell.sequence, cell.missed, saturated});
   ++cell.sequence;
@@ -91,8 +91,7 @@ bool LoadCells::send_tare(Link& link) {
     const uint32_t high = tare.sum_high / tare.count;
     const uint32_t rest = tare.sum_high % tare.count;
     const uint32_t low = ((rest << kLowBits) + tare.sum_low + tare.count / 2) / tare.count;
-    const link::TareResult result = {i,
-                                     static_cast<int32_t>((high << kLowBits) + low) + kLeastCounts,
+    const link::TareResult result = {i, static_cast<int32_t>((high << kLowBits) + low) + kMinCounts,
                                      static_cast<uint32_t>(tare.most - tare.least), tare.count};
     if (link.send(result)) tare.wanted = 0;
     return true;
@@ -122,7 +121,7 @@ void LoadCells::measure_rate(Cell& cell, uint32_t time_us) {
 
 void LoadCells::add(Mean& tare, int32_t counts) {
   if (tare.count >= tare.wanted) return;
-  const uint32_t above = static_cast<uint32_t>(counts - kLeastCounts);
+  const uint32_t above = static_cast<uint32_t>(counts - kMinCounts);
   tare.sum_high += above >> kLowBits;
   tare.sum_low += above & ((1u << kLowBits) - 1);
   if (counts < tare.least) tare.least = counts;

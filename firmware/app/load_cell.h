@@ -9,7 +9,7 @@ namespace firmware {
 
 class LoadCells {
  public:
-  /// Starts every channel anew; `inputs` has kMostCells of them. The first conversion of each is
+  /// Starts every channel anew; `inputs` has kMaxCells of them. The first conversion of each is
   /// dropped: its age and input are not known.
   void configure(const link::CellInput* inputs, uint8_t rate_sps, uint32_t now_us);
   /// Averages the next conversions of the channels in the mask. Replaces a tare of theirs that is
@@ -59,7 +59,7 @@ class LoadCells {
   static void measure_rate(Cell& cell, uint32_t time_us);
   static void add(Mean& tare, int32_t counts);
 
-  Cell cells_[link::kMostCells] = {};
+  Cell cells_[link::kMaxCells] = {};
   uint8_t watched_ = 0;  ///< channel whose silence is looked after next
 };
 

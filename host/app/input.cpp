@@ -9,8 +9,8 @@
 #include "host/app/recording_sensor.h"
 #include "host/app/scenario_config.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/recording/reader.h"
 #include "host/source/images.h"
 #include "host/source/recording.h"
@@ -151,7 +151,7 @@ Next next_frame(FrameSource& source, const UniqueFd& stop, Frame& frame) {
   const ReadStatus status = source.read(frame);
   if (status == ReadStatus::end) return Next::end;
   if (status == ReadStatus::disconnected || status == ReadStatus::reconnected)
-    tell(source.detail());
+    log_info(source.detail());
   return status == ReadStatus::frame ? Next::frame : Next::nothing;
 }
 

@@ -6,34 +6,34 @@
 #include <array>
 #include <exception>
 
-#include "host/core/tell.h"
-#include "host/tracker/hint_text.h"
+#include "host/core/log.h"
+#include "host/tracker/diagnostic_text.h"
 
 namespace tagwrench {
 namespace {
 
 using std::chrono::milliseconds;
 
-// A frame is missing when it is this late. With the guardian's delay both stay below 80 ms, the
+// A frame is missing when it is this late. With the watchdog's delay both stay below 80 ms, the
 // time after which robot teleoperation programs take a silent device for gone.
 constexpr Duration kGrace = milliseconds(40);
-constexpr Duration kGuardianGrace = milliseconds(60);
+constexpr Duration kWatchdogGrace = milliseconds(60);
 // A camera that slows down in dim light is late, not lost; slower than this it is lost.
 constexpr Duration kSlowestInterval = milliseconds(250);
-constexpr std::size_t kMostOutputs = 14;
+constexpr std::size_t kMaxOutputs = 14;
 constexpr std::size_t kOthers = 3;  // source, stop, desk
 
 }  // namespace
 
-Pipeline::Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, Desk& desk,
-                   std::vector<std::unique_ptr<Output>>& outputs, DeadMan& dead_man, int stop_fd,
-                   FrameLog* log)
+Pipeline::Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench,
+                   ProfileManager& profiles, std::vector<std::unique_ptr<Output>>& outputs,
+                   Watchdog& watchdog, int stop_fd, FrameLog* log)
     : source_(source),
       tracker_(tracker),
       wrench_(wrench),
-      desk_(desk),
+      profiles_(profiles),
       outputs_(outputs),
-      dead_man_(dead_man),
+      watchdog_(watchdog),
       stop_fd_(stop_fd),
       log_(log),
       intervals_{source.format().period, source.format().period, source.format().period},
@@ -53,13 +53,13 @@ void Pipeline::step(Frame& frame) noexcept {
   sample.buttons = pressed();
   sample.touched = frame.touched || sample.buttons != 0;
   follow_zero(sample, wrench_.noise(track));  // less what reads untouched
-  desk_.shape(sample);                        // newtons -> motion and buttons of an input device
+  profiles_.shape(sample);                    // newtons -> motion and buttons of an input device
   send(sample, frame.recorded_latency);       // to every output
   if (log_ != nullptr) log_->frame({frame, decoded, source_.raw(), track, sample});
   ++report_.frames;
   report_.dropped += sample.dropped;
   if (carries_numbers(sample.status)) ++report_.with_numbers;
-  say_hint(track);
+  say_diagnostic(track);
 }
 
 RunReport Pipeline::run(const RunLimits& limits) {
@@ -73,7 +73,7 @@ RunReport Pipeline::run(const RunLimits& limits) {
     if (!came && now >= missing_at()) send_neutral({});
     if (now >= next_move_) move_on(now);
   }
-  dead_man_.stand_down();
+  watchdog_.stand_down();
   report_.end = end_.value_or(RunReport::End::limit);
   report_.elapsed = std::chrono::steady_clock::now() - start_;
   return report_;
@@ -93,12 +93,12 @@ TimePoint Pipeline::missing_at() const noexcept {
 
 /// Blocks until the source, an output's client or a stop wants attention, or the time has come.
 void Pipeline::wait(TimePoint until) noexcept {
-  std::array<pollfd, kMostOutputs + kOthers> fds{};
+  std::array<pollfd, kMaxOutputs + kOthers> fds{};
   const int source_fd = source_.poll_fd();
   fds[0] = {source_fd, POLLIN, 0};
   fds[1] = {stop_fd_, POLLIN, 0};
-  fds[2] = {desk_.poll_fd(), POLLIN, 0};
-  const std::size_t outputs = std::min(outputs_.size(), kMostOutputs);
+  fds[2] = {profiles_.poll_fd(), POLLIN, 0};
+  const std::size_t outputs = std::min(outputs_.size(), kMaxOutputs);
   for (std::size_t i = 0; i < outputs; ++i) fds[i + kOthers] = {outputs_[i]->poll_fd(), POLLIN, 0};
 
   timespec timeout{};
@@ -113,11 +113,13 @@ void Pipeline::wait(TimePoint until) noexcept {
   source_ready_ = source_fd < 0 || (ready > 0 && fds[0].revents != 0);
   if (ready <= 0) return;
   if (fds[1].revents != 0) end_ = RunReport::End::interrupted;
-  if (fds[2].revents != 0) desk_.service();
-  if (const std::string news = desk_.take_news(); !news.empty()) say(news);
+  if (fds[2].revents != 0) profiles_.service();
+  if (const std::string status_line = profiles_.take_status_line(); !status_line.empty())
+    say(status_line);
   for (std::size_t i = 0; i < outputs; ++i) {
     if (fds[i + kOthers].revents == 0) continue;
-    if (const std::string_view news = outputs_[i]->service(); !news.empty()) say(news);
+    if (const std::string_view status_line = outputs_[i]->service(); !status_line.empty())
+      say(status_line);
   }
 }
 
@@ -169,14 +171,14 @@ void Pipeline::send(Sample& sample, std::optional<Duration> recorded_latency) no
   for (const std::unique_ptr<Output>& output : outputs_) note(output->send(sample), *output);
   last_sample_ = sample;
   neutral_ = !carries_numbers(sample.status);
-  const bool steady = desk_.period() > Duration::zero() && source_.poll_fd() >= 0;
+  const bool steady = profiles_.period() > Duration::zero() && source_.poll_fd() >= 0;
   if (neutral_ || !steady) {
     next_move_ = TimePoint::max();
     move(sample);
   } else if (next_move_ == TimePoint::max()) {
     next_move_ = TimePoint::min();  // at once, and from then on by the clock
   }
-  if (neutral_) dead_man_.stand_down();
+  if (neutral_) watchdog_.stand_down();
 }
 
 void Pipeline::move(const Sample& sample) noexcept {
@@ -185,11 +187,11 @@ void Pipeline::move(const Sample& sample) noexcept {
 
 /// Between frames devices move on, to where the motion is by now.
 void Pipeline::move_on(TimePoint now) noexcept {
-  const Duration period = desk_.period();
+  const Duration period = profiles_.period();
   next_move_ = next_move_ == TimePoint::min() || now - next_move_ > period ? now + period
                                                                            : next_move_ + period;
   Sample sample = last_sample_;
-  desk_.move_on(sample, sample.capture_time + (now - sample.latency_origin));
+  profiles_.move_on(sample, sample.capture_time + (now - sample.latency_origin));
   move(sample);
 }
 
@@ -208,14 +210,14 @@ std::uint32_t Pipeline::pressed() const noexcept {
 
 void Pipeline::follow_zero(Sample& sample, const Vector6& noise) noexcept {
   if (zero_ == nullptr) return;
-  if (desk_.take_zero()) zero_->ask();
+  if (profiles_.take_zero()) zero_->ask();
   if (source_.poll_fd() >= 0 && sleep_.woke(time_asleep())) zero_->wake();
   zero_->follow(sample, noise);
   if (const std::string_view line = zero_text(zero_->take_answer()); !line.empty()) say(line);
 }
 
-/// If the loop should hang from here on, the guardian sends neutral.
-void Pipeline::guard() noexcept { dead_man_.expect_by(last_arrival_ + interval_ + kGuardianGrace); }
+/// If the loop should hang from here on, the watchdog sends neutral.
+void Pipeline::guard() noexcept { watchdog_.expect_by(last_arrival_ + interval_ + kWatchdogGrace); }
 
 /// The frame that should have come did not: one sample that says so, with zeros.
 void Pipeline::send_neutral(std::optional<Duration> recorded_latency) noexcept {
@@ -224,24 +226,26 @@ void Pipeline::send_neutral(std::optional<Duration> recorded_latency) noexcept {
                 .capture_time = last_sample_.capture_time,
                 .latency_origin = last_sample_.latency_origin,
                 .status = Status::lost};
-  desk_.shape(sample);  // or it would go on from before the gap
+  profiles_.shape(sample);  // or it would go on from before the gap
   send(sample, recorded_latency);
   if (log_ != nullptr) log_->missing(sample);
 }
 
 /// What was wrong is not, once the target is held.
-void Pipeline::say_hint(const Track& track) noexcept {
+void Pipeline::say_diagnostic(const Track& track) noexcept {
   if (track.status == Status::ok && trouble_shown_) {
     trouble_shown_ = false;
     for (const std::unique_ptr<Output>& output : outputs_) output->notice({});
   }
   // The tracker itself sees to it that troubles are not said too often.
-  const bool trouble = is_trouble(track.hint);
-  if (track.hint == Hint::none || (track.hint == last_hint_ && !trouble)) return;
-  last_hint_ = track.hint;
+  const bool trouble = is_trouble(track.diagnostic);
+  if (track.diagnostic == Diagnostic::none || (track.diagnostic == last_diagnostic_ && !trouble))
+    return;
+  last_diagnostic_ = track.diagnostic;
   try {
-    const std::string line = hint_text(track.hint, track.details);
-    if (track.status != Status::ok && track.hint != Hint::rest_learned) report_.trouble = line;
+    const std::string line = diagnostic_text(track.diagnostic, track.details);
+    if (track.status != Status::ok && track.diagnostic != Diagnostic::rest_learned)
+      report_.trouble = line;
     trouble_shown_ = trouble_shown_ || (trouble && track.status != Status::ok);
     say(line);
   } catch (const std::exception&) {
@@ -252,7 +256,7 @@ void Pipeline::say_hint(const Track& track) noexcept {
 void Pipeline::say(std::string_view line) noexcept {
   bool shown = false;
   for (const std::unique_ptr<Output>& output : outputs_) shown = output->notice(line) || shown;
-  if (!shown) tell(line);
+  if (!shown) log_info(line);
 }
 
 }  // namespace tagwrench

@@ -12,9 +12,9 @@
 
 #include "host/core/frame_log.h"
 #include "host/core/sleep_watch.h"
-#include "host/motion/desk.h"
-#include "host/output/dead_man.h"
+#include "host/motion/profile_manager.h"
 #include "host/output/output.h"
+#include "host/output/watchdog.h"
 #include "host/source/frame_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
@@ -43,8 +43,8 @@ class Pipeline {
  public:
   /// Borrows everything; `stop_fd` becomes readable when the run shall end (of termination_fd()),
   /// -1 for never. `log` is told of every frame; there may be none.
-  Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, Desk& desk,
-           std::vector<std::unique_ptr<Output>>& outputs, DeadMan& dead_man, int stop_fd,
+  Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, ProfileManager& profiles,
+           std::vector<std::unique_ptr<Output>>& outputs, Watchdog& watchdog, int stop_fd,
            FrameLog* log = nullptr);
 
   /// Takes the zero off every sample; without it the wrench stays as it is estimated. Borrowed.
@@ -70,16 +70,16 @@ class Pipeline {
   void note_arrival(TimePoint now) noexcept;
   void wait(TimePoint until) noexcept;
   void say(std::string_view line) noexcept;
-  void say_hint(const Track& track) noexcept;
+  void say_diagnostic(const Track& track) noexcept;
   TimePoint wake_time(const RunLimits& limits) const noexcept;
   TimePoint missing_at() const noexcept;
 
   FrameSource& source_;
   Tracker& tracker_;
   WrenchEstimator& wrench_;
-  Desk& desk_;
+  ProfileManager& profiles_;
   std::vector<std::unique_ptr<Output>>& outputs_;
-  DeadMan& dead_man_;
+  Watchdog& watchdog_;
   int stop_fd_;
   FrameLog* log_;
   ZeroTracking* zero_ = nullptr;
@@ -92,7 +92,7 @@ class Pipeline {
   Duration interval_;                       ///< to be expected, at least the announced period
   bool neutral_ = true;
   bool source_ready_ = false;
-  Hint last_hint_ = Hint::none;
+  Diagnostic last_diagnostic_ = Diagnostic::none;
   bool trouble_shown_ = false;  ///< since the target was last held
   Sample last_sample_;
   RunReport report_;

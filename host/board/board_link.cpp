@@ -13,7 +13,7 @@
 namespace tagwrench::link {
 namespace {
 
-constexpr int kMostReads = 4;  ///< in one service(): the frame loop goes first
+constexpr int kMaxReads = 4;  ///< in one service(): the frame loop goes first
 
 TimePoint clock_now() { return std::chrono::steady_clock::now(); }
 
@@ -79,7 +79,7 @@ void BoardLink::service() noexcept {
 
 void BoardLink::send() noexcept {
   if (!serial_) return arm(next_try_);
-  std::array<std::uint8_t, BoardSession::kMostBytesOut> out;
+  std::array<std::uint8_t, BoardSession::kMaxBytesOut> out;
   const std::size_t count = session_.poll(clock_now(), out.data());
   if (count > 0 && !serial_.write({out.data(), count})) lost();
   arm(serial_ ? session_.next_poll() : next_try_);
@@ -87,7 +87,7 @@ void BoardLink::send() noexcept {
 
 void BoardLink::receive() noexcept {
   std::array<std::uint8_t, 4096> room;
-  for (int i = 0; i < kMostReads; ++i) {
+  for (int i = 0; i < kMaxReads; ++i) {
     const SerialPort::ReadResult got = serial_.read(room);
     if (got.gone) return lost();
     if (got.count == 0) return;
@@ -99,7 +99,7 @@ void BoardLink::receive() noexcept {
 void BoardLink::lost() noexcept {
   serial_.close();
   session_.reconnect();
-  news_.push({News::Kind::unplugged, 0, 0});
+  news_.push({BoardEvent::Kind::unplugged, 0, 0});
   next_try_ = clock_now() + kRetryPeriod;
 }
 
@@ -118,7 +118,7 @@ void BoardLink::try_again(TimePoint now) noexcept {
   if (!mark_.may_reopen(path_.c_str()) || serial_.open(path_.c_str(), baud_)) return;
   watch_serial();
   session_.reconnect();
-  news_.push({News::Kind::plugged, 0, 0});
+  news_.push({BoardEvent::Kind::plugged, 0, 0});
 }
 
 void BoardLink::arm(TimePoint when) noexcept {
@@ -130,7 +130,7 @@ void BoardLink::arm(TimePoint when) noexcept {
   ::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &timer, nullptr);
 }
 
-bool BoardLink::next(News& news) noexcept { return session_.next(news) || news_.pop(news); }
+bool BoardLink::next(BoardEvent& news) noexcept { return session_.next(news) || news_.pop(news); }
 
 std::string BoardLink::why_no_board() const {
   const SessionCounters counters = session_.counters();

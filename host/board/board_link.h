@@ -40,8 +40,8 @@ class BoardLink {
   const std::string& port() const noexcept { return path_; }
   std::uint64_t dropped_bytes() const noexcept { return serial_.dropped_bytes(); }
 
-  /// News of the session and of the port, oldest first.
-  bool next(News& news) noexcept;
+  /// BoardEvent of the session and of the port, oldest first.
+  bool next(BoardEvent& news) noexcept;
 
   /// One line: what came from the port instead of a board's greeting, and what may be the matter.
   std::string why_no_board() const;
@@ -63,7 +63,7 @@ class BoardLink {
   UniqueFd timer_;
   TimePoint next_try_{};
   TimePoint armed_ = TimePoint::max();  ///< of the timer
-  Ring<News, 8> news_;
+  Ring<BoardEvent, 8> news_;
 };
 
 }  // namespace tagwrench::link

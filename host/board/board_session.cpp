@@ -84,7 +84,7 @@ void BoardSession::configure(const Configure& configuration) noexcept {
 
 template <class Message>
 std::uint8_t BoardSession::put(const Message& message) noexcept {
-  std::array<std::uint8_t, kMostBodyBytes> body;
+  std::array<std::uint8_t, kMaxBodyBytes> body;
   const std::uint8_t count = encode(message, sequence_++, body.data());
   const std::uint8_t wire_bytes = write_frame(body.data(), count, out_ + out_bytes_);
   out_bytes_ += wire_bytes;

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "host/board/board_news.h"
+#include "host/board/board_events.h"
 #include "host/board/clock_sync.h"
 #include "host/board/ring.h"
 #include "host/core/types.h"
@@ -22,7 +22,7 @@ struct BoardSessionOptions {
   Configure configuration{
       .host_timeout_ms = 5000,
       .cells = {CellInput::a128, CellInput::a128, CellInput::a128, CellInput::a128},
-      .cell_count = kMostCells,
+      .cell_count = kMaxCells,
       .cell_rate_sps = 80,
       .adc_mask = 0,
       .adc_rate_hz = 100,
@@ -83,7 +83,7 @@ struct SessionCounters {
 class BoardSession {
  public:
   /// Room for all that one poll() writes.
-  static constexpr std::size_t kMostBytesOut = 6 * kMostFrameBytes;
+  static constexpr std::size_t kMaxBytesOut = 6 * kMaxFrameBytes;
   static constexpr Duration kHelloPeriod = std::chrono::milliseconds(250);
 
   explicit BoardSession(const BoardSessionOptions& options) noexcept;
@@ -91,7 +91,7 @@ class BoardSession {
   /// Bytes as they came; the last of them was there at `arrival`. Their samples wait to be taken.
   void take(std::span<const std::uint8_t> bytes, TimePoint arrival) noexcept;
 
-  /// What is to be sent now, to `out` (kMostBytesOut of room); returns its length. The bytes count
+  /// What is to be sent now, to `out` (kMaxBytesOut of room); returns its length. The bytes count
   /// as sent at `now`, or, if the line was still busy, right after those before.
   std::size_t poll(TimePoint now, std::uint8_t* out) noexcept;
   /// When to call poll() at the latest.
@@ -131,7 +131,7 @@ class BoardSession {
   bool next(ButtonReading& reading) noexcept { return buttons_.pop(reading); }
   bool next(FaultReading& reading) noexcept { return faults_.pop(reading); }
   bool next(TareResult& result) noexcept { return tares_.pop(result); }
-  bool next(News& news) noexcept { return news_.pop(news); }
+  bool next(BoardEvent& news) noexcept { return news_.pop(news); }
 
   /// What came before there was a good frame: tells a board of ours from other devices.
   std::span<const std::uint8_t> first_bytes() const noexcept {
@@ -176,7 +176,7 @@ class BoardSession {
   void watch_frame_sequence(std::uint8_t sequence) noexcept;
   void restart_streams() noexcept;
   void greet_again(TimePoint now) noexcept;
-  void tell(News::Kind kind, std::uint32_t value = 0, std::uint32_t other = 0) noexcept;
+  void log_info(BoardEvent::Kind kind, std::uint32_t value = 0, std::uint32_t other = 0) noexcept;
   HostTime host_time(std::uint32_t board_us, TimePoint arrival) const noexcept;
   static std::uint16_t lost_between(SequenceWatch& watch, std::uint16_t sequence) noexcept;
 
@@ -210,7 +210,7 @@ class BoardSession {
   TimePoint last_frame_{};
   SessionCounters counters_;
   SequenceWatch frame_sequence_;
-  std::array<SequenceWatch, kMostCells> cell_sequence_;
+  std::array<SequenceWatch, kMaxCells> cell_sequence_;
   std::array<SequenceWatch, 8> adc_sequence_;
 
   std::uint8_t* out_ = nullptr;
@@ -245,7 +245,7 @@ class BoardSession {
   Ring<ButtonReading, 64> buttons_;
   Ring<FaultReading, 64> faults_;
   Ring<TareResult, 16> tares_;
-  Ring<News, 32> news_;
+  Ring<BoardEvent, 32> news_;
 };
 
 }  // namespace tagwrench::link

@@ -11,10 +11,10 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Duration kMostAhead = seconds(2);  ///< of its arrival: a stamp that cannot be
-constexpr Duration kMostAge = seconds(60);   ///< this program was held up for so long
-constexpr unsigned kMisfitsOfARestart = 4;   ///< in a row: its clock may have started anew
-constexpr unsigned kQuickRequests = 20;      ///< at the start, for the clock to converge soon
+constexpr Duration kMaxAhead = seconds(2);  ///< of its arrival: a stamp that cannot be
+constexpr Duration kMaxAge = seconds(60);   ///< this program was held up for so long
+constexpr unsigned kMisfitsOfARestart = 4;  ///< in a row: its clock may have started anew
+constexpr unsigned kQuickRequests = 20;     ///< at the start, for the clock to converge soon
 
 /// The board's words are a stranger's bytes: no control codes to a terminal.
 void make_printable(char* text) {
@@ -120,20 +120,22 @@ void BoardSession::take_hello(const Hello& hello, TimePoint arrival) noexcept {
     configured_ = false;
     restarted_ = arrival;
     led_start_lost_ = led_start_.known;
-    tell(News::Kind::restarted, static_cast<std::uint32_t>(hello.reset_cause));
+    log_info(BoardEvent::Kind::restarted, static_cast<std::uint32_t>(hello.reset_cause));
   }
   const std::uint32_t version = hello.protocol_major * 256u + hello.protocol_minor;
   const Update update = needed_update(kProtocolMajor, hello.protocol_major);
   if (update != Update::none) {
     if (state_ != BoardState::other_version) {
-      tell(update == Update::board ? News::Kind::board_too_old : News::Kind::host_too_old, version);
+      log_info(update == Update::board ? BoardEvent::Kind::board_too_old
+                                       : BoardEvent::Kind::host_too_old,
+               version);
     }
     state_ = BoardState::other_version;
     return;
   }
   if (!known) restart_streams();
   if (known && state_ >= BoardState::configuring) return;  // a repeated answer
-  tell(News::Kind::connected, version);
+  log_info(BoardEvent::Kind::connected, version);
   state_ = configured_ ? BoardState::ready : BoardState::configuring;
   set_id_due_ = hello.unique_id.count == 0 && options_.new_id.count > 0;
   next_set_id_ = next_configure_ = next_led_ = next_time_request_ = next_tare_ = {};
@@ -163,33 +165,33 @@ void BoardSession::take_answer(const Answer& answer) noexcept {
       if (state_ != BoardState::configuring) return;
       state_ = BoardState::ready;
       configured_ = true;
-      if (!ok) tell(News::Kind::configuration_refused, result);
+      if (!ok) log_info(BoardEvent::Kind::configuration_refused, result);
       return;
     case Kind::set_id:
       if (!set_id_due_) return;
       set_id_due_ = false;
       if (ok) {
         hello_.unique_id = options_.new_id;
-        tell(News::Kind::id_given);
+        log_info(BoardEvent::Kind::id_given);
       } else {
-        tell(News::Kind::request_refused, answer.request_kind, result);
+        log_info(BoardEvent::Kind::request_refused, answer.request_kind, result);
       }
       return;
     case Kind::led:
       if (ok) led_accepted_ |= answer.request_sequence == led_sequence_;
       if (ok || led_refused_told_) return;
       led_refused_told_ = true;
-      tell(News::Kind::led_refused, result);
+      log_info(BoardEvent::Kind::led_refused, result);
       return;
     case Kind::tare:
       if (!tare_due_) return;
       tare_due_ = false;
-      if (!ok) tell(News::Kind::request_refused, answer.request_kind, result);
+      if (!ok) log_info(BoardEvent::Kind::request_refused, answer.request_kind, result);
       return;
     case Kind::hello_request:
       return;  // Hello says it in full
     default:
-      if (!ok) tell(News::Kind::request_refused, answer.request_kind, result);
+      if (!ok) log_info(BoardEvent::Kind::request_refused, answer.request_kind, result);
   }
 }
 
@@ -200,7 +202,7 @@ void BoardSession::take_status(const Status& status, TimePoint arrival) noexcept
   if (status.session != 0) configured_ = false;
   if (status.session != 0 && !other_host_told_) {
     other_host_told_ = true;
-    tell(News::Kind::other_host, status.session);
+    log_info(BoardEvent::Kind::other_host, status.session);
   }
   greet_again(arrival);
 }
@@ -284,18 +286,19 @@ void BoardSession::take_button(const ButtonEvent& event, TimePoint arrival) noex
 
 void BoardSession::take_fault(const Fault& fault, TimePoint arrival) noexcept {
   faults_.push({fault.code, fault.channel, host_time(fault.time_us, arrival)});
-  tell(News::Kind::fault, static_cast<std::uint32_t>(fault.code), fault.channel);
+  log_info(BoardEvent::Kind::fault, static_cast<std::uint32_t>(fault.code), fault.channel);
 }
 
 HostTime BoardSession::host_time(std::uint32_t board_us, TimePoint arrival) const noexcept {
   if (!clock_.known()) return arrival_only(arrival);
   const HostTime time = clock_.to_host(board_us);
   const Duration age = arrival - time.time;
-  const bool sane = age < kMostAge && age > -kMostAhead;
+  const bool sane = age < kMaxAge && age > -kMaxAhead;
   return sane ? time : arrival_only(arrival);
 }
 
-void BoardSession::tell(News::Kind kind, std::uint32_t value, std::uint32_t other) noexcept {
+void BoardSession::log_info(BoardEvent::Kind kind, std::uint32_t value,
+                            std::uint32_t other) noexcept {
   news_.push({kind, value, other});
 }
 

@@ -10,8 +10,8 @@
 namespace tagwrench::link {
 namespace {
 
-constexpr double kLeastSpan = 20;  ///< standard deviations of the counts' difference: 5 % of scale
-constexpr double kLeastSigma_counts = 0.3;  ///< of a mean: counts are whole numbers (1/sqrt(12))
+constexpr double kMinSpan = 20;  ///< standard deviations of the counts' difference: 5 % of scale
+constexpr double kMinSigma_counts = 0.3;  ///< of a mean: counts are whole numbers (1/sqrt(12))
 
 void check_span(const std::vector<CellPoint>& points) {
   const auto by_mass = [](const CellPoint& a, const CellPoint& b) { return a.mass_kg < b.mass_kg; };
@@ -22,9 +22,9 @@ void check_span(const std::vector<CellPoint>& points) {
         "--mass 0,0.5");
   }
   const double difference = std::abs(most->mean_counts - least->mean_counts);
-  const double sigma = std::hypot(std::max(most->sigma_counts, kLeastSigma_counts),
-                                  std::max(least->sigma_counts, kLeastSigma_counts));
-  if (difference < kLeastSpan * sigma) {
+  const double sigma = std::hypot(std::max(most->sigma_counts, kMinSigma_counts),
+                                  std::max(least->sigma_counts, kMinSigma_counts));
+  if (difference < kMinSpan * sigma) {
     throw ConfigError(fmt::format(
         "calibrate-cell: {:g} kg changed the counts by {:.0f} only, with an uncertainty of {:.0f}; "
         "take a larger mass, or check that it rests on this cell",
@@ -48,7 +48,7 @@ CellCalibration fit_cell(const std::vector<CellPoint>& points, double gravity) {
   // counts = zero + slope * force, each point weighed by its variance.
   double w = 0, wx = 0, wxx = 0, wy = 0, wxy = 0;
   for (const CellPoint& point : points) {
-    const double sigma = std::max(point.sigma_counts, kLeastSigma_counts);
+    const double sigma = std::max(point.sigma_counts, kMinSigma_counts);
     const double weight = 1 / (sigma * sigma);
     const double force = point.mass_kg * gravity;
     w += weight;
@@ -64,7 +64,7 @@ CellCalibration fit_cell(const std::vector<CellPoint>& points, double gravity) {
   double weighted = 0;
   for (const CellPoint& point : points) {
     const double off = point.mean_counts - zero - slope * point.mass_kg * gravity;
-    const double sigma = std::max(point.sigma_counts, kLeastSigma_counts);
+    const double sigma = std::max(point.sigma_counts, kMinSigma_counts);
     squares += off * off;
     weighted += off * off / (sigma * sigma);
   }

@@ -35,8 +35,8 @@ struct CellCalibration {
   Newtons newtons(double counts) const noexcept;
 };
 
-constexpr std::size_t kMostChannels = 4;
-using CellCalibrations = std::array<CellCalibration, kMostChannels>;
+constexpr std::size_t kMaxChannels = 4;
+using CellCalibrations = std::array<CellCalibration, kMaxChannels>;
 
 /// The line through two points, or nearest to more of them by least squares; zero is where no mass
 /// weighs. Its uncertainty is that of the points, or what they scatter about the line if that is

@@ -24,9 +24,9 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kFormat = "tagwrench-cells-1";
-constexpr std::uintmax_t kMostBytes = 1 << 20;
-constexpr double kMostNumber = 1e12;  ///< far beyond any cell; its square and products are finite
-constexpr std::size_t kMostShown = 40;
+constexpr std::uintmax_t kMaxBytes = 1 << 20;
+constexpr double kMaxNumber = 1e12;  ///< far beyond any cell; its square and products are finite
+constexpr std::size_t kMaxShown = 40;
 
 /// The file, and what to do if it is none.
 struct Source {
@@ -45,11 +45,11 @@ struct Source {
 
 /// A stranger's words: no control codes to a terminal.
 std::string printable(const std::string& text) {
-  std::string out = text.substr(0, kMostShown);
+  std::string out = text.substr(0, kMaxShown);
   for (char& c : out) {
     if (c < 0x20 || c > 0x7E) c = '?';
   }
-  return text.size() > kMostShown ? out + "..." : out;
+  return text.size() > kMaxShown ? out + "..." : out;
 }
 
 double number(const Source& source, const json& cell, const char* key) {
@@ -57,15 +57,15 @@ double number(const Source& source, const json& cell, const char* key) {
   if (found == cell.end() || !found->is_number())
     refuse(source, fmt::format("\"{}\" is missing or no number", key));
   const double value = found->get<double>();
-  if (!(std::abs(value) <= kMostNumber))
-    refuse(source, fmt::format("\"{}\" is beyond {:.0e}", key, kMostNumber));
+  if (!(std::abs(value) <= kMaxNumber))
+    refuse(source, fmt::format("\"{}\" is beyond {:.0e}", key, kMaxNumber));
   return value;
 }
 
 void read_cell(const Source& source, const json& cell, CellCalibrations& out) {
   if (!cell.is_object()) refuse(source, "\"cells\" holds something that is no cell");
   const double channel = number(source, cell, "channel");
-  if (channel < 0 || channel >= kMostChannels || channel != std::floor(channel))
+  if (channel < 0 || channel >= kMaxChannels || channel != std::floor(channel))
     refuse(source, fmt::format("channel {} does not exist", channel));
   CellCalibration& to = out[static_cast<std::size_t>(channel)];
   if (to.calibrated) refuse(source, fmt::format("channel {} is in it twice", channel));
@@ -130,7 +130,7 @@ CellCalibrations load_cells(const std::string& path, const std::string& board_id
   const fs::file_type type = fs::status(path, error).type();
   if (type == fs::file_type::not_found) return out;
   if (error) not_readable(path, error.message());
-  if (!fs::is_regular_file(path, error) || fs::file_size(path, error) > kMostBytes)
+  if (!fs::is_regular_file(path, error) || fs::file_size(path, error) > kMaxBytes)
     refuse(source, "is no calibration of load cells");
   errno = 0;
   std::ifstream in(path);

@@ -6,13 +6,13 @@
 namespace tagwrench::link {
 namespace {
 
-constexpr double kLeastRoundTrip = -2e-3;  ///< below zero only where wire times are not as told
-constexpr double kMostRoundTrip = 1;
+constexpr double kMinRoundTrip = -2e-3;  ///< below zero only where wire times are not as told
+constexpr double kMaxRoundTrip = 1;
 constexpr double kGate = 25;               ///< squared innovation over its variance: 5 sigma
 constexpr std::size_t kContradicting = 8;  ///< in a row: it was not they that erred
 constexpr double kOneSidedSigma = 0.29;    ///< k is within +-1/2
 constexpr double kScaleWeight = 20;        ///< exchanges that the assumed scale of errors is worth
-constexpr double kLeastVariance = 1e-13;   ///< s^2: the board's times are whole microseconds
+constexpr double kMinVariance = 1e-13;     ///< s^2: the board's times are whole microseconds
 
 std::int64_t to_ns(TimePoint time) {
   return std::chrono::duration_cast<Duration>(time.time_since_epoch()).count();
@@ -63,7 +63,7 @@ bool ClockSync::add(const TimeExchange& exchange) noexcept {
   entry.board_us2 = 2 * board_received + std::llround(entry.board_span * 1e6);
 
   const double trip = round_trip(entry);
-  const bool possible = entry.board_span >= 0 && trip >= kLeastRoundTrip && trip <= kMostRoundTrip;
+  const bool possible = entry.board_span >= 0 && trip >= kMinRoundTrip && trip <= kMaxRoundTrip;
   const bool forward = count_ == 0 || (exchange.host_sent >= last_sent_ &&
                                        entry.board_us2 > this->entry(count_ - 1).board_us2);
   if (!possible || (!forward && !begins_anew(entry))) {
@@ -118,15 +118,15 @@ void ClockSync::note_jump(double size, std::int64_t host_ns) noexcept {
 
 void ClockSync::append(const Entry& entry) noexcept {
   while (count_ > 0 && entry.host_ns - this->entry(0).host_ns > kWindow.count()) drop_oldest(1);
-  if (count_ == kMostEntries) drop_oldest(1);
-  entries_[(first_ + count_) % kMostEntries] = entry;
+  if (count_ == kMaxEntries) drop_oldest(1);
+  entries_[(first_ + count_) % kMaxEntries] = entry;
   ++count_;
   board_reference_us2_ = entry.board_us2;
   host_reference_ = TimePoint(Duration(entry.host_ns));
 }
 
 void ClockSync::drop_oldest(std::size_t count) noexcept {
-  first_ = (first_ + count) % kMostEntries;
+  first_ = (first_ + count) % kMaxEntries;
   count_ -= count;
 }
 
@@ -140,7 +140,7 @@ double ClockSync::round_trip(const Entry& entry) const noexcept {
 /// zero.
 ClockSync::RoundTrip ClockSync::least_round_trip() const noexcept {
   std::array<double, 16> fastest;
-  fastest.fill(kMostRoundTrip);
+  fastest.fill(kMaxRoundTrip);
   for (std::size_t i = 0; i < count_; ++i) {
     double trip = round_trip(entry(i));
     if (trip >= fastest.back()) continue;
@@ -247,7 +247,7 @@ double ClockSync::variance_after(double seconds) const noexcept {
                           q * std::abs(seconds * seconds * seconds) / 3 +
                           squared(state_.mean[2] * least_.sigma) + squared(unsteady_) +
                           squared(misfit_.size + std::abs(seconds) * misfit_.rate);
-  return std::max(variance, kLeastVariance);
+  return std::max(variance, kMinVariance);
 }
 
 /// Uniform between the bounds that the least round trip sets. None is below zero: if one is, wire

@@ -118,10 +118,10 @@ class ClockSync {
     double surprise = 0;    ///< sum of squared innovations over their variances
     std::size_t fitting = 0;
   };
-  static constexpr std::size_t kMostEntries = 600;
+  static constexpr std::size_t kMaxEntries = 600;
   static constexpr std::size_t kFewForRoundTrip = 8;
 
-  const Entry& entry(std::size_t i) const noexcept { return entries_[(first_ + i) % kMostEntries]; }
+  const Entry& entry(std::size_t i) const noexcept { return entries_[(first_ + i) % kMaxEntries]; }
   void append(const Entry& entry) noexcept;
   void drop_oldest(std::size_t count) noexcept;
   std::int64_t unwrap(std::uint32_t board_us, std::int64_t near_us) const noexcept;
@@ -139,7 +139,7 @@ class ClockSync {
   double asymmetry_sigma() const noexcept;
 
   ClockSyncOptions options_;
-  std::array<Entry, kMostEntries> entries_{};
+  std::array<Entry, kMaxEntries> entries_{};
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   State state_;  ///< at the reference

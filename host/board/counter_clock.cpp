@@ -6,14 +6,14 @@
 namespace tagwrench::link {
 namespace {
 
-constexpr double kFirstJitter = 5e-3;   ///< s, before any is seen
-constexpr double kLeastJitter = 20e-6;  ///< s
-constexpr double kPeriodSigma = 0.02;   ///< of the nominal period
-constexpr double kWander = 1e-6;        ///< of the period, relative, per square root of a second
-constexpr double kForget = 0.02;        ///< of the jitter's estimate, per sample
-constexpr double kGate = 36;            ///< squared innovation over its variance
-constexpr double kMisfitTime = 0.5;     ///< s
-constexpr double kMostSteps = 30'000;   ///< half of the counter's range: a bridge of a long silence
+constexpr double kFirstJitter = 5e-3;  ///< s, before any is seen
+constexpr double kMinJitter = 20e-6;   ///< s
+constexpr double kPeriodSigma = 0.02;  ///< of the nominal period
+constexpr double kWander = 1e-6;       ///< of the period, relative, per square root of a second
+constexpr double kForget = 0.02;       ///< of the jitter's estimate, per sample
+constexpr double kGate = 36;           ///< squared innovation over its variance
+constexpr double kMisfitTime = 0.5;    ///< s
+constexpr double kMaxSteps = 30'000;   ///< half of the counter's range: a bridge of a long silence
 
 Duration to_duration(double seconds) {
   return Duration(std::llround(std::clamp(seconds, -1e9, 1e9) * 1e9));
@@ -46,7 +46,7 @@ HostTime CounterClock::take(std::uint16_t counter, TimePoint arrival) noexcept {
   const auto difference = static_cast<std::uint16_t>(counter - last_);
   const double steps = difference;
   last_ = counter;
-  if (difference == 0 || steps > kMostSteps) {
+  if (difference == 0 || steps > kMaxSteps) {
     start(counter, arrival);
     ++restarts_;
     return now();
@@ -72,7 +72,7 @@ HostTime CounterClock::take(std::uint16_t counter, TimePoint arrival) noexcept {
   state_ += gain * innovation;
   covariance_ = (covariance_ - gain * covariance_.row(0)).eval();
   jitter_variance_ += kForget * (innovation * innovation - jitter_variance_);
-  jitter_variance_ = std::max(jitter_variance_, kLeastJitter * kLeastJitter);
+  jitter_variance_ = std::max(jitter_variance_, kMinJitter * kMinJitter);
   return now();
 }
 

@@ -15,11 +15,11 @@ namespace tagwrench::link {
 /// n = 0A: 16 bytes, 3 axes (Fx Fy Fz); 10: 22 bytes, 6 axes (Fx Fy Fz Tx Ty Tz); 1C: 34 bytes,
 /// four 3-axis sensors.
 struct OptoforceFrame {
-  static constexpr std::size_t kMostAxes = 12;
+  static constexpr std::size_t kMaxAxes = 12;
 
   std::uint16_t counter = 0;
   std::uint16_t status = 0;
-  std::array<std::int16_t, kMostAxes> counts{};
+  std::array<std::int16_t, kMaxAxes> counts{};
   std::uint8_t axes = 0;          ///< of `counts`
   std::uint16_t lost_before = 0;  ///< frames between the last one and this, by the counter
 };
@@ -69,7 +69,7 @@ class OptoforceParser {
   std::uint8_t reply() const noexcept { return reply_; }
 
  private:
-  static constexpr std::size_t kMostBytes = 34;
+  static constexpr std::size_t kMaxBytes = 34;
 
   bool next(OptoforceFrame& frame) noexcept;
   std::size_t length() const noexcept;
@@ -79,7 +79,7 @@ class OptoforceParser {
   void consume(std::size_t count) noexcept;
   void read(OptoforceFrame& frame, std::size_t length) noexcept;
 
-  std::array<std::uint8_t, kMostBytes> pending_{};
+  std::array<std::uint8_t, kMaxBytes> pending_{};
   std::size_t count_ = 0;
   bool have_frame_ = false;
   bool interrupted_ = false;

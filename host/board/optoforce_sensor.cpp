@@ -11,14 +11,14 @@ namespace {
 
 TimePoint clock_now() { return std::chrono::steady_clock::now(); }
 
-std::array<double, OptoforceFrame::kMostAxes> scale_of(const std::vector<double>& counts_per_unit) {
+std::array<double, OptoforceFrame::kMaxAxes> scale_of(const std::vector<double>& counts_per_unit) {
   if (counts_per_unit.size() != 3 && counts_per_unit.size() != 6) {
     throw ConfigError(fmt::format(
         "--counts-per-unit: {} numbers, but a sensor has 3 (Fx,Fy,Fz) or 6 (and Tx,Ty,Tz); they "
         "stand in its data sheet",
         counts_per_unit.size()));
   }
-  std::array<double, OptoforceFrame::kMostAxes> out{};
+  std::array<double, OptoforceFrame::kMaxAxes> out{};
   for (std::size_t i = 0; i < out.size(); ++i) {
     // Four 3-axis sensors are of one kind.
     const double counts = counts_per_unit.size() == 3 ? counts_per_unit[i % 3]

@@ -24,7 +24,7 @@ struct OptoforceOptions {
 
 struct OptoforceReading {
   HostTime time;
-  std::array<double, OptoforceFrame::kMostAxes> values{};  ///< N, N m
+  std::array<double, OptoforceFrame::kMaxAxes> values{};  ///< N, N m
   std::uint8_t axes = 0;
   std::uint16_t status = 0;
   std::uint16_t counter = 0;
@@ -56,7 +56,7 @@ class OptoforceSensor {
 
   OptoforceOptions options_;
   std::array<std::uint8_t, 9> command_;
-  std::array<double, OptoforceFrame::kMostAxes> scale_{};  ///< N or N m per count; 0: not told
+  std::array<double, OptoforceFrame::kMaxAxes> scale_{};  ///< N or N m per count; 0: not told
   SerialPort serial_;
   TerminalMark mark_;
   OptoforceParser parser_;

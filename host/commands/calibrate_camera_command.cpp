@@ -17,9 +17,9 @@
 #include "host/commands/exit_status.h"
 #include "host/commands/today.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/sensor/sensor_edit.h"
 #include "host/source/images.h"
 
@@ -137,11 +137,11 @@ std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& opt
         collector->look(frame.image, source->path_of(frame.sequence));
       if (Clock::now() - said < kSayEvery) continue;
       said = Clock::now();
-      tell(fmt::format("{} of {} pictures, {} views", seen, all, collector->views().size()));
+      log_info(fmt::format("{} of {} pictures, {} views", seen, all, collector->views().size()));
     }
-    if (const std::string bad = source->unusable(); !bad.empty()) tell(bad);
+    if (const std::string bad = source->unusable(); !bad.empty()) log_info(bad);
   }
-  tell(
+  log_info(
       fmt::format("{} pictures, {} different views of the board", seen, collector->views().size()));
   collector->thin_out(options.views.value_or(kViewsFromFolders));
   return collector;
@@ -150,8 +150,8 @@ std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& opt
 /// Says what to do next, once per change.
 class Guide {
  public:
-  void say(Taken taken, const ViewCollector& collector, int wanted) {
-    if (taken == Taken::yes) {
+  void say(ViewResult taken, const ViewCollector& collector, int wanted) {
+    if (taken == ViewResult::yes) {
       const std::size_t count = collector.views().size();
       const std::vector<std::string> missing = collector.coverage().missing();
       std::string line = fmt::format("view {} of {} taken", count, wanted);
@@ -159,31 +159,31 @@ class Guide {
       if (need != need_) line += need.empty() ? "; nothing is missing" : "; still wanted: " + need;
       need_ = need;
       complete_ = missing.empty() && static_cast<int>(count) >= wanted;
-      tell(line);
+      log_info(line);
     }
-    const std::string hint = hint_for(taken, collector.last_look());
-    frames_ = hint == hint_ ? frames_ + 1 : 1;
-    hint_ = hint;
-    if (frames_ == kFramesBeforeHint && !hint.empty() && hint != said_) {
-      tell(hint);
-      said_ = hint;
+    const std::string diagnostic = diagnostic_for(taken, collector.last_look());
+    frames_ = diagnostic == diagnostic_ ? frames_ + 1 : 1;
+    diagnostic_ = diagnostic;
+    if (frames_ == kFramesBeforeDiagnostic && !diagnostic.empty() && diagnostic != said_) {
+      log_info(diagnostic);
+      said_ = diagnostic;
     }
-    if (taken == Taken::yes) said_.clear();
+    if (taken == ViewResult::yes) said_.clear();
   }
   bool complete() const { return complete_; }
 
  private:
-  static constexpr int kFramesBeforeHint = 15;
+  static constexpr int kFramesBeforeDiagnostic = 15;
 
-  static std::string hint_for(Taken taken, Look look) {
-    if (taken == Taken::moving) return "hold the board still for a moment";
-    if (taken == Taken::alike) return "seen from here already: move or tilt the board";
-    if (taken == Taken::no) return fmt::format("the picture is {}", words(look));
+  static std::string diagnostic_for(ViewResult taken, BoardView look) {
+    if (taken == ViewResult::moving) return "hold the board still for a moment";
+    if (taken == ViewResult::alike) return "seen from here already: move or tilt the board";
+    if (taken == ViewResult::no) return fmt::format("the picture is {}", words(look));
     return {};
   }
 
   std::string need_;
-  std::string hint_;
+  std::string diagnostic_;
   std::string said_;
   int frames_ = 0;
   bool complete_ = false;
@@ -208,7 +208,7 @@ std::vector<int> views_of_regions(const ViewCollector& collector) {
 
 /// Where the board is in the image as the camera delivers it.
 std::vector<TagCorners> outline_of_board(const ViewCollector& collector, int width) {
-  if (collector.last_look() != Look::board) return {};
+  if (collector.last_look() != BoardView::board) return {};
   std::vector<std::array<double, 2>> px;
   for (const BoardCorner& corner : collector.last_corners()) {
     const double x = corner.pixel.x();
@@ -229,9 +229,9 @@ void tell_events(Events& events, const ViewCollector& collector, int wanted, con
     events.progress(static_cast<double>(views) / std::max(1, wanted));
   }
   events.picture(frame.image, outline_of_board(collector, frame.image.width));
-  events.live(
-      fmt::format("{} of {} views; the board is {}", views, wanted,
-                  collector.last_look() == Look::board ? "seen" : words(collector.last_look())));
+  events.live(fmt::format(
+      "{} of {} views; the board is {}", views, wanted,
+      collector.last_look() == BoardView::board ? "seen" : words(collector.last_look())));
 }
 
 /// Until the views are complete, time is up, or a signal comes: then nothing.
@@ -241,8 +241,8 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
   const Input input =
       open_input({options.sensor, options.source, false, WrenchCalibration::ignore});
   FrameSource& source = *input.source;
-  tell("source: " + source.format().description);
-  tell(
+  log_info("source: " + source.format().description);
+  log_info(
       "show the board: whole and sharp, in every part of the picture, tilted each way; Ctrl-C "
       "gives up");
   const int wanted = options.views.value_or(kViewsFromCamera);
@@ -254,7 +254,7 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
                             ? Clock::now() + std::chrono::duration_cast<Duration>(
                                                  std::chrono::duration<double>(*options.seconds))
                             : TimePoint::max();
-  while (!guide.complete() && static_cast<int>(collector->views().size()) < kMostCameraViews &&
+  while (!guide.complete() && static_cast<int>(collector->views().size()) < kMaxCameraViews &&
          Clock::now() < end) {
     Frame frame;
     const Next next = next_frame(source, stop, frame);
@@ -262,9 +262,9 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
     if (next == Next::end) break;
     if (next != Next::frame) continue;
     const std::string name = fmt::format("view {}", collector->views().size() + 1);
-    const Taken taken = collector->look(frame.image, name);
+    const ViewResult taken = collector->look(frame.image, name);
     guide.say(taken, *collector, wanted);
-    tell_events(events, *collector, wanted, frame, taken == Taken::yes);
+    tell_events(events, *collector, wanted, frame, taken == ViewResult::yes);
   }
   return collector;
 }
@@ -286,32 +286,33 @@ void report(const CameraFit& fit, const std::vector<CameraView>& views, const Co
   const auto& s = fit.sigma;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!fit.views[i].used) {
-      tell(fmt::format("dropped {}: reprojection error {:.3f} px stands out from the others'",
-                       views[i].name, fit.views[i].rms_px));
+      log_info(fmt::format("dropped {}: reprojection error {:.3f} px stands out from the others'",
+                           views[i].name, fit.views[i].rms_px));
     }
   }
-  tell(fmt::format(
+  log_info(fmt::format(
       "fx {:.2f} +- {:.2f}, fy {:.2f} +- {:.2f}, cx {:.2f} +- {:.2f}, cy {:.2f} +- {:.2f} px",
       now.fx_px, s[0], now.fy_px, s[1], now.cx_px, s[2], now.cy_px, s[3]));
   const auto& [k1, k2, p1, p2, k3] = now.distortion;
-  tell(fmt::format(
+  log_info(fmt::format(
       "distortion k1 {:.4f} +- {:.4f}, k2 {:.4f} +- {:.4f}, p1 {:.5f} +- {:.5f}, p2 {:.5f} "
       "+- {:.5f}, k3 {:.4f}{}",
       k1, s[4], k2, s[5], p1, s[6], p2, s[7], k3,
       k3 == 0 ? " (fixed: it does not help)" : fmt::format(" +- {:.4f}", s[8])));
-  tell(fmt::format(
+  log_info(fmt::format(
       "reprojection error {:.3f} px RMS over {} views, {} dropped; corners in {} of 9 regions, "
       "tilts to {:.0f} degrees",
       fit.rms_px, fit.used, views.size() - static_cast<std::size_t>(fit.used), coverage.regions(),
       coverage.largest_tilt() * 57.29578));
   if (const std::vector<std::string> missing = coverage.missing(); !missing.empty())
-    tell("it would be better still with " + listed(missing));
+    log_info("it would be better still with " + listed(missing));
   if (!record.known) return;
-  tell(fmt::format("before: fx {:.2f} ({:+.2f} %), fy {:.2f} ({:+.2f} %), cx {:.2f}, cy {:.2f} px",
-                   old.fx_px, 100 * (now.fx_px / old.fx_px - 1), old.fy_px,
-                   100 * (now.fy_px / old.fy_px - 1), old.cx_px, old.cy_px));
+  log_info(
+      fmt::format("before: fx {:.2f} ({:+.2f} %), fy {:.2f} ({:+.2f} %), cx {:.2f}, cy {:.2f} px",
+                  old.fx_px, 100 * (now.fx_px / old.fx_px - 1), old.fy_px,
+                  100 * (now.fy_px / old.fy_px - 1), old.cx_px, old.cy_px));
   if (const std::string parts = stale(record.sensor); !parts.empty())
-    tell(fmt::format(
+    log_info(fmt::format(
         "{} in sensor.yaml came from the camera before: run `tagwrench calibrate target`", parts));
 }
 
@@ -341,13 +342,14 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   const UniqueFd stop = termination_fd();
   std::unique_ptr<ViewCollector> collector = collect(options, board, record, stop);
   if (!collector) {
-    tell("stopped; nothing was written");
+    log_info("stopped; nothing was written");
     return kExitStopped;
   }
   collector->check();
   if (collector->mirrored() != record.sensor.camera.mirrored) {
-    tell(fmt::format("the camera's image is {}: writing mirrored: {}",
-                     collector->mirrored() ? "mirrored" : "not mirrored", collector->mirrored()));
+    log_info(fmt::format("the camera's image is {}: writing mirrored: {}",
+                         collector->mirrored() ? "mirrored" : "not mirrored",
+                         collector->mirrored()));
   }
   const std::vector<CameraView>& views = collector->views();
   check_views(views, collector->coverage());
@@ -361,14 +363,14 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   }
   check_fit(fit, coverage);
   if (termination_requested()) {
-    tell("stopped; nothing was written");
+    log_info("stopped; nothing was written");
     return kExitStopped;
   }
   write_sensor(record.text, {camera_section(fit.camera, fit)}, record.target);
   report(fit, views, coverage, record);
-  tell("written: " + record.target);
+  log_info("written: " + record.target);
   if (!record.sensor.calibration.empty())
-    tell(
+    log_info(
         "the calibration in newtons was made with the lens as it was described; run `tagwrench "
         "calibrate wrench` again");
   return 0;

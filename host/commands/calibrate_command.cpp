@@ -5,7 +5,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr int kMostFrames = 2'000'000'000;
+constexpr int kMaxFrames = 2'000'000'000;
 
 command_line::Check duration() {
   return command_line::number(1, 1e6, "a number of seconds from 1 to 1e6", "SECONDS");
@@ -41,7 +41,7 @@ CalibrateCommand::CalibrateCommand(command_line::Command program)
   camera_
       .add_option("--views", camera_options_.views,
                   "views of the board to use: as many at least from a camera, at most from folders")
-      .check(command_line::range(kFewestCameraViews, kMostCameraViews));
+      .check(command_line::range(kMinCameraViews, kMaxCameraViews));
   camera_
       .add_option("--seconds", camera_options_.seconds,
                   "look at a camera no longer than this, then use what there is")
@@ -54,7 +54,7 @@ CalibrateCommand::CalibrateCommand(command_line::Command program)
   target_.add_option("--out", target_options_.out,
                      "sensor.yaml to write; without it --sensor is edited in place");
   target_.add_option("--frames", target_options_.frames, "use no more than N frames")
-      .check(command_line::range(1, kMostFrames));
+      .check(command_line::range(1, kMaxFrames));
   target_
       .add_option("--seconds", target_options_.seconds,
                   "use no more than S seconds; without it a folder is used up and anything else "

@@ -14,12 +14,12 @@
 #include "host/commands/exit_status.h"
 #include "host/commands/zero_command.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/sensor/appearance_file.h"
 #include "host/sensor/sensor_edit.h"
-#include "host/tracker/hint_text.h"
+#include "host/tracker/diagnostic_text.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kMostKeyframes = 150;
+constexpr std::size_t kMaxKeyframes = 150;
 constexpr double kSecondsFromCamera = 30;
 constexpr Duration kAdviseEvery = std::chrono::seconds(2);
 
@@ -36,21 +36,21 @@ constexpr Duration kAdviseEvery = std::chrono::seconds(2);
 class MotionGuide {
  public:
   void say(const TargetRecorder& record, const Track& track) {
-    if (track.hint == Hint::moved_while_learning)
-      tell("the platform moved: hands off until the rest is learned");
-    if (is_trouble(track.hint)) tell(hint_text(track.hint, track.details));
+    if (track.diagnostic == Diagnostic::moved_while_learning)
+      log_info("the platform moved: hands off until the rest is learned");
+    if (is_trouble(track.diagnostic)) log_info(diagnostic_text(track.diagnostic, track.details));
     if (record.rest_known() && !told_to_move_) {
       told_to_move_ = true;
-      tell("rest learned; now tilt and push the platform slowly, every way");
+      log_info("rest learned; now tilt and push the platform slowly, every way");
     }
     if (Clock::now() - said_ < kAdviseEvery) return;
     said_ = Clock::now();
     if (!record.rest_known()) {
-      tell(fmt::format("{} frames; waiting for all tags, at rest", record.counts().frames));
+      log_info(fmt::format("{} frames; waiting for all tags, at rest", record.counts().frames));
       return;
     }
     const Vector6 range = record.range();
-    tell(fmt::format(
+    log_info(fmt::format(
         "{} frames, {} different pictures; x {:.2f} y {:.2f} z {:.2f} mm, about x {:.1f} y {:.1f} "
         "z "
         "{:.1f} degrees{}",
@@ -65,12 +65,12 @@ class MotionGuide {
 };
 
 /// Of the time of a calibration, seeing takes the first part, the adjustment the rest.
-constexpr double kSeeingPart = 0.7;
+constexpr double kSeeingFraction = 0.7;
 
 void tell_events(Events& events, const TargetRecorder& record, const Track& track,
                  const Frame& frame, double part) {
   if (!events.on()) return;
-  events.progress(kSeeingPart * std::min(1.0, part));
+  events.progress(kSeeingFraction * std::min(1.0, part));
   events.picture(frame.image, {track.corners.data(), track.corner_count});
   if (!record.rest_known()) {
     events.live("hands off: the rest is learned");
@@ -79,7 +79,7 @@ void tell_events(Events& events, const TargetRecorder& record, const Track& trac
   const Vector6 range = record.range();
   events.coverage({{"range", std::vector<double>(range.begin(), range.end())},
                    {"keyframes", record.keyframes().size()},
-                   {"wanted", kLeastKeyframes}});
+                   {"wanted", kMinKeyframes}});
   events.live(track.status == Status::ok ? "tilt and push the platform slowly, every way"
                                          : "the tags are not held");
 }
@@ -105,7 +105,7 @@ bool watch(FrameSource& source, const CalibrateTargetOptions& options, const Uni
     guide.say(record, track);
     tell_events(events, record, track, frame, elapsed / seconds);
   }
-  if (const std::string bad = source.unusable(); !bad.empty()) tell(bad);
+  if (const std::string bad = source.unusable(); !bad.empty()) log_info(bad);
   return true;
 }
 
@@ -145,7 +145,7 @@ std::string appearance_name(const fs::path& sensor, const fs::path& appearance) 
   return name + "'";
 }
 
-SectionEdit rest_section(const TargetEstimate& estimate, const RestImage& image,
+SectionEdit rest_section(const TargetEstimate& estimate, const ReferenceImage& image,
                          const std::string& appearance) {
   const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
   return {"rest",
@@ -169,11 +169,12 @@ std::vector<SectionEdit> placeholders() {
 
 /// Both files or neither: the picture belongs to the poses.
 void write(const fs::path& sensor, const std::string& text, const fs::path& appearance,
-           const TargetEstimate& estimate, const SensorConfig& described, const RestImage& image) {
+           const TargetEstimate& estimate, const SensorConfig& described,
+           const ReferenceImage& image) {
   std::error_code error;
   std::optional<std::string> before;
   if (fs::exists(appearance, error)) before = read_text(appearance);
-  save_rest_image(appearance, image);
+  save_reference_image(appearance, image);
   std::vector<SectionEdit> edits = {
       target_section(estimate, described.target),
       rest_section(estimate, image, appearance_name(sensor, appearance))};
@@ -194,7 +195,7 @@ void write(const fs::path& sensor, const std::string& text, const fs::path& appe
 }
 
 int stopped() {
-  tell("stopped; nothing was written");
+  log_info("stopped; nothing was written");
   return kExitStopped;
 }
 
@@ -212,20 +213,20 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   check_size(input);
   const SensorConfig& sensor = input.sensor;
   Events events(options.events);
-  TargetRecorder record(sensor.camera, sensor.target, sensor.rest, kMostKeyframes);
-  tell("source: " + input.source->format().description);
-  tell(fmt::format("hands off until {} frames at rest are taken", sensor.rest.frames));
+  TargetRecorder record(sensor.camera, sensor.target, sensor.rest, kMaxKeyframes);
+  log_info("source: " + input.source->format().description);
+  log_info(fmt::format("hands off until {} frames at rest are taken", sensor.rest.frames));
   if (!watch(*input.source, options, stop, record, events)) return stopped();
   check_record(record, sensor.target, sensor.rest);
 
-  tell(fmt::format("adjusting to {} pictures", record.keyframes().size()));
+  log_info(fmt::format("adjusting to {} pictures", record.keyframes().size()));
   TimePoint said = Clock::now();
   const TargetEstimate estimate =
       TargetAdjuster(record.at_rest()).adjust(record.keyframes(), [&](double share) {
-        events.progress(kSeeingPart + (1 - kSeeingPart) * share);
+        events.progress(kSeeingFraction + (1 - kSeeingFraction) * share);
         if (Clock::now() - said >= kAdviseEvery) {
           said = Clock::now();
-          tell(fmt::format("{:.0f} %", 100 * share));
+          log_info(fmt::format("{:.0f} %", 100 * share));
         }
         return !termination_requested();
       });
@@ -233,11 +234,11 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   check_estimate(estimate, sensor.camera);
   write(sensor_file, text, appearance, estimate, sensor, record.at_rest().image);
   for (const std::string& line : describe(record, estimate, sensor.target, sensor.camera))
-    tell(line);
-  if (readout_is_clear(estimate)) tell("the shutter rolls: camera.readout_ms is written too");
-  tell(fmt::format("written: {} and {}", sensor_file.string(), appearance.string()));
+    log_info(line);
+  if (readout_is_clear(estimate)) log_info("the shutter rolls: camera.readout_ms is written too");
+  log_info(fmt::format("written: {} and {}", sensor_file.string(), appearance.string()));
   if (!sensor.calibration.empty())
-    tell(
+    log_info(
         "the calibration in newtons was made with the target as it was; run `tagwrench calibrate "
         "wrench` again");
   return 0;

@@ -19,12 +19,12 @@
 #include "host/commands/calibrate_wrench/result.h"
 #include "host/commands/calibrate_wrench/run.h"
 #include "host/commands/exit_status.h"
-#include "host/commands/hands_off.h"
+#include "host/commands/static_measurement.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
 #include "host/core/sha256.h"
-#include "host/core/tell.h"
 #include "host/sensor/sensor_edit.h"
 #include "host/wrench/zero.h"
 
@@ -129,11 +129,11 @@ void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject
   fs::remove(subject.files.progress, none);
   for (const std::string& line :
        describe(plan, data, fit, subject.range, subject.sensor.wrench.range))
-    tell(line);
-  if (!poorer.empty()) tell(poorer);
-  tell(fmt::format("written: {}, {} and wrench.calibration in {}",
-                   subject.files.calibration.string(), subject.files.data.string(),
-                   options.sensor));
+    log_info(line);
+  if (!poorer.empty()) log_info(poorer);
+  log_info(fmt::format("written: {}, {} and wrench.calibration in {}",
+                       subject.files.calibration.string(), subject.files.data.string(),
+                       options.sensor));
 }
 
 void check_sensor(const Input& input, const std::string& sensor_text, const std::string& file) {
@@ -143,13 +143,13 @@ void check_sensor(const Input& input, const std::string& sensor_text, const std:
 }
 
 int say_stopped(GuideEnd end, const WrenchGuide& guide, const fs::path& progress) {
-  if (end == GuideEnd::failed) tell(guide.failure());
-  if (end == GuideEnd::ended) tell("the source has ended before the plan");
-  tell(guide.records().empty()
-           ? "stopped; nothing was measured, and the calibration in force stays"
-           : fmt::format("stopped after {} steps, which are kept in {}; --resume goes on; the "
-                         "calibration in force stays",
-                         guide.records().size(), progress.string()));
+  if (end == GuideEnd::failed) log_info(guide.failure());
+  if (end == GuideEnd::ended) log_info("the source has ended before the plan");
+  log_info(guide.records().empty()
+               ? "stopped; nothing was measured, and the calibration in force stays"
+               : fmt::format("stopped after {} steps, which are kept in {}; --resume goes on; the "
+                             "calibration in force stays",
+                             guide.records().size(), progress.string()));
   return kExitStopped;
 }
 
@@ -157,14 +157,15 @@ int say_stopped(GuideEnd end, const WrenchGuide& guide, const fs::path& progress
 bool end_recording(CalibrationRecorder& recorder, const std::string& file) {
   const std::string trouble = recorder.finish();
   const record::WriterState state = recorder.state();
-  tell(fmt::format("recording {}: {} frames, {:.3g} MB{}", file, state.frames,
-                   1e-6 * static_cast<double>(state.bytes),
-                   state.lost_frames > 0
-                       ? fmt::format("; the disk was too slow for {} of them; --keep region keeps "
-                                     "less",
-                                     state.lost_frames)
-                       : ""));
-  if (!trouble.empty()) tell(trouble);
+  log_info(
+      fmt::format("recording {}: {} frames, {:.3g} MB{}", file, state.frames,
+                  1e-6 * static_cast<double>(state.bytes),
+                  state.lost_frames > 0
+                      ? fmt::format("; the disk was too slow for {} of them; --keep region keeps "
+                                    "less",
+                                    state.lost_frames)
+                      : ""));
+  if (!trouble.empty()) log_info(trouble);
   return trouble.empty() && state.lost_frames == 0 && state.lost_others == 0;
 }
 
@@ -192,17 +193,17 @@ int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles
     const Progress progress = load_progress(files.progress, of, plan);
     check_resumable(sensor, plan, progress, files.progress);
     guide.resume(progress.records, progress.skipped);
-    tell(fmt::format("going on: {} steps are done", progress.records.size()));
+    log_info(fmt::format("going on: {} steps are done", progress.records.size()));
   }
   const std::unique_ptr<Reference> reference =
       open_reference(plan,
                      {options.board, options.cells, options.optoforce, options.counts_per_unit,
                       options.emulated_cell},
                      at.bench.get(), at.time_zero);
-  tell("source: " + at.input.source->format().description);
-  if (reference) tell("reference: " + reference->description());
+  log_info("source: " + at.input.source->format().description);
+  if (reference) log_info("reference: " + reference->description());
   if (!rest_is_calibrated(sensor)) {
-    tell(
+    log_info(
         "this sensor's rest is learned anew at every start; run `tagwrench calibrate target` first "
         "if `check`, `zero` and --resume shall work: newtons hold for the target as it was");
   }
@@ -284,15 +285,15 @@ int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFile
   const std::string other = difference(identity_of(then.camera, then.target, then.rest),
                                        identity_of(sensor.camera, sensor.target, sensor.rest));
   if (!other.empty())
-    tell(fmt::format("recorded with another sensor.yaml ({}); --sensor counts", other));
+    log_info(fmt::format("recorded with another sensor.yaml ({}); --sensor counts", other));
   const Subject subject{files, sensor_text, sensor, stiffness_before(sensor, recording),
                         full_load(sensor)};
   check_plan(plan, subject.range, options.require_all);
-  tell("source: " + input.source->format().description);
-  tell(fmt::format("plan {}, {}: {} steps were accepted", plan.name, recorded.reference,
-                   steps.size()));
+  log_info("source: " + input.source->format().description);
+  log_info(fmt::format("plan {}, {}: {} steps were accepted", plan.name, recorded.reference,
+                       steps.size()));
   if (const std::string missing = not_recorded(steps, plan); !missing.empty())
-    tell("not in the recording: " + missing);
+    log_info("not in the recording: " + missing);
 
   fit_and_write(options, subject, plan,
                 {.records = replay_steps(input, recording, steps, plan),

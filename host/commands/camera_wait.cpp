@@ -10,9 +10,9 @@
 #include <string_view>
 
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
 #include "host/core/os/unique_fd.h"
-#include "host/core/tell.h"
 
 namespace tagwrench {
 namespace {
@@ -51,7 +51,7 @@ std::optional<Input> wait_for_camera(const std::function<std::optional<Input>()>
   const UniqueFd events = watch_dev();  // before the first look, or a camera might come in between
   const UniqueFd stop = termination_fd();
   if (std::optional<Input> input = look()) return input;
-  tell(kWaiting);
+  log_info(kWaiting);
   if (watch != nullptr) watch->ready(kWaiting);
   for (bool came = false;;) {
     std::array<pollfd, 3> fds{{{events.get(), POLLIN, 0},

@@ -17,9 +17,9 @@
 #include "host/commands/today.h"
 #include "host/core/axis_names.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/sha256.h"
-#include "host/core/tell.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/sensor_config.h"
@@ -177,14 +177,14 @@ int CertificateCommand::run() const {
   write_together({{files[0], rendered.html}, {files[1], rendered.pdf}, {files[2], rendered.json}},
                  replace);
   if (rendered.pages > 1)
-    tell(fmt::format("{}: {} pages; shorter texts would fit one", files[1].string(),
-                     rendered.pages));
+    log_info(fmt::format("{}: {} pages; shorter texts would fit one", files[1].string(),
+                         rendered.pages));
   for (std::size_t i = 0; i < 6; ++i) {
     const study::AxisReport& axis = contents.analysis.axis[i];
     if (!axis.calibrated)
-      tell(fmt::format("{} is not calibrated: {}", kWrenchAxes[i], axis.reason));
+      log_info(fmt::format("{} is not calibrated: {}", kWrenchAxes[i], axis.reason));
   }
-  tell(fmt::format("certificate {}: {}.html .pdf .json", contents.number, base));
+  log_info(fmt::format("certificate {}: {}.html .pdf .json", contents.number, base));
   return 0;
 }
 

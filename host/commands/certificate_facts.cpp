@@ -100,7 +100,7 @@ void add_calibration(const CalibrationRecord& record, study::Analysis& analysis)
       report.reason.clear();
       // The fit has all readings together and judges the axis; one reading's score cannot.
       const std::string why =
-          report.excitation < study::kLeastExcitation
+          report.excitation < study::kMinExcitation
               ? fmt::format(
                     "the scores on held-out readings hold the reference's own noise, which "
                     "the load exceeds {:.0f} times only",

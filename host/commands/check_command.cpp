@@ -12,8 +12,8 @@
 #include "host/commands/emulated_cell.h"
 #include "host/commands/events_option.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -22,9 +22,9 @@ namespace {
 constexpr int kOff = 1;
 constexpr Duration kPatience = std::chrono::seconds(20);
 constexpr Duration kPatienceForMass = std::chrono::seconds(60);
-constexpr Duration kLeastPush = std::chrono::seconds(8);
+constexpr Duration kMinPush = std::chrono::seconds(8);
 constexpr double kKnownScale = 0.004;  // standard deviation at which pushing may end
-constexpr double kShortest = 1e-9;     // of a direction
+constexpr double kMin = 1e-9;          // of a direction
 
 Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
 
@@ -34,7 +34,7 @@ command_line::Check finite() {
 }
 
 int stopped() {
-  tell("stopped");
+  log_info("stopped");
   return kOff;
 }
 
@@ -151,9 +151,9 @@ void CheckCommand::add_load_options() {
 }
 
 int CheckCommand::run() const {
-  if (!(vector3(options_.gravity).norm() > kShortest))
+  if (!(vector3(options_.gravity).norm() > kMin))
     throw ConfigError("--gravity: has no length; give a direction such as 0,0,-1");
-  if (!options_.direction.empty() && !(vector3(options_.direction).norm() > kShortest))
+  if (!options_.direction.empty() && !(vector3(options_.direction).norm() > kMin))
     throw ConfigError("--direction: has no length; give a direction such as 0,0,-1");
   const UniqueFd stop = termination_fd();
   std::unique_ptr<RunBoard> board;
@@ -180,45 +180,45 @@ int CheckCommand::run() const {
   check_size(input);
   check_calibrated_rest(input.sensor, "check");
   if (board && !board->settle_light(input, stop)) return stopped();
-  HandsOff hands_off(input.sensor, std::chrono::seconds(2),
-                     options_.mass_g ? kPatienceForMass : kPatience);
+  StaticMeasurement static_measurement(input.sensor, std::chrono::seconds(2),
+                                       options_.mass_g ? kPatienceForMass : kPatience);
   Events events(options_.events);
-  tell("source: " + input.source->format().description);
-  tell("hands off for some seconds");
+  log_info("source: " + input.source->format().description);
+  log_info("hands off for some seconds");
   std::unique_ptr<Output> cell;
   if (board) {
     input.sensor.reference = ReferenceLine{options_.channel, vector3(options_.at_mm) * 1e-3,
                                            vector3(options_.direction).normalized()};
     cell = board->output(input.sensor, "");
   }
-  const Seen seen = watch(*input.source, stop, hands_off, events, cell.get());
+  const Seen seen = watch(*input.source, stop, static_measurement, events, cell.get());
   if (seen == Seen::stopped) return stopped();
-  if (const std::string why = why_nothing(seen, hands_off); !why.empty()) {
-    tell(why);
+  if (const std::string why = why_nothing(seen, static_measurement); !why.empty()) {
+    log_info(why);
     return kOff;
   }
-  bool fine = print(judge(hands_off.result()));
-  if (options_.mass_g) fine = by_mass(at, stop, hands_off, events) && fine;
+  bool fine = print(judge(static_measurement.result()));
+  if (options_.mass_g) fine = by_mass(at, stop, static_measurement, events) && fine;
   if (board) fine = by_cell(at, stop, *board, *cell) && fine;
   if (termination_requested()) return stopped();
   return fine ? 0 : kOff;
 }
 
-bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off,
-                           Events& events) const {
+bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop,
+                           StaticMeasurement& static_measurement, Events& events) const {
   ProofLoad load;
   load.range = at.input.sensor.wrench.range;
-  const Vector6 before = hands_off.result().wrench;
-  hands_off.wait_for_change(least_change(options_, load.range));
-  tell(fmt::format("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest",
-                   *options_.mass_g, options_.at_mm[0], options_.at_mm[1], options_.at_mm[2]));
+  const Vector6 before = static_measurement.result().wrench;
+  static_measurement.wait_for_change(least_change(options_, load.range));
+  log_info(fmt::format("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest",
+                       *options_.mass_g, options_.at_mm[0], options_.at_mm[1], options_.at_mm[2]));
   if (at.bench) at.bench->hang(*options_.mass_g * 1e-3, vector3(options_.at_mm) * 1e-3);
-  const Seen loaded = watch(*at.input.source, stop, hands_off, events);
+  const Seen loaded = watch(*at.input.source, stop, static_measurement, events);
   InSituFinding scale{.subject = Subject::scale, .fault = Fault::not_known};
-  if (loaded == Seen::enough && hands_off.result().held) {
-    load.measured = hands_off.result().wrench - before;
-    load.measured_covariance = hands_off.wrench_sigma().cwiseAbs2().asDiagonal();
-    set_known(options_, hands_off.displacement(), load);
+  if (loaded == Seen::enough && static_measurement.result().held) {
+    load.measured = static_measurement.result().wrench - before;
+    load.measured_covariance = static_measurement.wrench_sigma().cwiseAbs2().asDiagonal();
+    set_known(options_, static_measurement.displacement(), load);
     scale = judge(load);
   }
   return loaded != Seen::stopped && print({scale});
@@ -233,7 +233,7 @@ bool CheckCommand::by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard&
   std::optional<EmulatedCell> hand;
   if (!options_.emulated_cell.empty())
     hand.emplace(options_.emulated_cell, options_.channel, *at.bench, at.time_zero);
-  tell("now push with the load cell, slowly, on and off, for some seconds");
+  log_info("now push with the load cell, slowly, on and off, for some seconds");
   if (hand) simulated_push(*at.bench, sensor.wrench.range, *sensor.reference);
   std::optional<TimePoint> begin;
   while (true) {
@@ -242,7 +242,7 @@ bool CheckCommand::by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard&
     if (next == Next::stopped) return false;
     if (next == Next::end) break;
     if (hand) hand->follow();
-    if (const std::string_view news = cell.service(); !news.empty()) tell(news);
+    if (const std::string_view news = cell.service(); !news.empty()) log_info(news);
     if (next != Next::frame) continue;
     if (!begin) begin = frame.capture_time;
     Sample sample{.capture_time = frame.capture_time, .latency_origin = frame.latency_origin};
@@ -251,7 +251,7 @@ bool CheckCommand::by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard&
     cell.send(sample);
     const Duration pushed = frame.capture_time - *begin;
     const bool known = board.monitor().scale_sigma() < kKnownScale;
-    if (pushed >= kPatience || (known && pushed >= kLeastPush)) break;
+    if (pushed >= kPatience || (known && pushed >= kMinPush)) break;
   }
   return print({judge(board.monitor())});
 }

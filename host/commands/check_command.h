@@ -9,7 +9,7 @@
 
 #include "host/commands/bench_input.h"
 #include "host/commands/board/run_board.h"
-#include "host/commands/hands_off.h"
+#include "host/commands/static_measurement.h"
 #include "host/core/command_line/command_line.h"
 
 namespace tagwrench {
@@ -43,7 +43,8 @@ class CheckCommand {
 
  private:
   void add_load_options();
-  bool by_mass(BenchInput& at, const UniqueFd& stop, HandsOff& hands_off, Events& events) const;
+  bool by_mass(BenchInput& at, const UniqueFd& stop, StaticMeasurement& static_measurement,
+               Events& events) const;
   bool by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard& board, Output& cell) const;
 
   command_line::Command verb_;

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/motion/control_socket.h"
 
 namespace tagwrench {
@@ -24,19 +24,19 @@ ControlCommand::ControlCommand(command_line::Command program)
 }
 
 int ControlCommand::run() const {
-  const std::string wish = zero_.parsed()      ? "zero"
-                           : next_.parsed()    ? "next"
-                           : profile_.parsed() ? "profile " + profile_name_
-                           : window_.parsed()  ? "window " + program_
-                                               : "status";
-  const std::string answer = ask(control_path(name_), wish);
+  const std::string request = zero_.parsed()      ? "zero"
+                              : next_.parsed()    ? "next"
+                              : profile_.parsed() ? "profile " + profile_name_
+                              : window_.parsed()  ? "window " + program_
+                                                  : "status";
+  const std::string answer = ask(control_path(name_), request);
   constexpr std::string_view kDone = "ok: ";
   if (answer.starts_with(kDone)) {
     if (std::fputs(answer.c_str() + kDone.size(), stdout) >= 0 && std::fflush(stdout) == 0)
       return 0;
     throw std::runtime_error("standard output: cannot be written; redirect it somewhere");
   }
-  tell(answer.substr(0, answer.find('\n')));
+  log_info(answer.substr(0, answer.find('\n')));
   return 1;
 }
 

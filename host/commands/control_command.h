@@ -1,4 +1,4 @@
-// `tagwrench control`: a wish to a sensor that runs.
+// `tagwrench control`: a request to a sensor that runs.
 #pragma once
 
 #include <string>

@@ -11,7 +11,7 @@
 #include "host/commands/hardware_design.h"
 #include "host/commands/hardware_instrument.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/sensor/sensor_config.h"
 #include "host/tools/design/hardware_config.h"
 #include "host/tracker/tag_patterns.h"
@@ -360,7 +360,7 @@ int DesignCommand::run() const {
   if (!export_.empty()) export_hardware(hardware_, export_, force_);
   const study::Design design = study::design(asked, ranges_);
   std::cout << design_report(asked, design) << std::flush;
-  for (const std::string& warning : design.warnings) tell(warning);
+  for (const std::string& warning : design.warnings) log_info(warning);
   return std::cout ? 0 : 1;
 }
 

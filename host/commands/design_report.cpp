@@ -67,7 +67,7 @@ std::string bandwidth(const Instrument& i, const Design& d) {
 
 /// Three digits: "1.58 N", "312 N"; "beyond 1000 N".
 std::string force(double newtons) {
-  if (newtons > study::kMostForce) return fmt::format("beyond {:g} N", study::kMostForce);
+  if (newtons > study::kMaxForce) return fmt::format("beyond {:g} N", study::kMaxForce);
   const int decimals = newtons >= 99.95 ? 0 : newtons >= 9.995 ? 1 : newtons >= 0.9995 ? 2 : 3;
   return fmt::format("{:.{}f} N", newtons, decimals);
 }

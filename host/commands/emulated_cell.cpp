@@ -16,7 +16,7 @@ namespace tagwrench {
 namespace {
 
 constexpr double kPointEvery = 0.004;  // s; a hand trembles at 12 Hz
-constexpr double kMostCatchUp = 1.0;   // s of the past that are told once
+constexpr double kMaxCatchUp = 1.0;    // s of the past that are told once
 
 }  // namespace
 
@@ -37,7 +37,7 @@ EmulatedCell::EmulatedCell(const std::string& orders, int channel, const sim::Be
 void EmulatedCell::follow() noexcept {
   // An order that is given later changes nothing before the reaction time is over.
   const double decided = bench_.newest() + bench_.settings().times.reaction;
-  told_to_ = std::max(told_to_, decided - kMostCatchUp);
+  told_to_ = std::max(told_to_, decided - kMaxCatchUp);
   while (told_to_ + kPointEvery < decided) {
     told_to_ += kPointEvery;
     const auto at = start_.time_since_epoch() + Duration(std::llround(1e9 * told_to_));

@@ -10,7 +10,7 @@
 
 #include "host/commands/count_text.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/output/sample_text.h"
 
 namespace tagwrench {
@@ -22,7 +22,7 @@ std::int64_t ns(TimePoint time) { return time.time_since_epoch().count(); }
 
 /// What a file holds now. Standard output is not talked about.
 void tell_written(std::uint64_t count, std::string_view one, const std::string& path) {
-  if (path != "-") tell(fmt::format("{} in {}", count_text(count, one), path));
+  if (path != "-") log_info(fmt::format("{} in {}", count_text(count, one), path));
 }
 
 void export_samples(const std::string& recording, const std::string& path, bool force) {
@@ -142,7 +142,7 @@ int ExportCommand::run() const {
         "export: nothing was asked for; give --csv, --paper, --frames, --references or --events");
   }
   if (const record::RecordingReader reader(recording_); !reader.unclosed().empty())
-    tell(fmt::format("{} {}", recording_, reader.unclosed()));
+    log_info(fmt::format("{} {}", recording_, reader.unclosed()));
   if (!csv_.empty()) export_samples(recording_, csv_, force_);
   if (!references_.empty()) export_references(recording_, references_, force_);
   if (!events_.empty()) export_events(recording_, events_, force_);

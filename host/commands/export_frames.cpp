@@ -15,7 +15,7 @@
 #include "host/commands/count_text.h"
 #include "host/commands/export_command.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/source/recording.h"
 
 namespace tagwrench {
@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostFrames = 1'000'000;  // names have six digits
+constexpr std::size_t kMaxFrames = 1'000'000;  // names have six digits
 
 struct Picture {
   const char* extension;
@@ -116,8 +116,8 @@ void export_frames(const std::string& recording, const std::string& folder) {
   Frame frame;
   for (ReadStatus status; (status = source.read(frame)) != ReadStatus::end;) {
     if (status != ReadStatus::frame) continue;
-    if (count == kMostFrames)
-      throw ConfigError(fmt::format("{}: has more than {} frames", recording, kMostFrames));
+    if (count == kMaxFrames)
+      throw ConfigError(fmt::format("{}: has more than {} frames", recording, kMaxFrames));
     source.complete(frame);
     const Picture picture = picture_of(source.raw(), frame);
     const std::string name = fmt::format("{:06}{}", count++, picture.extension);
@@ -127,11 +127,12 @@ void export_frames(const std::string& recording, const std::string& folder) {
   write(partial.path() / "frames.csv", times, nullptr, 0);
   write_recorded_sensor(head, partial.path());
   partial.finish();
-  tell(fmt::format("{} in {}{}", count_text(static_cast<std::uint64_t>(count), "frame"), folder,
-                   head.keep == record::Keep::region
-                       ? ", black where nothing was kept: replay the recording itself for samples"
-                       : ""));
-  if (const std::string unusable = source.unusable(); !unusable.empty()) tell(unusable);
+  log_info(
+      fmt::format("{} in {}{}", count_text(static_cast<std::uint64_t>(count), "frame"), folder,
+                  head.keep == record::Keep::region
+                      ? ", black where nothing was kept: replay the recording itself for samples"
+                      : ""));
+  if (const std::string unusable = source.unusable(); !unusable.empty()) log_info(unusable);
 }
 
 }  // namespace tagwrench

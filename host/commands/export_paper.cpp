@@ -18,7 +18,7 @@
 #include "host/commands/count_text.h"
 #include "host/commands/export_command.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 
 namespace tagwrench {
 namespace {
@@ -174,9 +174,9 @@ std::size_t export_reference(const std::string& recording, const std::string& pa
 void export_paper(const std::string& recording, const std::string& prefix, bool force) {
   const std::size_t tags = export_tags(recording, prefix + "_arucotagData.csv", force);
   const std::size_t readings = export_reference(recording, prefix + "_optoforceData.csv", force);
-  tell(fmt::format("{} of tags, {}", count_text(tags, "row"),
-                   readings > 0 ? fmt::format("{} of the reference", readings)
-                                : "none of a reference: no six-axis sensor was recorded"));
+  log_info(fmt::format("{} of tags, {}", count_text(tags, "row"),
+                       readings > 0 ? fmt::format("{} of the reference", readings)
+                                    : "none of a reference: no six-axis sensor was recorded"));
 }
 
 }  // namespace tagwrench

@@ -13,8 +13,8 @@
 #include "host/app/input.h"
 #include "host/calibration/check/focus_guide.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/output/text_sink.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/tracker/acquire.h"
@@ -134,8 +134,9 @@ class FocusView {
     std::string text = fmt::format("edges {:5.2f} px wide, best {:5.2f}   contrast {:3.0f}",
                                    w.blur_px, tag.best_px, w.contrast);
     if (w.contrast < kFaint) text += ": more light";
-    if (w.white_part >= 0.005) text += fmt::format("   cut off {:.0f} %", 100 * w.white_part);
-    if (w.white_part > kMuchWhite) text += ": less light";
+    if (w.white_fraction >= 0.005)
+      text += fmt::format("   cut off {:.0f} %", 100 * w.white_fraction);
+    if (w.white_fraction > kMuchWhite) text += ": less light";
     return text;
   }
 
@@ -235,7 +236,7 @@ int run_focus(const FocusOptions& options) {
   const std::string source = options.source.empty() ? only_camera() : options.source;
   const UniqueFd stop = termination_fd();
   Input input = open_input({options.sensor, source, false, WrenchCalibration::ignore});
-  tell("source: " + input.source->format().description);
+  log_info("source: " + input.source->format().description);
   FocusView view(input.sensor);
   FocusScreen screen;
   bool ever_seen = false;
@@ -251,12 +252,12 @@ int run_focus(const FocusOptions& options) {
     if (view.look(frame)) ever_seen = true;
     if (!screen.due(frame.capture_time)) continue;
     if (!screen.show(view.text(), frame.capture_time)) {
-      tell(screen.failure());
+      log_info(screen.failure());
       return kNeverSeen;
     }
   }
   if (ever_seen || !looked) return kSeen;
-  tell("the tags were never seen");
+  log_info("the tags were never seen");
   return kNeverSeen;
 }
 

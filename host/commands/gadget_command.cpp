@@ -6,8 +6,8 @@
 #include <cstdio>
 
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
-#include "host/output/gadget_keeper.h"
+#include "host/core/log.h"
+#include "host/output/gadget_daemon.h"
 #include "host/output/uhid_device.h"
 
 namespace tagwrench {
@@ -120,15 +120,15 @@ void GadgetCommand::up() const {
   spec.udc = controller.name;
   if (const std::optional<GadgetFound> found = tree.find(name_)) {
     if (same(*found, spec, controller)) {
-      tell(fmt::format("gadget {}: is up already on {}; feed it: {}", ours, found->udc,
-                       run_command_of(name_)));
+      log_info(fmt::format("gadget {}: is up already on {}; feed it: {}", ours, found->udc,
+                           run_command_of(name_)));
       return;
     }
     rest(files, places_, tree, *found);
   }
   tree.up(spec);
-  tell(fmt::format("gadget {}: up on {} as {}; feed it: {}", ours, spec.udc,
-                   described(tree.find(name_).value()), run_command_of(name_)));
+  log_info(fmt::format("gadget {}: up on {} as {}; feed it: {}", ours, spec.udc,
+                       described(tree.find(name_).value()), run_command_of(name_)));
 }
 
 void GadgetCommand::down() const {
@@ -136,14 +136,14 @@ void GadgetCommand::down() const {
   GadgetTree tree(files, places_.gadgets());
   const std::string ours = std::string(kGadgetPrefix) + name_;
   if (!tree.find(name_)) {
-    tell(fmt::format("gadget {}: is not up", ours));
+    log_info(fmt::format("gadget {}: is not up", ours));
     return;
   }
   need_root(places_, "down", name_);
   const UniqueFd lock = lock_gadgets(places_);
   if (const std::optional<GadgetFound> found = tree.find(name_)) rest(files, places_, tree, *found);
   tree.down(name_);
-  tell(fmt::format("gadget {}: taken down", ours));
+  log_info(fmt::format("gadget {}: taken down", ours));
 }
 
 void GadgetCommand::status() const {
@@ -171,7 +171,7 @@ void GadgetCommand::status() const {
   try {
     choose_controller(ports, "", "");
   } catch (const ConfigError& none) {
-    tell(none.what());
+    log_info(none.what());
   }
 }
 

@@ -10,8 +10,8 @@
 
 #include "host/commands/hardware_plan.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
-#include "host/core/tell.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/tools/design/checks.h"
 #include "host/tools/design/drawing.h"
@@ -34,7 +34,7 @@ std::string nominal_sensor(const hardware::Parameters& p) {
 
 void tell_of_mirror(const hardware::Geometry& g) {
   if (!g.mirror) return;
-  tell(
+  log_info(
       "design: `run` does not follow the tag in the mirror yet: sensor.yaml and the simulator have "
       "the flat tag alone, with which z and the tilts are poor");
 }
@@ -108,8 +108,8 @@ void export_hardware(const std::string& file, const std::string& folder, bool fo
   }
   tell_of_mirror(g);
   for (const auto& [path, text] : files) write_atomically(path, text);
-  tell(fmt::format("design: wrote parameters.scad, scenario.yaml, sensor.yaml and plan.yaml to {}",
-                   folder));
+  log_info(fmt::format(
+      "design: wrote parameters.scad, scenario.yaml, sensor.yaml and plan.yaml to {}", folder));
 }
 
 }  // namespace tagwrench

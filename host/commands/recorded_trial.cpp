@@ -22,9 +22,9 @@ double seconds_since(TimePoint from, TimePoint to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-constexpr double kLargest = 1e12;  // that an instrument may read; squares of it are finite
+constexpr double kMax = 1e12;  // that an instrument may read; squares of it are finite
 
-bool believable(const Vector6& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargest; }
+bool believable(const Vector6& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= kMax; }
 
 /// Rows of numbers that grow in time.
 struct Table {
@@ -172,7 +172,7 @@ study::Trial recorded_trial(const std::filesystem::path& file, std::vector<std::
   trial.reference = rows(references.value);
   trial.reference_sigma = rows(references.sigma);
   const auto sigmas = trial.reference_sigma.array();
-  if (!(sigmas >= 0 && sigmas <= kLargest).all()) trial.reference_sigma.resize(0, 0);
+  if (!(sigmas >= 0 && sigmas <= kMax).all()) trial.reference_sigma.resize(0, 0);
   trial.step = steps_of(recording.marks(), origin, trial.time);
   return trial;
 }

@@ -19,8 +19,8 @@
 #include "host/commands/run_outputs.h"
 #include "host/commands/run_web.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/output/service_watch.h"
 #include "host/sensor/default_profile.h"
 #include "host/sensor/sensor_config.h"
@@ -36,7 +36,7 @@ std::string_view last_program(const SpnavOutput& output) {
   return output.programs().back().name.data();
 }
 
-/// Where wishes come in, for who has a device on his desk.
+/// Where requests come in, for who has a device on his profiles.
 std::optional<ControlSocket> control_of(const RunOptions& options) {
   const std::vector<Spec> specs = output_specs(options);
   const bool device = (specs.empty() && !options.record) ||
@@ -48,7 +48,7 @@ std::optional<ControlSocket> control_of(const RunOptions& options) {
     const std::string path = control_path(options.name);
     if (!on_hid || !listens(path)) return ControlSocket(path);
   } catch (const ConfigError& e) {
-    tell(fmt::format("running without `tagwrench control`: {}", e.what()));
+    log_info(fmt::format("running without `tagwrench control`: {}", e.what()));
     return {};
   }
   // Two devices with one serial number would be mixed up by whoever opens them by it.
@@ -77,7 +77,7 @@ void say_zero(const ZeroTracking& zero, const Vector6& range, double band) {
       most = std::max(most, std::abs(moved[i]) / range[i]);
   }
   if (most < kSeen) return;
-  tell(fmt::format(
+  log_info(fmt::format(
       "the zero followed what read while nobody touched: by {:.3g} {:.3g} {:.3g} N, {:.3g} {:.3g} "
       "{:.3g} mN m, {:.2g} % of the range{}",
       moved[0], moved[1], moved[2], moved[3] * 1e3, moved[4] * 1e3, moved[5] * 1e3, 100 * most,
@@ -100,8 +100,8 @@ Recording& start_recording(const RunOptions& options, const record::Head& head, 
 bool end_recording(std::unique_ptr<Output> output) {
   auto& recording = static_cast<Recording&>(*output);
   const std::string trouble = recording.finish();
-  tell(recording.summary());
-  if (!trouble.empty()) tell(trouble);
+  log_info(recording.summary());
+  if (!trouble.empty()) log_info(trouble);
   return trouble.empty();
 }
 
@@ -187,14 +187,15 @@ RegionSource& choose_region(Input& input, bool narrow) {
 }
 
 std::unique_ptr<WebOutput> begin_web_run(const Session& session, const Input& input,
-                                         RegionSource* source, RunBoard* board, bool desk,
+                                         RegionSource* source, RunBoard* board, bool profiles,
                                          const Outputs& outputs) {
   if (session.web == nullptr) return nullptr;
   WebOutput::Parts parts;
   parts.source = source;
   parts.board = board;
   parts.programs = outputs.programs;
-  return session.web->begin_run(run_facts(session.options, input, board != nullptr, desk), parts);
+  return session.web->begin_run(run_facts(session.options, input, board != nullptr, profiles),
+                                parts);
 }
 
 /// The exit status; nothing: the camera is wanted for something else, and the run goes on after it.
@@ -227,17 +228,17 @@ std::optional<int> run_once(Session& session) {
   const bool many_profiles = !options.profiles.empty();
   std::optional<ControlSocket> control = control_of(options);
   const bool has_control = control.has_value();
-  Desk desk(ProfileFiles(options.profiles, default_profile(input.sensor)), std::move(control),
-            many_profiles ? FocusWatch::open() : std::nullopt);
+  ProfileManager profiles(ProfileFiles(options.profiles, default_profile(input.sensor)),
+                          std::move(control), many_profiles ? FocusWatch::open() : std::nullopt);
   const ZeroOptions zero_limits =
       zero_options(input.sensor, wrench.tool(), !options.no_zero_tracking);
   ZeroTracking zero(zero_limits);
   Outputs outputs = open_outputs(options, input, board.get(), session.kept);
   if (many_profiles && outputs.programs != nullptr)
-    desk.follow_programs([&programs = *outputs.programs] { return last_program(programs); });
-  tell("source: " + input.source->format().description);
+    profiles.follow_programs([&programs = *outputs.programs] { return last_program(programs); });
+  log_info("source: " + input.source->format().description);
   if (!input.sensor.completed_axes.empty()) {
-    tell(
+    log_info(
         fmt::format("not calibrated, but as the springs are described: {}; their standard "
                     "deviations say how little is known",
                     input.sensor.completed_axes));
@@ -253,14 +254,14 @@ std::optional<int> run_once(Session& session) {
     const WebRun web(session.web,
                      begin_web_run(session, input, region, board.get(), has_control, outputs),
                      outputs);
-    DeadMan dead_man(outputs.devices);
+    Watchdog watchdog(outputs.devices);
     FrameLog* log = web.output();
     if (options.record) {
       Recording& recording = start_recording(options, head, input, limits, board.get(), outputs);
       if (web.output() != nullptr) web.output()->pass_on_to(&recording);
       if (log == nullptr) log = &recording;
     }
-    Pipeline pipeline(*input.source, tracker, wrench, desk, outputs.all, dead_man,
+    Pipeline pipeline(*input.source, tracker, wrench, profiles, outputs.all, watchdog,
                       session.web == nullptr ? stop.get() : session.web->end_fd(), log);
     pipeline.follow_zero(zero);
     if (web.output() != nullptr) web.output()->follow_skipped(pipeline.so_far().skipped);
@@ -279,12 +280,12 @@ std::optional<int> run_once(Session& session) {
   outputs.all.clear();  // neutral, then gone, before anything else is said
   const bool recorded = recording == nullptr || end_recording(std::move(recording));
   if (report.end == RunReport::End::output_failed) {
-    if (recorded) tell(report.failure);
+    if (recorded) log_info(report.failure);
     return 1;
   }
-  tell(summary(report, input.sensor));
+  log_info(summary(report, input.sensor));
   say_zero(zero, zero_limits.range, zero_limits.band);
-  if (const std::string unusable = input.source->unusable(); !unusable.empty()) tell(unusable);
+  if (const std::string unusable = input.source->unusable(); !unusable.empty()) log_info(unusable);
   return recorded ? 0 : 1;
 }
 
@@ -300,7 +301,7 @@ int run_with_pages(Session& session) {
       again = web->lend_camera(session.kept);
     } catch (const ConfigError& e) {
       if (first) throw;
-      tell(e.what());
+      log_info(e.what());
       again = web->wait_after(e.what(), session.kept);
     }
     if (!again) return 0;

@@ -12,9 +12,9 @@
 
 #include "host/commands/camera_wait.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/config_folder.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/v4l2_nodes.h"
 #include "host/source/v4l2_source.h"
@@ -37,7 +37,7 @@ bool sees_tags(Input& input, Duration patience) {
     Frame frame;
     if (input.source->read(frame) != ReadStatus::frame) continue;
     const Track track = tracker.track(frame);
-    if (track.tags_held > 0 || track.hint == Hint::image_looks_mirrored) return true;
+    if (track.tags_held > 0 || track.diagnostic == Diagnostic::image_looks_mirrored) return true;
   }
   return false;
 }
@@ -54,7 +54,7 @@ std::optional<Input> find_camera(const RunOptions& options, int& cameras) {
           sees_tags(input, kPatience))
         return input;
     } catch (const ConfigError& e) {
-      tell(e.what());
+      log_info(e.what());
     }
   }
   return std::nullopt;
@@ -64,10 +64,11 @@ std::optional<Input> find_camera(const RunOptions& options, int& cameras) {
 Input find_input(const RunOptions& options) {
   int cameras = 0;
   if (std::optional<Input> input = find_camera(options, cameras)) return std::move(*input);
-  tell(cameras == 0 ? "no camera found: showing the simulated sensor (--source v4l2:/dev/videoN "
-                      "picks a camera)"
-                    : "no camera sees the tags: showing the simulated sensor (--source "
-                      "v4l2:/dev/videoN insists)");
+  log_info(cameras == 0
+               ? "no camera found: showing the simulated sensor (--source v4l2:/dev/videoN "
+                 "picks a camera)"
+               : "no camera sees the tags: showing the simulated sensor (--source "
+                 "v4l2:/dev/videoN insists)");
   return open_input({"", "sim", options.fast});  // --sensor describes the camera that is not there
 }
 
@@ -78,7 +79,7 @@ std::optional<Input> try_camera(const RunOptions& options) {
   try {
     return open_input({options.sensor, options.source, options.fast});
   } catch (const ConfigError& e) {
-    tell(e.what());
+    log_info(e.what());
     return std::nullopt;
   }
 }
@@ -105,7 +106,7 @@ RunOptions with_own_sensor(RunOptions options) {
   struct stat found {};
   if (::lstat(file.c_str(), &found) == 0) {
     options.sensor = file;
-    tell("sensor: " + file);
+    log_info("sensor: " + file);
   } else if (errno != ENOENT && errno != ENOTDIR) {
     throw ConfigError(file + ": cannot be looked at: " + std::strerror(errno) +
                       "; make its folder yours, or name a file with --sensor");

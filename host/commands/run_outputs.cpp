@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/output/csv.h"
 #include "host/output/gadget_output.h"
 #include "host/output/joystick.h"
@@ -39,7 +39,7 @@ void add_device(Outputs& outputs, const std::string& kind, const SensorConfig& s
   if (kind == "spacemouse") {
     auto device = std::make_unique<SpacemouseOutput>(spacemouse_options(sensor, name));
     device->add_to(outputs.devices);
-    if (const std::string advice = device->spacenavd_advice(); !advice.empty()) tell(advice);
+    if (const std::string advice = device->spacenavd_advice(); !advice.empty()) log_info(advice);
     outputs.all.push_back(std::move(device));
   } else if (kind == "wrench") {
     WrenchHidOptions options;
@@ -71,7 +71,7 @@ void add_spnav(Outputs& outputs, const std::string& socket, const SensorConfig& 
   options.vendor = sensor.spacemouse.vendor;
   options.product = sensor.spacemouse.product;
   auto output = std::make_unique<SpnavOutput>(options);
-  tell(output->advice());
+  log_info(output->advice());
   outputs.programs = output.get();
   outputs.all.push_back(std::move(output));
 }
@@ -93,7 +93,7 @@ void add_default_outputs(Outputs& outputs, const Input& input, const std::string
     } catch (const ConfigError& e) {
       // Both uhid devices lack the same thing; say it once.
       if (kind != std::string("wrench"))
-        tell(fmt::format("running without {}: {}", kind, e.what()));
+        log_info(fmt::format("running without {}: {}", kind, e.what()));
     }
   }
   outputs.all.push_back(terminal(input, false));

@@ -8,16 +8,16 @@
 #include "host/app/input.h"
 #include "host/commands/board/run_board.h"
 #include "host/commands/run_command.h"
-#include "host/output/dead_man.h"
 #include "host/output/output.h"
 #include "host/output/spnav_output.h"
+#include "host/output/watchdog.h"
 
 namespace tagwrench {
 
-/// The outputs, and the devices among them that a guardian must bring to rest.
+/// The outputs, and the devices among them that a watchdog must bring to rest.
 struct Outputs {
   std::vector<std::unique_ptr<Output>> all;
-  std::vector<DeadManDevice> devices;
+  std::vector<WatchdogDevice> devices;
   const SpnavOutput* programs = nullptr;  ///< knows those that are connected
 };
 

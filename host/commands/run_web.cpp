@@ -12,9 +12,9 @@
 #include "host/commands/recording.h"
 #include "host/commands/web_place.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/config_folder.h"
 #include "host/core/os/uninterrupted.h"
-#include "host/core/tell.h"
 #include "host/source/v4l2_mode.h"
 #include "host/web/bridge/recording_folder.h"
 #include "host/web/server/token_file.h"
@@ -90,16 +90,17 @@ std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& s
   if (const std::string folder = config_folder(); !folder.empty())
     web.own_profiles = fs::path(folder) / "profiles";
   auto bridge = std::make_unique<WebBridge>(web, stop.get());
-  tell(fmt::format("pages: {}{}", token_made ? bridge->url_with_token() : bridge->url(),
-                   web.server.token.empty() || token_made
-                       ? ""
-                       : fmt::format("#token=... (the token is in {})", options.web.token_file)));
+  log_info(
+      fmt::format("pages: {}{}", token_made ? bridge->url_with_token() : bridge->url(),
+                  web.server.token.empty() || token_made
+                      ? ""
+                      : fmt::format("#token=... (the token is in {})", options.web.token_file)));
   bridge->start();
   if (options.web.open) open_in_browser(bridge->url_with_token());
   return bridge;
 }
 
-RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bool desk) {
+RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bool profiles) {
   RunFacts facts;
   facts.name = options.name;
   facts.format = input.source->format();
@@ -114,7 +115,7 @@ RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bo
   const Spec source = split_spec(input.spec);
   if (source.kind == "v4l2") facts.camera_device = parse_v4l2_spec(source.argument).path;
   facts.board = board;
-  facts.desk = desk;
+  facts.profiles = profiles;
   if (!options.record) facts.head = recording_head(input, record::Keep::raw);
   return facts;
 }

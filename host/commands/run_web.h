@@ -18,7 +18,7 @@ bool has_web(const RunOptions& options);
 /// Binds, and says where; nothing is served yet. `stop` is of termination_fd().
 std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& stop);
 
-/// `desk`: it listens to wishes.
-RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bool desk);
+/// `desk`: it listens to requests.
+RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bool profiles);
 
 }  // namespace tagwrench

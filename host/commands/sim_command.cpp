@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "host/app/scenario_config.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/source/simulator/folder_export.h"
 
 namespace tagwrench {
@@ -21,7 +21,7 @@ SimCommand::SimCommand(command_line::Command program)
 int SimCommand::run() const {
   const sim::Scenario described = scenario_.empty() ? sim::Scenario{} : load_scenario(scenario_);
   sim::export_folder(described, folder_, frames_);
-  tell(fmt::format("{} frames with truth and sensor.yaml in {}", frames_, folder_));
+  log_info(fmt::format("{} frames with truth and sensor.yaml in {}", frames_, folder_));
   return 0;
 }
 

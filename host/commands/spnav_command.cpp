@@ -9,16 +9,16 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/output/service_watch.h"
-#include "host/output/spnav_keeper.h"
+#include "host/output/spnav_daemon.h"
 #include "host/output/spnav_link.h"
 
 namespace tagwrench {
 namespace {
 
-/// How long a keeper that a bridge has started waits for the next bridge or program.
+/// How long a daemon that a bridge has started waits for the next bridge or program.
 constexpr Duration kIdle = std::chrono::minutes(1);
 
 SpnavSockets make_sockets(const std::string& path) {
@@ -57,13 +57,13 @@ int SpnavCommand::run() const {
   const UniqueFd stop = termination_fd();
   SpnavSockets sockets =
       inherited ? inherited_spnav(path, inherited_[0], inherited_[1]) : make_sockets(path);
-  SpnavKeeperOptions options;
+  SpnavDaemonOptions options;
   if (inherited) options.idle_end = kIdle;
-  tell(fmt::format("spnav: serving {}; programs find it when started with SPNAV_SOCKET={}", path,
-                   path));
+  log_info(fmt::format("spnav: serving {}; programs find it when started with SPNAV_SOCKET={}",
+                       path, path));
   const std::unique_ptr<ServiceWatch> watch = inherited ? nullptr : ServiceWatch::open();
   if (watch != nullptr) watch->ready("serving " + path);
-  SpnavKeeper(std::move(sockets), options, stop.get()).run();
+  SpnavDaemon(std::move(sockets), options, stop.get()).run();
   return 0;
 }
 

@@ -1,4 +1,4 @@
-// `tagwrench spnav`: the keeper of the spnav socket, by hand or as a service.
+// `tagwrench spnav`: the daemon of the spnav socket, by hand or as a service.
 #pragma once
 
 #include <optional>

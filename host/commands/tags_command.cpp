@@ -8,7 +8,7 @@
 #include "host/calibration/print/sheets.h"
 #include "host/calibration/print/vector_file.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/sensor/sensor_config.h"
 #include "host/tools/design/hardware_config.h"
 
@@ -166,12 +166,12 @@ int TagsCommand::run() const {
   const Sheet asked = sheet();
   write_vector_file(asked.drawing, out_);
   if (asked.cell_mm < kFinestCell_mm) {
-    tell(
+    log_info(
         fmt::format("{}: cells of {:.3f} mm are finer than most printers print; use larger tags, "
                     "or fewer cells",
                     out_, asked.cell_mm));
   }
-  tell(fmt::format("{}: print at 100 %, then measure the two bars of 50.0 mm", out_));
+  log_info(fmt::format("{}: print at 100 %, then measure the two bars of 50.0 mm", out_));
   return 0;
 }
 

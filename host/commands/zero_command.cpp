@@ -9,11 +9,11 @@
 #include "host/commands/bench_input.h"
 #include "host/commands/check_text.h"
 #include "host/commands/events_option.h"
-#include "host/commands/hands_off.h"
+#include "host/commands/static_measurement.h"
 #include "host/commands/today.h"
+#include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 
 namespace tagwrench {
 namespace {
@@ -85,31 +85,31 @@ int ZeroCommand::run() const {
   check_editable(yaml, {{"wrench", zero_entries(Vector6::Zero(), "")}}, options_.sensor);
   check_size(at.input);
   check_calibrated_rest(sensor, "zero");
-  HandsOff hands_off(sensor);
+  StaticMeasurement static_measurement(sensor);
   Events events(options_.events);
-  tell("source: " + at.input.source->format().description);
-  tell("hands off for some seconds");
-  const Seen seen = watch(*at.input.source, stop, hands_off, events);
+  log_info("source: " + at.input.source->format().description);
+  log_info("hands off for some seconds");
+  const Seen seen = watch(*at.input.source, stop, static_measurement, events);
   if (seen == Seen::stopped) {
-    tell("stopped; nothing was written");
+    log_info("stopped; nothing was written");
     return kRefused;
   }
-  std::string why = why_nothing(seen, hands_off);
-  if (why.empty()) why = objection(judge(hands_off.result()));
+  std::string why = why_nothing(seen, static_measurement);
+  if (why.empty()) why = objection(judge(static_measurement.result()));
   if (!why.empty()) {
-    tell(why + "; nothing was written");
+    log_info(why + "; nothing was written");
     return kRefused;
   }
-  const Vector6 zero = hands_off.result().wrench + sensor.zero.set;
+  const Vector6 zero = static_measurement.result().wrench + sensor.zero.set;
   const std::string date = today();
   write_sensor(yaml, {{"wrench", zero_entries(zero, date)}}, options_.sensor);
-  tell(fmt::format("zero was {}{}", in_words(sensor.zero.set),
-                   sensor.zero.date.empty() ? "" : ", since " + sensor.zero.date));
-  tell(
-      fmt::format("zero is  {}, from {} frames in {:.1f} s; no thermometer is read: let it warm up "
-                  "before, and zero again after",
-                  in_words(zero), hands_off.result().frames, hands_off.seconds()));
-  tell("written: " + options_.sensor);
+  log_info(fmt::format("zero was {}{}", in_words(sensor.zero.set),
+                       sensor.zero.date.empty() ? "" : ", since " + sensor.zero.date));
+  log_info(fmt::format(
+      "zero is  {}, from {} frames in {:.1f} s; no thermometer is read: let it warm up "
+      "before, and zero again after",
+      in_words(zero), static_measurement.result().frames, static_measurement.seconds()));
+  log_info("written: " + options_.sensor);
   return 0;
 }
 

@@ -135,7 +135,7 @@ constexpr const char* name(Status status) {
 }
 
 /// What the tracker noticed that a person should be told; said once by whoever runs the loop.
-enum class Hint : std::uint8_t {
+enum class Diagnostic : std::uint8_t {
   none,
   image_looks_mirrored,     ///< tags decode only after a horizontal flip, and the sensor says
                             ///< mirrored: false
@@ -162,10 +162,10 @@ enum class Hint : std::uint8_t {
 };
 
 /// Says why the target is not held, and is true no longer when it is.
-constexpr bool is_trouble(Hint hint) { return hint >= Hint::image_black; }
+constexpr bool is_trouble(Diagnostic diagnostic) { return diagnostic >= Diagnostic::image_black; }
 
-/// The numbers that go with a hint; those that do not apply are empty or zero.
-struct HintDetails {
+/// The numbers that go with a diagnostic; those that do not apply are empty or zero.
+struct DiagnosticDetails {
   struct Ids {
     std::array<std::int16_t, 8> id{};
     std::uint8_t count = 0;
@@ -198,8 +198,8 @@ struct TagCorners {
 /// ok.
 struct Track {
   Status status = Status::acquiring;
-  Hint hint = Hint::none;
-  HintDetails details;                     ///< of the hint
+  Diagnostic diagnostic = Diagnostic::none;
+  DiagnosticDetails details;               ///< of the diagnostic
   Vector6 displacement = Vector6::Zero();  ///< translation (m), rotation vector r with R_now =
                                            ///< exp(r) R_rest (rad), both along camera axes
   Matrix6 covariance = Matrix6::Zero();    ///< of displacement, m^2, m rad, rad^2
@@ -207,7 +207,7 @@ struct Track {
   /// What the fit to the picture at rest leaves: RMS, over the contrast between black and white;
   /// and how much wider the image of an edge is than there, as growth of its variance, px^2. Both
   /// are zero where there is no such picture, and known even if status is doubtful.
-  double residual_part = 0;
+  double residual_fraction = 0;
   double blur_px2 = 0;
   std::uint8_t tags_held = 0;           ///< number of tags that carried the fit
   std::array<TagCorners, 8> corners{};  ///< of the target's tags, while it is held
@@ -253,9 +253,9 @@ struct Sample {
   Vector6 zero = Vector6::Zero();  ///< N, N m: what `tagwrench zero` and the following of zero have
                                    ///< taken off the wrench
   ZeroState zero_state = ZeroState::off;
-  bool touched = false;              ///< somebody presses a button of the board
-  Vector6 motion = Vector6::Zero();  ///< -1..1 per axis in the HID frame, dead zone and full scale
-                                     ///< applied; exactly zero at rest
+  bool touched = false;                  ///< somebody presses a button of the board
+  Vector6 deflection = Vector6::Zero();  ///< -1..1 per axis in the HID frame, dead zone and full
+                                         ///< scale applied; exactly zero at rest
   std::uint32_t buttons = 0;  ///< pressed, bit 0 is the first: the board's, and what gestures press
   std::uint32_t dropped = 0;
   TimePoint output_time{};  ///< when it was handed to the outputs, on latency_origin's clock; the

@@ -69,10 +69,10 @@ bool somebody_listens(const sockaddr_un& address) {
 
 bool listens(const std::string& path) { return somebody_listens(address_of(path)); }
 
-ControlWish parse_wish(std::string_view bytes) noexcept {
-  using Kind = ControlWish::Kind;
-  const std::string_view wish = trimmed(bytes);
-  const auto [line, text] = split_at(wish, '\n');
+ControlRequest parse_request(std::string_view bytes) noexcept {
+  using Kind = ControlRequest::Kind;
+  const std::string_view request = trimmed(bytes);
+  const auto [line, text] = split_at(request, '\n');
   const auto [word, behind] = split_at(line, ' ');
   const std::string_view name = trimmed(behind);
   if (word == "try" && !name.empty()) return {Kind::attempt, name, text};
@@ -91,7 +91,7 @@ ControlWish parse_wish(std::string_view bytes) noexcept {
 }
 
 ControlSocket::ControlSocket(std::string path)
-    : path_(std::move(path)), socket_(datagram_socket()), wish_(kLongestWish) {
+    : path_(std::move(path)), socket_(datagram_socket()), request_(kMaxRequest) {
   const sockaddr_un address = address_of(path_);
   if (::bind(socket_.get(), generic(address), sizeof address) == 0) return;
   int error = errno;
@@ -111,14 +111,14 @@ ControlSocket::~ControlSocket() {
   if (socket_) ::unlink(path_.c_str());
 }
 
-ControlWish ControlSocket::next() noexcept {
+ControlRequest ControlSocket::next() noexcept {
   asker_size_ = sizeof asker_;
-  const ssize_t size = ::recvfrom(socket_.get(), wish_.data(), wish_.size(), MSG_TRUNC,
+  const ssize_t size = ::recvfrom(socket_.get(), request_.data(), request_.size(), MSG_TRUNC,
                                   reinterpret_cast<sockaddr*>(&asker_), &asker_size_);
   if (size < 0) return {};
-  if (static_cast<std::size_t>(size) > wish_.size())
-    return {ControlWish::Kind::unknown, "too long"};
-  return parse_wish({wish_.data(), static_cast<std::size_t>(size)});
+  if (static_cast<std::size_t>(size) > request_.size())
+    return {ControlRequest::Kind::unknown, "too long"};
+  return parse_request({request_.data(), static_cast<std::size_t>(size)});
 }
 
 std::string_view ControlSocket::asker() const noexcept {
@@ -149,16 +149,16 @@ void ControlClient::fail() const {
                     "); start `tagwrench run` first, as the same user");
 }
 
-std::string ControlClient::ask(std::string_view wish) {
+std::string ControlClient::ask(std::string_view request) {
   const auto send = [&] {
-    return ::send(socket_.get(), wish.data(), wish.size(), MSG_NOSIGNAL) >= 0;
+    return ::send(socket_.get(), request.data(), request.size(), MSG_NOSIGNAL) >= 0;
   };
   pollfd room{socket_.get(), POLLOUT, 0};  // many ask at once, or it is stopped
   bool sent = send();
   if (!sent && errno == EAGAIN && is_ready(room)) sent = send();
   if (!sent && errno != EAGAIN) fail();
   pollfd waiting{socket_.get(), POLLIN, 0};
-  std::string answer(ControlSocket::kLongestAnswer, '\0');
+  std::string answer(ControlSocket::kMaxAnswer, '\0');
   const ssize_t size =
       sent && is_ready(waiting) ? ::recv(socket_.get(), answer.data(), answer.size(), 0) : -1;
   if (size < 0) throw ConfigError(path_ + ": no answer within 2 s; is `tagwrench run` stopped?");
@@ -166,8 +166,8 @@ std::string ControlClient::ask(std::string_view wish) {
   return answer;
 }
 
-std::string ask(const std::string& path, std::string_view wish) {
-  return ControlClient(path).ask(wish);
+std::string ask(const std::string& path, std::string_view request) {
+  return ControlClient(path).ask(request);
 }
 
 std::string control_path(const std::string& sensor) {

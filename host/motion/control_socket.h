@@ -1,5 +1,5 @@
-// Wishes from outside while the sensor runs: `tagwrench control`, a key of the window manager, a
-// script; and the pages' sliders. One datagram a wish, one back.
+// Requests from outside while the sensor runs: `tagwrench control`, a key of the window manager, a
+// script; and the pages' sliders. One datagram a request, one back.
 #pragma once
 
 #include <sys/socket.h>
@@ -15,7 +15,7 @@
 
 namespace tagwrench {
 
-struct ControlWish {
+struct ControlRequest {
   enum class Kind : std::uint8_t {
     none,
     zero,
@@ -31,19 +31,19 @@ struct ControlWish {
     unknown,
   };
   Kind kind = Kind::none;
-  std::string_view name{};  ///< of the profile or the program; valid until the next wish
+  std::string_view name{};  ///< of the profile or the program; valid until the next request
   std::string_view text{};  ///< of the profile on trial
 };
 
 /// "zero", "next", "profile NAME", "status", "window [NAME]", "live", "show [NAME]", "keep",
 /// "revert", and "try NAME" with a profile's text from the next line on; anything else is unknown.
 /// Blanks around words do not count.
-ControlWish parse_wish(std::string_view bytes) noexcept;
+ControlRequest parse_request(std::string_view bytes) noexcept;
 
 class ControlSocket {
  public:
-  static constexpr std::size_t kLongestWish = 16384;
-  static constexpr std::size_t kLongestAnswer = 16384;
+  static constexpr std::size_t kMaxRequest = 16384;
+  static constexpr std::size_t kMaxAnswer = 16384;
 
   /// Listens at `path`; a socket file that nobody listens to any more is replaced. Throws
   /// ConfigError: somebody listens there, or the path cannot be used.
@@ -53,17 +53,18 @@ class ControlSocket {
   ~ControlSocket();
 
   int fd() const noexcept { return socket_.get(); }
-  /// The next wish; none when all are taken.
-  ControlWish next() noexcept;
-  /// Who had the last wish, tells askers apart; empty if he has no address. Valid until the next.
+  /// The next request; none when all are taken.
+  ControlRequest next() noexcept;
+  /// Who had the last request, tells askers apart; empty if he has no address. Valid until the
+  /// next.
   std::string_view asker() const noexcept;
-  /// To whoever had the last wish, if he listens. Never blocks.
+  /// To whoever had the last request, if he listens. Never blocks.
   void answer(std::string_view text) noexcept;
 
  private:
   std::string path_;
   UniqueFd socket_;
-  std::vector<char> wish_;
+  std::vector<char> request_;
   sockaddr_un asker_{};
   socklen_t asker_size_ = 0;
 };
@@ -71,15 +72,15 @@ class ControlSocket {
 /// Whether somebody listens there.
 bool listens(const std::string& path);
 
-/// One who asks, the same for all his wishes.
+/// One who asks, the same for all his requests.
 class ControlClient {
  public:
   /// Of the sensor that listens at `path`. Throws ConfigError: nobody does.
   explicit ControlClient(const std::string& path);
 
-  /// Sends a wish, and waits for its answer. Throws ConfigError: nobody listens any more, or
+  /// Sends a request, and waits for its answer. Throws ConfigError: nobody listens any more, or
   /// answers.
-  std::string ask(std::string_view wish);
+  std::string ask(std::string_view request);
 
  private:
   [[noreturn]] void fail() const;
@@ -88,8 +89,8 @@ class ControlClient {
   UniqueFd socket_;
 };
 
-/// One wish of a client that is then gone.
-std::string ask(const std::string& path, std::string_view wish);
+/// One request of a client that is then gone.
+std::string ask(const std::string& path, std::string_view request);
 
 /// Where the sensor of this name is asked; a folder of the user's own.
 std::string control_path(const std::string& sensor);

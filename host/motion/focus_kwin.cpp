@@ -22,7 +22,7 @@ constexpr const char* kScripting = "/Scripting";
 constexpr const char* kScriptingInterface = "org.kde.kwin.Scripting";
 constexpr const char* kOurs = "/focus";
 constexpr const char* kOurInterface = "org.tagwrench.Focus";
-constexpr std::size_t kLongestName = 256;
+constexpr std::size_t kMaxName = 256;
 constexpr std::uint64_t kPatience_us = 2'000'000;
 
 struct BusClosed {
@@ -71,7 +71,7 @@ class KwinFocus : public FocusSource {
     while ((more = sd_bus_process(bus_.get(), nullptr)) > 0) {
     }
     if (more < 0) return Focus{.ended = true};
-    return std::exchange(news_, std::nullopt);
+    return std::exchange(status_line_, std::nullopt);
   }
 
  private:
@@ -86,8 +86,8 @@ class KwinFocus : public FocusSource {
         sd_bus_message_read(message, "s", &name) < 0)
       return 0;
     try {
-      const std::string program = lower_case(std::string_view(name).substr(0, kLongestName));
-      static_cast<KwinFocus*>(self)->news_ = Focus{!program.empty(), program};
+      const std::string program = lower_case(std::string_view(name).substr(0, kMaxName));
+      static_cast<KwinFocus*>(self)->status_line_ = Focus{!program.empty(), program};
     } catch (const std::exception&) {
       return 0;  // out of memory: the profile stays
     }
@@ -96,7 +96,7 @@ class KwinFocus : public FocusSource {
 
   Bus bus_;
   std::string script_;  ///< its file, and its name in KWin
-  std::optional<Focus> news_;
+  std::optional<Focus> status_line_;
 };
 
 }  // namespace

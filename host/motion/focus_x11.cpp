@@ -12,7 +12,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::uint32_t kLongestClass = 256;  // bytes / 4 of a property
+constexpr std::uint32_t kMaxClass = 256;  // bytes / 4 of a property
 
 template <typename Reply>
 struct Freed {
@@ -70,7 +70,7 @@ class X11Focus : public FocusSource {
   void ask_for_class(xcb_window_t window) {
     if (class_asked_) xcb_discard_reply(x_, class_asked_->sequence);
     class_asked_ =
-        xcb_get_property(x_, 0, window, XCB_ATOM_WM_CLASS, XCB_ATOM_STRING, 0, kLongestClass);
+        xcb_get_property(x_, 0, window, XCB_ATOM_WM_CLASS, XCB_ATOM_STRING, 0, kMaxClass);
     xcb_flush(x_);
   }
   bool moved() {

@@ -10,7 +10,7 @@ constexpr int kDown = 2;  // HID axes: force towards the table
 constexpr int kTurn = 5;  // and torque about it
 
 constexpr double kNoiseSigmas = 4;     // of what counts as rest, at least
-constexpr double kMostBand = 0.5;      // of the least peak; where rest is wider, no gesture is told
+constexpr double kMaxBand = 0.5;       // of the least peak; where rest is wider, no gesture is told
 constexpr double kTurnBack = 0.7;      // of the peak: a twist that is let go rings for longer
 constexpr double kSwingBack = 0.5;     // of the peak: springs overshoot so much, a knock does more
 constexpr double kSamePlace = 0.5;     // of `quiet`, between rest before and rest after
@@ -18,12 +18,12 @@ constexpr double kCalm = 0.5;          // of `quiet`, when the springs have swun
 constexpr int kCalmFrames = 2;         // in a row: one alone may be a passage through the middle
 constexpr double kRiseTime = 1.0 / 3;  // of the longest gesture, from `quiet` to its least peak
 constexpr double kBarely = 1.5;  // times what counts as rest: too little to tell how fast it grows
-constexpr double kFirstRise = 0.5;      // of the rise asked for: it began somewhere between frames
-constexpr double kMostOfPlateau = 0.8;  // where the rise of a press ends
-constexpr double kSteadyLow = 0.6;      // of the plateau
+constexpr double kFirstRise = 0.5;     // of the rise asked for: it began somewhere between frames
+constexpr double kMaxOfPlateau = 0.8;  // where the rise of a press ends
+constexpr double kSteadyLow = 0.6;     // of the plateau
 constexpr double kSteadyHigh = 1.5;
 constexpr double kLetGo = 0.5;  // of press_force
-constexpr auto kLongestSwing = std::chrono::milliseconds(150);
+constexpr auto kMaxSwing = std::chrono::milliseconds(150);
 constexpr auto kStale = std::chrono::seconds(1);  // without numbers: a command from before is void
 constexpr double kBaselineMemory = 0.1;           // s
 
@@ -54,12 +54,12 @@ Vector6 turned_load(const Eigen::Matrix3d& rotation, const Vector6& load) {
 bool Gestures::looks_for_taps() const noexcept {
   const bool wanted = options_.tap.does_something() || options_.double_tap.does_something() ||
                       options_.press_hold.does_something();
-  return wanted && band_[kDown] <= kMostBand * options_.tap_force;
+  return wanted && band_[kDown] <= kMaxBand * options_.tap_force;
 }
 
 bool Gestures::looks_for_twists() const noexcept {
   const bool wanted = options_.twist_left.does_something() || options_.twist_right.does_something();
-  return wanted && band_[kTurn] <= kMostBand * options_.twist_torque;
+  return wanted && band_[kTurn] <= kMaxBand * options_.twist_torque;
 }
 
 bool Gestures::at_rest(const Vector6& load, double part) const noexcept {
@@ -259,7 +259,7 @@ bool Gestures::straight_down(double force) const noexcept {
 /// A press whose force is where it stays: did it get there at once?
 bool Gestures::struck(double force) const noexcept {
   if (force < options_.press_force) return false;
-  const double level = kMostOfPlateau * force;
+  const double level = kMaxOfPlateau * force;
   TimePoint before = pulse_.left;
   double from = 0;
   for (std::size_t i = 0; i < pulse_.rise_count; ++i) {
@@ -384,7 +384,7 @@ void Gestures::forget() noexcept {
 
 void Gestures::begin_swing(TimePoint now) noexcept {
   swings_ = true;
-  swing_until_ = now + kLongestSwing;
+  swing_until_ = now + kMaxSwing;
   calm_frames_ = 0;
 }
 

@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::string_view kMagic = "i3-ipc";
-constexpr std::size_t kLongestName = 256;
+constexpr std::size_t kMaxName = 256;
 
 std::uint32_t word_at(std::string_view bytes, std::size_t at) {
   std::uint32_t word = 0;
@@ -26,7 +26,7 @@ std::uint32_t word_at(std::string_view bytes, std::size_t at) {
 std::string text_of(const Json& object, const char* key) {
   const auto found = object.find(key);
   if (found == object.end() || !found->is_string()) return {};
-  return found->get_ref<const std::string&>().substr(0, kLongestName);
+  return found->get_ref<const std::string&>().substr(0, kMaxName);
 }
 
 /// A window of Wayland has an application id, one of X11 a class.
@@ -83,7 +83,7 @@ std::optional<I3Message> I3Stream::next() {
   if (bytes_.size() < kHead || !bytes_.starts_with(kMagic)) return {};
   const std::size_t size = word_at(bytes_, kMagic.size());
   I3Message message{word_at(bytes_, kMagic.size() + 4), {}};
-  if (size > kLongest) {
+  if (size > kMax) {
     const std::size_t here = std::min(size, bytes_.size() - kHead);
     passed_over_ = size - here;
     bytes_.erase(0, kHead + here);

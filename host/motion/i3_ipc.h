@@ -26,11 +26,11 @@ struct I3Message {
   std::string payload;
 };
 
-/// Bytes as they come, cut into messages. Of a message longer than kLongest the payload is passed
+/// Bytes as they come, cut into messages. Of a message longer than kMax the payload is passed
 /// over and counts as empty.
 class I3Stream {
  public:
-  static constexpr std::size_t kLongest = 1 << 20;
+  static constexpr std::size_t kMax = 1 << 20;
 
   /// False: this is not i3's IPC.
   bool put(std::string_view bytes);

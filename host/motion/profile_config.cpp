@@ -17,12 +17,12 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::size_t kLongestName = 64;
+constexpr std::size_t kMaxName = 64;
 constexpr double kFinestScale = 1e-6;  // N, N m
 constexpr double kCoarsestScale = 1e6;
 constexpr double kSlowestRate_hz = 20;
 constexpr double kFastestRate_hz = 125;
-constexpr int kMostButtons = 16;  // more move the mouse pointer on Linux
+constexpr int kMaxButtons = 16;  // more move the mouse pointer on Linux
 
 const std::vector<std::string_view> kAxes = {"x", "y", "z", "rx", "ry", "rz"};
 const std::vector<std::string_view> kLocks = {"none", "translation", "rotation"};
@@ -42,17 +42,17 @@ bool is_force(int source) { return source < 3; }
 void check_label(const YamlReader& node, const std::string& key, const std::string& text) {
   const bool printable =
       std::all_of(text.begin(), text.end(), [](unsigned char c) { return c >= 0x20 && c != 0x7f; });
-  if (text.empty() || text.size() > kLongestName || !printable)
-    node.fail(key, fmt::format("must be 1 to {} printable characters", kLongestName));
+  if (text.empty() || text.size() > kMaxName || !printable)
+    node.fail(key, fmt::format("must be 1 to {} printable characters", kMaxName));
 }
 
 CurveOptions read_points(YamlReader& node) {
   CurveOptions curve;
   curve.kind = CurveKind::points;
   const std::vector<std::vector<double>> points = node.points("points", 2);
-  if (points.size() < 2 || points.size() > kMostCurvePoints) {
+  if (points.size() < 2 || points.size() > kMaxCurvePoints) {
     node.fail("points", fmt::format("has {} points; give 2 to {}, from [0, 0] to [1, ...]",
-                                    points.size(), kMostCurvePoints));
+                                    points.size(), kMaxCurvePoints));
   }
   for (const std::vector<double>& point : points) {
     const CurvePoint next{point[0], point[1]};
@@ -187,13 +187,13 @@ GestureAction read_action(YamlReader& node, const char* key) {
   const std::string text = node.text(key);
   std::vector<GestureAction> known = {
       {}, {-1, GestureCommand::zero}, {-1, GestureCommand::next_profile}};
-  for (int button = 0; button < kMostButtons; ++button) known.push_back({button});
+  for (int button = 0; button < kMaxButtons; ++button) known.push_back({button});
   for (const GestureAction& action : known) {
     if (action_text(action) == text) return action;
   }
   node.fail(key, fmt::format("'{}' is not known; use one of: none, zero, next_profile, button 1 "
                              "to button {}",
-                             text, kMostButtons));
+                             text, kMaxButtons));
 }
 
 void read_gestures(YamlReader node, GestureOptions& gestures) {

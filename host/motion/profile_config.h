@@ -26,14 +26,15 @@ struct Profile {
 ///   name [the file's, without .yaml]
 ///   applications: [part of a window's class or a program's name, ...]
 ///   rate_hz [125]                  20 to 125, of reports; 0: one for every frame
-///   fill [predict] | none          between frames (host/motion/motion_fill.h)
+///   fill [predict] | none          between frames (host/motion/motion_extrapolator.h)
 ///   curve [{power: 1}] | {points: [[0, 0], ..., [1, 1]]}     of all axes
 ///   axes:                          of the device: x y z rx ry rz
 ///     x: {from [x], invert [false], limit [1], curve,
 ///         full_scale_n, dead_zone_n | full_scale_nm, dead_zone_nm}     as `from` is a force or not
 ///   dead_zone_release [0.7]        part of it below which an axis comes to rest again
 ///   noise_sigmas [8]               of the noise at rest, that a dead zone holds at least
-///   swing_ms [120]                 a sudden release's, to 1/e (host/motion/after_swing.h); 0: it
+///   swing_ms [120]                 a sudden release's, to 1/e (host/motion/ringdown_suppressor.h);
+///   0: it
 ///                                  counts
 ///   translation [1], rotation [1]  deflection, times
 ///   dominant: {on [true], ratio [1.3]}                       only the strongest axis

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLongestFile = 65536;
+constexpr std::size_t kMaxFile = 65536;
 constexpr const char* kTooLong = ": longer than 64 kB; a profile is a page of text";
 
 /// One byte more of a file that is too long.
@@ -26,7 +26,7 @@ std::optional<std::string> read_start(const std::string& path) {
   std::error_code none;
   if (!fs::is_regular_file(path, none)) return {};  // a pipe would be waited for
   std::ifstream in(path, std::ios::binary);
-  std::string text(kLongestFile + 1, '\0');
+  std::string text(kMaxFile + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (in.bad() || (!in.eof() && in.fail())) return {};
   text.resize(static_cast<std::size_t>(in.gcount()));
@@ -85,7 +85,7 @@ ProfileFiles::ProfileFiles(const std::vector<std::string>& chosen, Profile defau
 void ProfileFiles::take(const std::string& path) {
   const std::optional<std::string> text = read_start(path);
   if (!text) throw ConfigError(path + ": cannot be read; give --profile a file of yours");
-  if (text->size() > kLongestFile) throw ConfigError(path + kTooLong);
+  if (text->size() > kMaxFile) throw ConfigError(path + kTooLong);
   const fs::path whole = fs::absolute(path);
   files_.push_back({whole.parent_path(), whole.filename(), *text, profiles_.size()});
   profiles_.push_back(parse_profile(*text, path, defaults_));
@@ -138,7 +138,7 @@ std::optional<ProfileFiles::Change> ProfileFiles::look_again(File& file) {
   if (!text || *text == file.text) return {};
   file.text = std::move(*text);
   try {
-    if (file.text.size() > kLongestFile) throw ConfigError(path + kTooLong);
+    if (file.text.size() > kMaxFile) throw ConfigError(path + kTooLong);
     Profile read = parse_profile(file.text, path, defaults_);
     profiles_[file.profile] = std::move(read);
     return Change{file.profile, "profile " + profiles_[file.profile].name + ": read again"};

@@ -27,8 +27,8 @@ double end_slope(double h0, double d0, double h1, double d1) {
 
 ResponseCurve::ResponseCurve(const CurveOptions& options) noexcept : options_(options) {
   if (options.kind != CurveKind::points) return;
-  std::array<double, kMostCurvePoints> width{};
-  std::array<double, kMostCurvePoints> rise{};
+  std::array<double, kMaxCurvePoints> width{};
+  std::array<double, kMaxCurvePoints> rise{};
   const std::size_t intervals = options.count - 1;
   for (std::size_t i = 0; i < intervals; ++i) {
     width[i] = options.points[i + 1].in - options.points[i].in;

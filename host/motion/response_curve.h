@@ -19,14 +19,14 @@ struct CurvePoint {
   bool operator==(const CurvePoint&) const = default;
 };
 
-inline constexpr std::size_t kMostCurvePoints = 16;
+inline constexpr std::size_t kMaxCurvePoints = 16;
 
 struct CurveOptions {
   CurveKind kind = CurveKind::linear;
   double power = 1;  ///< greater than 0
   /// The first `count` of them, at least two: from (0, 0), `in` growing up to 1, `out` never
   /// falling and at most 1.
-  std::array<CurvePoint, kMostCurvePoints> points{};
+  std::array<CurvePoint, kMaxCurvePoints> points{};
   std::size_t count = 0;
   bool operator==(const CurveOptions&) const = default;
 };
@@ -47,7 +47,7 @@ class ResponseCurve {
   double between_points(double in) const noexcept;
 
   CurveOptions options_;
-  std::array<double, kMostCurvePoints> slope_{};  ///< at the points
+  std::array<double, kMaxCurvePoints> slope_{};  ///< at the points
 };
 
 }  // namespace tagwrench

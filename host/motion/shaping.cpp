@@ -6,10 +6,10 @@
 namespace tagwrench {
 namespace {
 
-constexpr Duration kLongestGap = std::chrono::milliseconds(500);  // then it begins anew
-constexpr double kMostNoise = 0.5;  // of full scale: a dead zone that noise makes
-constexpr double kMostPushed = 5;   // full scales: the largest swing that is waited for
-constexpr double kNearRest = 2;     // dead zones; within, the noise is learnt
+constexpr Duration kMaxGap = std::chrono::milliseconds(500);  // then it begins anew
+constexpr double kMaxNoise = 0.5;  // of full scale: a dead zone that noise makes
+constexpr double kMaxPushed = 5;   // full scales: the largest swing that is waited for
+constexpr double kNearRest = 2;    // dead zones; within, the noise is learnt
 
 Vector6 limits(const ShapingOptions& options) {
   Vector6 limit;
@@ -31,14 +31,14 @@ Shaping::Shaping(const ShapingOptions& options) noexcept
 }
 
 void Shaping::change(const ShapingOptions& options) noexcept {
-  const MotionFill fill = fill_;
+  const MotionExtrapolator fill = fill_;
   *this = Shaping(options);
   fill_ = fill;
 }
 
 void Shaping::suppress(Sample& sample) noexcept {
   shape(sample);  // noise and swing go on
-  sample.motion.setZero();
+  sample.deflection.setZero();
   zones_ = {};
   strongest_ = -1;
   filter_.settle();
@@ -54,7 +54,7 @@ void Shaping::begin_anew() noexcept {
 }
 
 Shaping::Order Shaping::order(TimePoint time) const noexcept {
-  if (!started_ || time - last_ > kLongestGap || last_ - time > kLongestGap) return Order::first;
+  if (!started_ || time - last_ > kMaxGap || last_ - time > kMaxGap) return Order::first;
   return time > last_ ? Order::next : Order::stale;
 }
 
@@ -83,18 +83,18 @@ Vector6 Shaping::felt_sigma(const Vector6& sigma) const noexcept {
 /// N and N m: where rest ends.
 Vector6 Shaping::rest_edge() const noexcept {
   const Vector6 noise = options_.noise_sigmas * noise_.sigma();
-  return options_.dead_zone.cwiseMax(noise.cwiseMin(kMostNoise * options_.full_scale));
+  return options_.dead_zone.cwiseMax(noise.cwiseMin(kMaxNoise * options_.full_scale));
 }
 
 void Shaping::shape(Sample& sample) noexcept {
   Vector6 raw = felt(sample.wrench);
   if (!carries_numbers(sample.status) || !raw.allFinite()) {
-    sample.motion.setZero();
+    sample.deflection.setZero();
     return begin_anew();
   }
   const Order place = order(sample.capture_time);
   if (place == Order::stale) {
-    sample.motion = fill_.newest();
+    sample.deflection = fill_.newest();
     return;
   }
   const bool first = place == Order::first;
@@ -111,16 +111,16 @@ void Shaping::shape(Sample& sample) noexcept {
   } else {
     filter_.step(seconds, raw);
   }
-  sample.motion = deflection(raw);
-  if (options_.dominant.on) keep_strongest(sample.motion);
-  fill_.add(sample.capture_time, sample.motion);
+  sample.deflection = deflection(raw);
+  if (options_.dominant.on) keep_strongest(sample.deflection);
+  fill_.add(sample.capture_time, sample.deflection);
 }
 
 /// Without the platform's swing, and within full scale: what is beyond would only have to be
 /// forgotten again.
 Vector6 Shaping::meant(double seconds, const Vector6& raw) noexcept {
   const Vector6 push =
-      raw.cwiseQuotient(options_.full_scale).cwiseMin(kMostPushed).cwiseMax(-kMostPushed);
+      raw.cwiseQuotient(options_.full_scale).cwiseMin(kMaxPushed).cwiseMax(-kMaxPushed);
   swing_.add(seconds, push);
   Vector6 meant = raw.cwiseMin(options_.full_scale).cwiseMax(-options_.full_scale);
   for (int i = 0; i < 6; ++i) {

@@ -8,12 +8,12 @@
 #include <cstdint>
 
 #include "host/core/types.h"
-#include "host/motion/after_swing.h"
 #include "host/motion/axis_filter.h"
 #include "host/motion/dead_zone.h"
-#include "host/motion/motion_fill.h"
+#include "host/motion/motion_extrapolator.h"
 #include "host/motion/noise_floor.h"
 #include "host/motion/response_curve.h"
+#include "host/motion/ringdown_suppressor.h"
 
 namespace tagwrench {
 
@@ -58,7 +58,8 @@ struct ShapingOptions {
   double noise_sigmas = 8;  ///< standard deviations of the noise at rest that a dead zone holds at
                             ///< least (host/motion/noise_floor.h); 0: it is not looked at
   /// s, in which the platform's swing after a sudden release falls to 1/e
-  /// (host/motion/after_swing.h); 0: a swing counts as pushes. The published sensor: 26 Hz, 0.1 s.
+  /// (host/motion/ringdown_suppressor.h); 0: a swing counts as pushes. The published sensor: 26 Hz,
+  /// 0.1 s.
   double swing = 0.12;
   std::array<AxisOptions, 6> axes = straight_axes();
   double translation = 1;  ///< deflection of X Y Z, times
@@ -85,8 +86,8 @@ class Shaping {
   void change(const ShapingOptions& options) noexcept;
   const ShapingOptions& options() const noexcept { return options_; }
 
-  /// Fills sample.motion: -1..1 per HID axis, exactly zero at rest and continuous at the edge of
-  /// rest. A status that carries no numbers, and a wrench that is not finite, are zero and begin
+  /// Fills sample.deflection: -1..1 per HID axis, exactly zero at rest and continuous at the edge
+  /// of rest. A status that carries no numbers, and a wrench that is not finite, are zero and begin
   /// anew. A frame older than the last one, or one with its time, changes nothing and has the last
   /// one's motion.
   void shape(Sample& sample) noexcept;
@@ -96,7 +97,7 @@ class Shaping {
   void suppress(Sample& sample) noexcept;
 
   /// The motion at `time` by the frames so far, on the clock of capture times: of the newest frame
-  /// for Fill::none, carried on from it for Fill::predict (host/motion/motion_fill.h).
+  /// for Fill::none, carried on from it for Fill::predict (host/motion/motion_extrapolator.h).
   Vector6 motion_at(TimePoint time) const noexcept;
 
  private:
@@ -115,9 +116,9 @@ class Shaping {
   std::array<ResponseCurve, 6> curves_;
   std::array<DeadZone, 6> zones_;
   AxisFilter filter_;
-  AfterSwing swing_;
+  RingdownSuppressor swing_;
   NoiseFloor noise_;
-  MotionFill fill_;
+  MotionExtrapolator fill_;
   Vector6 limit_;
   TimePoint last_{};
   bool started_ = false;

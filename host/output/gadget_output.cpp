@@ -27,7 +27,7 @@ namespace tagwrench {
 namespace {
 
 constexpr std::uint16_t k3dconnexion = 0x256f;
-constexpr int kStart_ms = 10'000;  // of a keeper on a busy machine
+constexpr int kStart_ms = 10'000;  // of a daemon on a busy machine
 constexpr int kPatience_ms = 300;  // with a computer that takes rest in its own time
 
 using Packet =
@@ -51,22 +51,22 @@ std::vector<std::uint8_t> neutral(GadgetFace face) {
   return {rest.begin(), rest.end()};
 }
 
-std::string_view news_text(GadgetNews news) noexcept {
-  switch (news) {
-    case GadgetNews::taken:
+std::string_view news_text(GadgetEvent status_line) noexcept {
+  switch (status_line) {
+    case GadgetEvent::taken:
       return "gadget: the other computer takes reports";
-    case GadgetNews::nobody:
+    case GadgetEvent::nobody:
       return "gadget: no computer at the other end; goes on when there is one";
-    case GadgetNews::asleep:
+    case GadgetEvent::asleep:
       return "gadget: the other computer does not ask for reports (asleep?); goes on when it does";
-    case GadgetNews::gone:
+    case GadgetEvent::gone:
       return "gadget: it was taken down; goes on after `tagwrench gadget up`";
-    case GadgetNews::led_off:
+    case GadgetEvent::led_off:
       return "gadget: LED off";
-    case GadgetNews::led_on:
+    case GadgetEvent::led_on:
       return "gadget: LED on";
-    case GadgetNews::none:
-    case GadgetNews::ready:
+    case GadgetEvent::none:
+    case GadgetEvent::ready:
       break;
   }
   return {};
@@ -80,7 +80,7 @@ std::string up_command(const GadgetOptions& options) {
   return command;
 }
 
-[[noreturn]] void no_keeper(const char* what, const char* why) {
+[[noreturn]] void no_daemon(const char* what, const char* why) {
   throw ConfigError(fmt::format("gadget: {}: {}; end other programs", what, why));
 }
 
@@ -130,7 +130,7 @@ GadgetPort find_gadget(const GadgetOptions& options) {
 
 void keep_gadget(const GadgetInheritance& given) {
   ::prctl(PR_SET_NAME, "tw-gadget");  // so that a kill by the bridge's name spares it
-  ignore_signals();                   // Ctrl-C is for the bridge: the keeper ends with its link
+  ignore_signals();                   // Ctrl-C is for the bridge: the daemon ends with its link
   UniqueFd link(kFirstDaemonFd), watch(kFirstDaemonFd + 1);
   OpenedNode node;
   node.fd.reset(kFirstDaemonFd + 2);
@@ -140,7 +140,7 @@ void keep_gadget(const GadgetInheritance& given) {
     if (::fcntl(fd->get(), F_SETFD, FD_CLOEXEC) != 0)
       throw ConfigError("gadget keep: is for `tagwrench run --output gadget`, which starts it");
   }
-  GadgetKeeper(given.face, std::move(link), std::move(watch), std::move(node), [given] {
+  GadgetDaemon(given.face, std::move(link), std::move(watch), std::move(node), [given] {
     return open_gadget_node(GadgetFiles(), given.places, given.function);
   }).run();
 }
@@ -150,49 +150,49 @@ GadgetOutput::GadgetOutput(GadgetPort port)
       spnav_order_(port.spnav_order),
       places_(port.places),
       function_(port.function) {
-  start_keeper(port);
-  port.node.fd.reset();  // the keeper's alone
-  await_keeper();
+  start_daemon(port);
+  port.node.fd.reset();  // the daemon's alone
+  await_daemon();
 }
 
 /// By exec and not by fork alone: it allocates, and a thread of a library may hold malloc's lock.
-void GadgetOutput::start_keeper(const GadgetPort& port) {
+void GadgetOutput::start_daemon(const GadgetPort& port) {
   const UniqueFd watch = watch_nodes(port.places.devices);
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0)
-    no_keeper("cannot make a socket", std::strerror(errno));
+    no_daemon("cannot make a socket", std::strerror(errno));
   link_.reset(ends[0]);
-  const UniqueFd keeper_end(ends[1]);
-  const int inherited[] = {keeper_end.get(), watch.get(), port.node.fd.get()};
+  const UniqueFd daemon_end(ends[1]);
+  const int inherited[] = {daemon_end.get(), watch.get(), port.node.fd.get()};
   const int error =
-      spawn_daemon(keeper_, port.program,
+      spawn_daemon(daemon_, port.program,
                    {"tagwrench", "gadget", "keep", "--face", std::string(face_name(face_)),
                     "--sysfs", port.places.sysfs, "--devices", port.places.devices, "--function",
                     port.function, "--node", port.node.path},
                    inherited, DaemonSignals::blocked);
-  if (error != 0) no_keeper("cannot start its process", std::strerror(error));
+  if (error != 0) no_daemon("cannot start its process", std::strerror(error));
 }
 
-void GadgetOutput::await_keeper() {
+void GadgetOutput::await_daemon() {
   pollfd first{link_.get(), POLLIN, 0};
   uninterrupted([&] { return ::poll(&first, 1, kStart_ms); });
-  GadgetNews news{};
-  const ssize_t got = ::recv(link_.get(), &news, sizeof news, MSG_DONTWAIT);
-  if (got == sizeof news && news == GadgetNews::ready) return;
+  GadgetEvent status_line{};
+  const ssize_t got = ::recv(link_.get(), &status_line, sizeof status_line, MSG_DONTWAIT);
+  if (got == sizeof status_line && status_line == GadgetEvent::ready) return;
   const char* why = got < 0 ? "it says nothing" : "it has ended";
   link_.reset();
-  ::kill(keeper_, SIGKILL);
-  uninterrupted([this] { return ::waitpid(keeper_, nullptr, 0); });
-  no_keeper("its process does not begin", why);
+  ::kill(daemon_, SIGKILL);
+  uninterrupted([this] { return ::waitpid(daemon_, nullptr, 0); });
+  no_daemon("its process does not begin", why);
 }
 
 GadgetOutput::~GadgetOutput() {
-  if (keeper_ <= 0) return;
+  if (daemon_ <= 0) return;
   const bool there = !lost_;
-  ::shutdown(link_.get(), SHUT_WR);  // the guardian's duplicate cannot keep it open
+  ::shutdown(link_.get(), SHUT_WR);  // the watchdog's duplicate cannot keep it open
   pollfd gone{link_.get(), 0, 0};
   const auto wait = [&] { return ::poll(&gone, 1, kPatience_ms); };
-  if (uninterrupted(wait) > 0) uninterrupted([this] { return ::waitpid(keeper_, nullptr, 0); });
+  if (uninterrupted(wait) > 0) uninterrupted([this] { return ::waitpid(daemon_, nullptr, 0); });
   if (there) return;
   try {
     const OpenedNode node = open_gadget_node(GadgetFiles(), places_, function_);
@@ -221,7 +221,7 @@ SendStatus GadgetOutput::move(const Sample& sample) noexcept {
   std::uint32_t pressed = 0;
   if (carries_numbers(shown_status(sample))) {
     pressed = sample.buttons;
-    counts = to_counts(sample.motion, kSpacemouseLimit_counts);
+    counts = to_counts(sample.deflection, kSpacemouseLimit_counts);
     if (spnav_order_) counts = to_spnav_order(counts);
   }
   return put(packet(counts, pressed));
@@ -235,10 +235,10 @@ std::string_view GadgetOutput::service() noexcept {
   std::array<std::uint8_t, 16> message;
   const ssize_t got = ::recv(link_.get(), message.data(), message.size(), MSG_DONTWAIT);
   lost_ = lost_ || got == 0;
-  return got > 0 ? news_text(static_cast<GadgetNews>(message[0])) : std::string_view();
+  return got > 0 ? news_text(static_cast<GadgetEvent>(message[0])) : std::string_view();
 }
 
-void GadgetOutput::add_to(std::vector<DeadManDevice>& devices) const {
+void GadgetOutput::add_to(std::vector<WatchdogDevice>& devices) const {
   devices.push_back({link_.get(), {neutral(face_)}, {}});
 }
 

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "host/output/dead_man.h"
-#include "host/output/gadget_keeper.h"
+#include "host/output/gadget_daemon.h"
 #include "host/output/gadget_kernel.h"
 #include "host/output/output.h"
+#include "host/output/watchdog.h"
 
 namespace tagwrench {
 
@@ -29,14 +29,14 @@ struct GadgetPort {
   KernelPlaces places;
   std::string function;  ///< of the gadget, in configfs
   OpenedNode node;
-  /// Program whose verb `gadget` has the keeper.
+  /// Program whose verb `gadget` has the daemon.
   std::string program = "/proc/self/exe";
 };
 
 /// Throws ConfigError: not up, another face, no permission, another bridge writes to it.
 GadgetPort find_gadget(const GadgetOptions& options);
 
-/// The life of the keeper that a GadgetOutput starts (`tagwrench gadget keep`), by what it was
+/// The life of the daemon that a GadgetOutput starts (`tagwrench gadget keep`), by what it was
 /// given.
 struct GadgetInheritance {
   GadgetFace face = GadgetFace::spacemouse;
@@ -62,11 +62,11 @@ class GadgetOutput : public Output {
   std::string_view service() noexcept override;
 
   GadgetFace face() const noexcept { return face_; }
-  void add_to(std::vector<DeadManDevice>& devices) const;
+  void add_to(std::vector<WatchdogDevice>& devices) const;
 
  private:
-  void start_keeper(const GadgetPort& port);
-  void await_keeper();
+  void start_daemon(const GadgetPort& port);
+  void await_daemon();
   SendStatus put(std::span<const std::uint8_t> reports) noexcept;
 
   GadgetFace face_;
@@ -74,8 +74,8 @@ class GadgetOutput : public Output {
   KernelPlaces places_;
   std::string function_;
   UniqueFd link_;
-  pid_t keeper_ = 0;
-  bool lost_ = false;  ///< the keeper
+  pid_t daemon_ = 0;
+  bool lost_ = false;  ///< the daemon
 };
 
 }  // namespace tagwrench

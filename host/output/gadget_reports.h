@@ -12,7 +12,7 @@ namespace tagwrench {
 
 class GadgetReports {
  public:
-  static constexpr std::size_t kLongest = 64;
+  static constexpr std::size_t kMax = 64;
 
   /// All at rest, nothing owed.
   explicit GadgetReports(GadgetFace face) noexcept;
@@ -40,8 +40,8 @@ class GadgetReports {
     bool stream = false;  ///< motion and samples: every one counts, even if it repeats the last
     bool axes = false;
     bool owed = false;
-    std::array<std::uint8_t, kLongest> newest{};
-    std::array<std::uint8_t, kLongest> last{};  ///< taken
+    std::array<std::uint8_t, kMax> newest{};
+    std::array<std::uint8_t, kMax> last{};  ///< taken
 
     std::span<const std::uint8_t> bytes() const { return {newest.data(), size}; }
   };
@@ -51,7 +51,7 @@ class GadgetReports {
   GadgetFace face_;
   std::array<Kind, 2> kinds_;
   std::size_t count_ = 0;
-  std::array<std::uint8_t, kLongest> out_{};
+  std::array<std::uint8_t, kMax> out_{};
 };
 
 }  // namespace tagwrench

@@ -26,8 +26,8 @@ constexpr const char* kConfiguration = "configs/c.1";
 // bmAttributes and bMaxPower (USB 2.0, table 9-10): what a port gives at most, or next to nothing.
 constexpr int kBusPowered = 0x80;
 constexpr int kSelfPowered = 0xc0;
-constexpr int kMostFromBus_mA = 500;
-constexpr int kLeastFromBus_mA = 2;
+constexpr int kMaxFromBus_mA = 500;
+constexpr int kMinFromBus_mA = 2;
 
 std::string hex(std::uint16_t number) { return fmt::format("0x{:04x}", number); }
 
@@ -189,7 +189,7 @@ void GadgetTree::make(const GadgetSpec& spec) {
   set(configuration + "/bmAttributes",
       std::to_string(spec.self_powered ? kSelfPowered : kBusPowered));
   set(configuration + "/MaxPower",
-      std::to_string(spec.self_powered ? kLeastFromBus_mA : kMostFromBus_mA));
+      std::to_string(spec.self_powered ? kMinFromBus_mA : kMaxFromBus_mA));
   folder(configuration + "/strings/0x409");
   set(configuration + "/strings/0x409/configuration", face_product(spec.face));
   const std::string member = fmt::format("{}/hid.{}", configuration, face_name(spec.face));

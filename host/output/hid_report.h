@@ -84,7 +84,7 @@ std::vector<std::uint8_t> wrench_descriptor();
 /// Rounds to the nearest count, clamps to the field. A wrench or sigma that is not finite is sent
 /// as zeros and `doubtful`.
 WrenchReport wrench_report(const Sample& sample) noexcept;
-/// What the dead man's guardian sends: zeros, status `lost`.
+/// What the watchdog's watchdog sends: zeros, status `lost`.
 WrenchReport neutral_wrench_report() noexcept;
 
 }  // namespace tagwrench

@@ -86,7 +86,7 @@ JoystickOutput::JoystickOutput(const JoystickOptions& options) {
 
 JoystickOutput::~JoystickOutput() {
   JoystickOutput::move(Sample{});
-  order(uinput_.get(), UI_DEV_DESTROY);  // the guardian's duplicate of the fd would keep it alive
+  order(uinput_.get(), UI_DEV_DESTROY);  // the watchdog's duplicate of the fd would keep it alive
 }
 
 SendStatus JoystickOutput::move(const Sample& sample) noexcept {
@@ -94,7 +94,7 @@ SendStatus JoystickOutput::move(const Sample& sample) noexcept {
   std::uint32_t pressed = 0;
   if (carries_numbers(shown_status(sample))) {
     pressed = sample.buttons;
-    counts = to_counts(sample.motion, kJoystickLimit_counts);
+    counts = to_counts(sample.deflection, kJoystickLimit_counts);
   }
   const JoystickEvents events = joystick_events(counts, pressed);
   const auto write = [&] { return ::write(uinput_.get(), events.data(), sizeof events); };
@@ -109,7 +109,7 @@ std::string JoystickOutput::failure() const {
                      std::strerror(error_));
 }
 
-void JoystickOutput::add_to(std::vector<DeadManDevice>& devices) const {
+void JoystickOutput::add_to(std::vector<WatchdogDevice>& devices) const {
   const JoystickEvents neutral = joystick_events({}, 0);
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(neutral.data());
   devices.push_back({uinput_.get(), {{bytes, bytes + sizeof neutral}}, {}});

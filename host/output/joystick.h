@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "host/core/os/unique_fd.h"
-#include "host/output/dead_man.h"
 #include "host/output/hid_report.h"
 #include "host/output/output.h"
+#include "host/output/watchdog.h"
 
 namespace tagwrench {
 
@@ -33,8 +33,8 @@ inline constexpr std::size_t kJoystickButtons = 8;
 using JoystickEvents = std::array<input_event, 6 + kJoystickButtons + 1>;
 JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noexcept;
 
-/// Sends Sample::motion as +-32767, and the buttons. No dither: games read the state of an axis,
-/// not its events.
+/// Sends Sample::deflection as +-32767, and the buttons. No dither: games read the state of an
+/// axis, not its events.
 class JoystickOutput : public Output {
  public:
   /// Throws ConfigError if /dev/uinput is not usable.
@@ -44,7 +44,7 @@ class JoystickOutput : public Output {
   SendStatus move(const Sample& sample) noexcept override;
   std::string failure() const override;
 
-  void add_to(std::vector<DeadManDevice>& devices) const;
+  void add_to(std::vector<WatchdogDevice>& devices) const;
 
  private:
   UniqueFd uinput_;

@@ -28,8 +28,8 @@ class Output {
   /// Every sample, once. One whose status does not carry numbers is a neutral output: zeros.
   virtual SendStatus send(const Sample&) noexcept { return SendStatus::ok; }
 
-  /// What input devices show: Sample::motion and Sample::buttons. With every sample, or at a rate
-  /// of its own, then with what the motion is at that time. Neutral as above.
+  /// What input devices show: Sample::deflection and Sample::buttons. With every sample, or at a
+  /// rate of its own, then with what the motion is at that time. Neutral as above.
   virtual SendStatus move(const Sample&) noexcept { return SendStatus::ok; }
 
   /// One line about the last failed send() or move().

@@ -17,9 +17,9 @@ namespace {
 void tell_systemd(const char* state) noexcept { sd_notify(0, state); }
 
 void tell_status(const char* before, std::string_view status) noexcept {
-  constexpr int kMost = 200;
+  constexpr int kMax = 200;
   sd_notifyf(0, "%sSTATUS=%.*s", before,
-             static_cast<int>(status.size() < kMost ? status.size() : kMost), status.data());
+             static_cast<int>(status.size() < kMax ? status.size() : kMax), status.data());
 }
 
 /// Rings twice in the time in which systemd wants a sign of life, as sd_watchdog_enabled(3)

@@ -11,7 +11,7 @@ inline Status shown_status(const Sample& sample) {
   if (!carries_numbers(sample.status)) return sample.status;
   const bool finite = sample.displacement.allFinite() && sample.displacement_sigma.allFinite() &&
                       sample.wrench.allFinite() && sample.wrench_sigma.allFinite() &&
-                      sample.motion.allFinite();
+                      sample.deflection.allFinite();
   return finite ? sample.status : Status::doubtful;
 }
 

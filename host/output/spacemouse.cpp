@@ -46,7 +46,7 @@ SendStatus SpacemouseOutput::move(const Sample& sample) noexcept {
   std::uint32_t pressed = 0;
   if (carries_numbers(shown_status(sample))) {
     pressed = sample.buttons;
-    wanted = to_counts(sample.motion, kSpacemouseLimit_counts);
+    wanted = to_counts(sample.deflection, kSpacemouseLimit_counts);
     if (vendor_ != k3dconnexion) wanted = to_spnav_order(wanted);
   }
   const Counts6 counts = dithered(wanted, last_);
@@ -76,10 +76,10 @@ std::string SpacemouseOutput::spacenavd_advice() const {
          hex_id(vendor_, product_);
 }
 
-void SpacemouseOutput::add_to(std::vector<DeadManDevice>& devices) const {
+void SpacemouseOutput::add_to(std::vector<WatchdogDevice>& devices) const {
   const SpacemouseReport rest = spacemouse_report({});
   const SpacemouseButtonReport released = spacemouse_button_report(0);
-  devices.push_back(device_.dead_man_device({rest, released}));
+  devices.push_back(device_.watchdog_device({rest, released}));
 }
 
 }  // namespace tagwrench

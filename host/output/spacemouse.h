@@ -20,8 +20,8 @@ struct SpacemouseOptions {
   std::string serial = "tagwrench-0";
 };
 
-/// Sends Sample::motion as +-350 counts, and buttons when they change. Zero at rest is exact and
-/// sent with every move, so that a slow hidraw reader that lost reports still learns of the
+/// Sends Sample::deflection as +-350 counts, and buttons when they change. Zero at rest is exact
+/// and sent with every move, so that a slow hidraw reader that lost reports still learns of the
 /// release. Off-centre every move makes an event (see dithered()). A status that carries no numbers
 /// is zeros at once.
 class SpacemouseOutput : public Output {
@@ -43,7 +43,7 @@ class SpacemouseOutput : public Output {
   /// What to add to /etc/spnavrc for an own id; empty where spacenavd finds the device by itself.
   std::string spacenavd_advice() const;
 
-  void add_to(std::vector<DeadManDevice>& devices) const;
+  void add_to(std::vector<WatchdogDevice>& devices) const;
 
  private:
   SpacemouseOutput(UhidDevice device, const SpacemouseOptions& options);

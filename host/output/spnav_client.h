@@ -58,7 +58,7 @@ class SpnavClient {
   TimePoint silent_until_;  ///< unless it speaks before
   bool behind_ = false;     ///< an event was dropped since the last room
   bool gone_ = false;
-  std::array<std::uint8_t, SpnavDialogue::kMostAnswers * sizeof(SpnavRecord)> rest_{};
+  std::array<std::uint8_t, SpnavDialogue::kMaxAnswers * sizeof(SpnavRecord)> rest_{};
   std::size_t rest_size_ = 0;  ///< bytes of rest_: the end of a record or answer that is under way
 };
 

@@ -51,7 +51,7 @@ bool served(const std::string& path) noexcept {
       path, what, std::strerror(error)));
 }
 
-/// Holds the folder while sockets come and go in it, so that two keepers do not take each other's.
+/// Holds the folder while sockets come and go in it, so that two daemons do not take each other's.
 UniqueFd lock_folder(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -168,7 +168,7 @@ void SpnavSockets::remove() const noexcept {
     const std::string beside = bridge_path(path);
     if (file_number(beside) == bridge_file) ::unlink(beside.c_str());
   } catch (const std::exception&) {
-    return;  // out of memory: a left-over, which the next keeper takes away
+    return;  // out of memory: a left-over, which the next daemon takes away
   }
 }
 

@@ -1,6 +1,6 @@
-// What the keeper of the spnav socket and the bridge say to each other, and the sockets of both.
+// What the daemon of the spnav socket and the bridge say to each other, and the sockets of both.
 //
-// The socket that programs connect to is held by a small process of its own, the keeper, so that
+// The socket that programs connect to is held by a small process of its own, the daemon, so that
 // they stay connected while the bridge restarts: FreeCAD spins at 100 % CPU when its server ends,
 // and neither it nor Blender connects again. Beside PATH lies PATH.bridge, a SOCK_SEQPACKET socket
 // for one bridge, its owner's alone. Whoever connects there is told at once whether it is welcome,
@@ -23,7 +23,7 @@
 
 namespace tagwrench {
 
-/// The last byte is the version: a keeper may be older than the bridge.
+/// The last byte is the version: a daemon may be older than the bridge.
 enum class SpnavWord : std::uint32_t {
   greeting = 0x74776701,
   hello = 0x74776801,
@@ -31,23 +31,23 @@ enum class SpnavWord : std::uint32_t {
   program = 0x74777001,
 };
 
-/// Keeper to bridge, first of all.
+/// Daemon to bridge, first of all.
 struct SpnavGreeting {
   static constexpr SpnavWord kWord = SpnavWord::greeting;
   SpnavWord word = kWord;
-  std::int32_t keeper_pid = 0;
+  std::int32_t daemon_pid = 0;
   std::uint32_t refused = 0;      ///< another bridge feeds it already:
   std::int32_t other_bridge = 0;  ///< this one; 0 if unknown
 };
 
-/// Bridge to keeper: what the device is.
+/// Bridge to daemon: what the device is.
 struct SpnavHello {
   static constexpr SpnavWord kWord = SpnavWord::hello;
   SpnavWord word = kWord;
   SpnavDevice device;
 };
 
-/// Bridge to keeper: what it shows. Off-centre or with a button pressed it must come again in time.
+/// Bridge to daemon: what it shows. Off-centre or with a button pressed it must come again in time.
 struct SpnavUpdate {
   static constexpr SpnavWord kWord = SpnavWord::update;
   SpnavWord word = kWord;
@@ -61,7 +61,7 @@ struct SpnavPeer {
   std::array<char, 16> name{};  ///< as the kernel has it, "freecad" say; ends with a zero
 };
 
-/// Keeper to bridge: a program has connected, or has gone.
+/// Daemon to bridge: a program has connected, or has gone.
 struct SpnavProgram {
   static constexpr SpnavWord kWord = SpnavWord::program;
   SpnavWord word = kWord;
@@ -105,7 +105,7 @@ inline constexpr const char* kSpnavSystemSocket = "/var/run/spnav.sock";
 /// libspnav's own place if no other server has it. Throws ConfigError: no place, path too long.
 std::string spnav_socket_path(const std::string& given);
 
-/// The two sockets of a keeper, listening. Their files are removed by remove(), if they are still
+/// The two sockets of a daemon, listening. Their files are removed by remove(), if they are still
 /// ours.
 struct SpnavSockets {
   std::string path;
@@ -117,15 +117,15 @@ struct SpnavSockets {
   void remove() const noexcept;
 };
 
-/// Makes them: for their owner alone, at libspnav's own path for everybody. A left-over of a keeper
-/// that was killed is replaced. Nothing if a keeper serves the path already. Throws ConfigError: no
+/// Makes them: for their owner alone, at libspnav's own path for everybody. A left-over of a daemon
+/// that was killed is replaced. Nothing if a daemon serves the path already. Throws ConfigError: no
 /// such folder, no permission, another server or a file is there.
 std::optional<SpnavSockets> listen_spnav(const std::string& path);
 
 /// Those that were inherited as descriptors.
 SpnavSockets inherited_spnav(const std::string& path, int programs, int bridge);
 
-/// Connects to the keeper; -1 if there is none.
+/// Connects to the daemon; -1 if there is none.
 UniqueFd connect_spnav_bridge(const std::string& path) noexcept;
 
 }  // namespace tagwrench

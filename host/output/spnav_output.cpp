@@ -22,14 +22,14 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-constexpr std::size_t kMostPrograms = 128;
+constexpr std::size_t kMaxPrograms = 128;
 constexpr int kAttempts = 3;
-constexpr milliseconds kStartTime{10'000};  // of a keeper on a busy machine
+constexpr milliseconds kStartTime{10'000};  // of a daemon on a busy machine
 constexpr Duration kBetweenAttempts = std::chrono::seconds(1);
 // As the pipeline has them: a move that is this late is missing, and a camera that is slower than
 // this is lost.
 constexpr Duration kGrace = milliseconds(60);
-constexpr Duration kShortestInterval = milliseconds(8);
+constexpr Duration kMinInterval = milliseconds(8);
 constexpr Duration kSlowestInterval = milliseconds(250);
 
 SpnavHello hello_of(const SpnavOptions& options) noexcept {
@@ -59,15 +59,15 @@ SpnavOutput::SpnavOutput(const SpnavOptions& options)
     : options_(options),
       path_(spnav_socket_path(options.socket)),
       intervals_{milliseconds(40), milliseconds(40), milliseconds(40)} {
-  programs_.reserve(kMostPrograms);
-  // A keeper that is just about to end, or to start, takes another attempt.
+  programs_.reserve(kMaxPrograms);
+  // A daemon that is just about to end, or to start, takes another attempt.
   for (int i = 0; i < kAttempts && !welcome_ && !other_bridge_; ++i) {
-    if (reach_keeper()) await_greeting();
+    if (reach_daemon()) await_greeting();
   }
   if (other_bridge_) throw ConfigError(refusal());
   if (!welcome_) {
     throw ConfigError(fmt::format(
-        "spnav socket {}: its keeper does not answer; `tagwrench spnav --socket {}` in another "
+        "spnav socket {}: its daemon does not answer; `tagwrench spnav --socket {}` in another "
         "terminal says why",
         path_, path_));
   }
@@ -75,30 +75,30 @@ SpnavOutput::SpnavOutput(const SpnavOptions& options)
 
 SpnavOutput::~SpnavOutput() {
   if (welcome_) send_spnav(link_.get(), SpnavUpdate{});
-  if (keeper_ > 0) ::waitpid(keeper_, nullptr, WNOHANG);
+  if (daemon_ > 0) ::waitpid(daemon_, nullptr, WNOHANG);
 }
 
-/// Connects, to a keeper that is started if there is none.
-bool SpnavOutput::reach_keeper() {
+/// Connects, to a daemon that is started if there is none.
+bool SpnavOutput::reach_daemon() {
   link_ = connect_spnav_bridge(path_);
   if (link_) return true;
-  if (const std::optional<SpnavSockets> sockets = listen_spnav(path_)) start_keeper(*sockets);
+  if (const std::optional<SpnavSockets> sockets = listen_spnav(path_)) start_daemon(*sockets);
   link_ = connect_spnav_bridge(path_);
   return static_cast<bool>(link_);
 }
 
-void SpnavOutput::start_keeper(const SpnavSockets& sockets) {
-  if (keeper_ > 0) ::waitpid(keeper_, nullptr, WNOHANG);
-  keeper_ = 0;
+void SpnavOutput::start_daemon(const SpnavSockets& sockets) {
+  if (daemon_ > 0) ::waitpid(daemon_, nullptr, WNOHANG);
+  daemon_ = 0;
   const int inherited[] = {sockets.programs.get(), sockets.bridge.get()};
-  const int failed = spawn_daemon(keeper_, options_.program,
+  const int failed = spawn_daemon(daemon_, options_.program,
                                   {"tagwrench", "spnav", "--socket", path_, "--inherited",
                                    fmt::format("{},{}", kFirstDaemonFd, kFirstDaemonFd + 1)},
                                   inherited, DaemonSignals::delivered);
   if (failed == 0) return;
   sockets.remove();
   throw ConfigError(
-      fmt::format("spnav socket {}: its keeper {} cannot be started: {}; end other "
+      fmt::format("spnav socket {}: its daemon {} cannot be started: {}; end other "
                   "programs, or run without the output spnav",
                   path_, options_.program, std::strerror(failed)));
 }
@@ -119,10 +119,10 @@ SendStatus SpnavOutput::move(const Sample& sample) noexcept {
   SpnavUpdate update;
   update.valid_ms = valid_ms(now);
   if (carries_numbers(shown_status(sample))) {
-    update.state.motion = spnav_counts(sample.motion);
+    update.state.motion = spnav_counts(sample.deflection);
     update.state.buttons = sample.buttons & ((std::uint32_t{1} << kSpnavButtons) - 1);
   }
-  if (!link_) restart_keeper(now);
+  if (!link_) restart_daemon(now);
   if (!welcome_) return SendStatus::skipped;
   const SpnavState rest;
   if (update.state == rest && last_ == rest) return SendStatus::ok;
@@ -134,7 +134,7 @@ SendStatus SpnavOutput::move(const Sample& sample) noexcept {
 /// Until when this move holds: the median of three intervals, and some grace.
 std::uint32_t SpnavOutput::valid_ms(TimePoint now) noexcept {
   intervals_ = {intervals_[1], intervals_[2],
-                std::clamp<Duration>(now - last_move_, kShortestInterval, kSlowestInterval)};
+                std::clamp<Duration>(now - last_move_, kMinInterval, kSlowestInterval)};
   last_move_ = now;
   std::array<Duration, 3> sorted = intervals_;
   std::sort(sorted.begin(), sorted.end());
@@ -142,11 +142,11 @@ std::uint32_t SpnavOutput::valid_ms(TimePoint now) noexcept {
 }
 
 /// At most once a second; what is in the way may go away.
-bool SpnavOutput::restart_keeper(TimePoint now) noexcept {
+bool SpnavOutput::restart_daemon(TimePoint now) noexcept {
   if (now < next_attempt_) return false;
   next_attempt_ = now + kBetweenAttempts;
   try {
-    return reach_keeper();
+    return reach_daemon();
   } catch (const std::exception&) {
     return false;
   }
@@ -172,25 +172,25 @@ std::string_view SpnavOutput::service() noexcept {
   if (!link_) return {};
   std::array<std::uint8_t, kSpnavLongestMessage> buffer;
   const SpnavReceived received = receive_spnav(link_.get(), buffer);
-  if (!received.open) return lost_keeper();
+  if (!received.open) return lost_daemon();
   if (received.bytes.empty()) return {};
   if (const auto greeting = spnav_message<SpnavGreeting>(received.bytes)) return take(*greeting);
   if (const auto program = spnav_message<SpnavProgram>(received.bytes)) return take(*program);
-  lost_keeper();
-  return write_line(news_,
-                    "spnav: the keeper is of another version of tagwrench; end it with `pkill "
+  lost_daemon();
+  return write_line(status_line_,
+                    "spnav: the daemon is of another version of tagwrench; end it with `pkill "
                     "tw-spnav`");
 }
 
-std::string_view SpnavOutput::lost_keeper() noexcept {
+std::string_view SpnavOutput::lost_daemon() noexcept {
   const bool was_welcome = welcome_;
   link_.reset();
   welcome_ = false;
   last_ = {};
   programs_.clear();
   if (!was_welcome) return {};
-  return write_line(news_,
-                    "spnav: the keeper of the socket has ended; starting another. Programs that "
+  return write_line(status_line_,
+                    "spnav: the daemon of the socket has ended; starting another. Programs that "
                     "were connected find it when they are started again");
 }
 
@@ -210,13 +210,14 @@ std::string_view SpnavOutput::take(const SpnavProgram& program) noexcept {
   std::replace_if(
       peer.name.begin(), peer.name.end() - 1, [](char c) { return c > 0 && c < ' '; }, '?');
   if (program.connected != 0) {
-    if (programs_.size() < kMostPrograms) programs_.push_back(peer);
-    return write_line(news_, "spnav: {} (process {}) has connected", peer.name.data(), peer.pid);
+    if (programs_.size() < kMaxPrograms) programs_.push_back(peer);
+    return write_line(status_line_, "spnav: {} (process {}) has connected", peer.name.data(),
+                      peer.pid);
   }
   const auto it = std::find_if(programs_.begin(), programs_.end(),
                                [&](const SpnavPeer& known) { return known.pid == peer.pid; });
   if (it != programs_.end()) programs_.erase(it);
-  return write_line(news_, "spnav: {} (process {}) has gone", peer.name.data(), peer.pid);
+  return write_line(status_line_, "spnav: {} (process {}) has gone", peer.name.data(), peer.pid);
 }
 
 }  // namespace tagwrench

@@ -1,5 +1,5 @@
 // The spnav socket without spacenavd and without a kernel device: for machines that have no uhid,
-// sandboxes and remote desktops. It is held by a keeper process (spnav_link.h), which this starts
+// sandboxes and remote desktops. It is held by a daemon process (spnav_link.h), which this starts
 // if there is none, and which stays when the bridge ends.
 #pragma once
 
@@ -23,26 +23,26 @@ struct SpnavOptions {
   std::uint16_t vendor = 0x256f;
   std::uint16_t product = 0xc62e;
   std::string name = "tagwrench SpaceMouse";
-  /// Program whose verb `spnav` is the keeper.
+  /// Program whose verb `spnav` is the daemon.
   std::string program = "/proc/self/exe";
 };
 
-/// Sends Sample::motion as +-500 counts in spnav's axes: an event for every move off-centre, one
-/// for the return to zero, none at rest. FreeCAD turns by counts times events, so moves at a steady
-/// rate make its speed. Should the bridge hang or die, the keeper goes neutral 60 ms after the move
-/// that should have come. Should the keeper die, another one is started; programs do not connect to
-/// it by themselves.
+/// Sends Sample::deflection as +-500 counts in spnav's axes: an event for every move off-centre,
+/// one for the return to zero, none at rest. FreeCAD turns by counts times events, so moves at a
+/// steady rate make its speed. Should the bridge hang or die, the daemon goes neutral 60 ms after
+/// the move that should have come. Should the daemon die, another one is started; programs do not
+/// connect to it by themselves.
 class SpnavOutput : public Output {
  public:
   /// Throws ConfigError: no place for the socket, another server has it, another bridge feeds its
-  /// keeper, the keeper cannot be started.
+  /// daemon, the daemon cannot be started.
   explicit SpnavOutput(const SpnavOptions& options);
   ~SpnavOutput() override;
 
   SendStatus move(const Sample& sample) noexcept override;
   std::string failure() const override;
   int poll_fd() const noexcept override { return link_.get(); }
-  /// Programs that come and go, and the keeper's end.
+  /// Programs that come and go, and the daemon's end.
   std::string_view service() noexcept override;
 
   /// Where programs connect, as an absolute path.
@@ -53,11 +53,11 @@ class SpnavOutput : public Output {
   const std::vector<SpnavPeer>& programs() const noexcept { return programs_; }
 
  private:
-  bool reach_keeper();
-  void start_keeper(const SpnavSockets& sockets);
+  bool reach_daemon();
+  void start_daemon(const SpnavSockets& sockets);
   void await_greeting();
-  bool restart_keeper(TimePoint now) noexcept;
-  std::string_view lost_keeper() noexcept;
+  bool restart_daemon(TimePoint now) noexcept;
+  std::string_view lost_daemon() noexcept;
   std::string_view take(const SpnavGreeting& greeting) noexcept;
   std::string_view take(const SpnavProgram& program) noexcept;
   std::string refusal() const;
@@ -66,15 +66,15 @@ class SpnavOutput : public Output {
   SpnavOptions options_;
   std::string path_;
   UniqueFd link_;
-  bool welcome_ = false;  ///< the keeper takes what is sent
+  bool welcome_ = false;  ///< the daemon takes what is sent
   std::optional<std::int32_t> other_bridge_;
-  pid_t keeper_ = 0;  ///< if it is a child of ours
-  SpnavState last_;   ///< what the keeper has
+  pid_t daemon_ = 0;  ///< if it is a child of ours
+  SpnavState last_;   ///< what the daemon has
   TimePoint last_move_{};
   std::array<Duration, 3> intervals_;  ///< the last three between moves
   TimePoint next_attempt_{};
   std::vector<SpnavPeer> programs_;
-  std::array<char, 256> news_{};  ///< the last that service() said
+  std::array<char, 256> status_line_{};  ///< the last that service() said
 };
 
 }  // namespace tagwrench

@@ -74,7 +74,7 @@ std::span<const std::uint8_t> SpnavDialogue::take(Bytes bytes, const SpnavDevice
   return answer(device, path);
 }
 
-/// Version 0: the wish for another version, which is a NaN as a number, or a sensitivity.
+/// Version 0: the request for another version, which is a NaN as a number, or a sensitivity.
 std::span<const std::uint8_t> SpnavDialogue::take_word() noexcept {
   std::uint32_t word = 0;
   std::memcpy(&word, input_.data(), sizeof word);
@@ -89,12 +89,12 @@ std::span<const std::uint8_t> SpnavDialogue::take_word() noexcept {
 }
 
 /// libspnav 1.0 sends half a double in place of a float, so that 1 arrives as 0 and 0.7 as 3e23.
-/// Such numbers are nobody's wish.
+/// Such numbers are nobody's request.
 bool SpnavDialogue::set_sensitivity(float sensitivity) noexcept {
-  constexpr float kLeast = 1e-3F;
-  constexpr float kMost = 1e3F;
+  constexpr float kMin = 1e-3F;
+  constexpr float kMax = 1e3F;
   const float size = std::abs(sensitivity);
-  if (!(size >= kLeast && size <= kMost)) return false;
+  if (!(size >= kMin && size <= kMax)) return false;
   sensitivity_ = sensitivity;
   return true;
 }
@@ -159,7 +159,7 @@ std::span<const std::uint8_t> SpnavDialogue::reply(std::int32_t status) noexcept
 /// 24 bytes a record; the last word counts those that are left, and marks all records but the
 /// first.
 std::span<const std::uint8_t> SpnavDialogue::reply_text(std::string_view text) noexcept {
-  text = text.substr(0, kMostAnswers * kTextInRecord);
+  text = text.substr(0, kMaxAnswers * kTextInRecord);
   if (text.empty()) return reply(kFailed);
   std::size_t records = 0;
   for (; !text.empty(); ++records) {

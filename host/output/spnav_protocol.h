@@ -58,7 +58,7 @@ class SpnavDialogue {
   enum Events : std::uint32_t { kMotion = 1, kButton = 2, kDevice = 4 };
 
   /// The longest answer, a string of 107 bytes.
-  static constexpr std::size_t kMostAnswers = 5;
+  static constexpr std::size_t kMaxAnswers = 5;
 
   /// Bytes that are missing of the next word or request, 1 to 32.
   std::size_t wanted() const noexcept { return (version_ == 0 ? 4 : 32) - held_; }
@@ -91,7 +91,7 @@ class SpnavDialogue {
   std::array<std::uint8_t, 32> input_{};
   std::size_t held_ = 0;  ///< bytes of input_
   SpnavRecord request_{};
-  std::array<SpnavRecord, kMostAnswers> answers_{};
+  std::array<SpnavRecord, kMaxAnswers> answers_{};
 };
 
 }  // namespace tagwrench

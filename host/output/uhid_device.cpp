@@ -212,9 +212,9 @@ std::optional<HidOutputReport> UhidDevice::next_output() noexcept {
   return std::nullopt;
 }
 
-DeadManDevice UhidDevice::dead_man_device(
+WatchdogDevice UhidDevice::watchdog_device(
     std::initializer_list<std::span<const std::uint8_t>> neutral) const {
-  DeadManDevice device;
+  WatchdogDevice device;
   device.fd = uhid_.get();
   for (const std::span<const std::uint8_t> report : neutral) {
     ShortInput input;

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "host/core/os/unique_fd.h"
-#include "host/output/dead_man.h"
 #include "host/output/output.h"
+#include "host/output/watchdog.h"
 
 namespace tagwrench {
 
@@ -50,7 +50,7 @@ class UhidDevice {
 
   UhidDevice(UhidDevice&&) = default;
   UhidDevice& operator=(UhidDevice&&) = delete;
-  /// Destroys the device; the guardian's duplicate of the fd cannot keep it alive.
+  /// Destroys the device; the watchdog's duplicate of the fd cannot keep it alive.
   ~UhidDevice();
 
   /// Sends one input report, report id first, at most 64 bytes. Never blocks, never queues.
@@ -66,8 +66,9 @@ class UhidDevice {
   /// One line about the last failed send().
   std::string failure() const;
 
-  /// For the guardian: these input reports, then the device's end.
-  DeadManDevice dead_man_device(std::initializer_list<std::span<const std::uint8_t>> neutral) const;
+  /// For the watchdog: these input reports, then the device's end.
+  WatchdogDevice watchdog_device(
+      std::initializer_list<std::span<const std::uint8_t>> neutral) const;
 
  private:
   void create(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor);

@@ -30,8 +30,8 @@ std::string_view WrenchHidOutput::service() noexcept {
   return {};
 }
 
-void WrenchHidOutput::add_to(std::vector<DeadManDevice>& devices) const {
-  devices.push_back(device_.dead_man_device({neutral_wrench_report()}));
+void WrenchHidOutput::add_to(std::vector<WatchdogDevice>& devices) const {
+  devices.push_back(device_.watchdog_device({neutral_wrench_report()}));
 }
 
 }  // namespace tagwrench

@@ -33,7 +33,7 @@ class WrenchHidOutput : public Output {
   int poll_fd() const noexcept override { return device_.fd(); }
   std::string_view service() noexcept override;
 
-  void add_to(std::vector<DeadManDevice>& devices) const;
+  void add_to(std::vector<WatchdogDevice>& devices) const;
 
  private:
   UhidDevice device_;

@@ -8,8 +8,8 @@
 namespace tagwrench::record {
 namespace {
 
-constexpr int kLongestValue = 256 << 20;  ///< bytes; a damaged file may claim any length
-constexpr int kPatience_ms = 2000;        ///< with somebody else's lock
+constexpr int kMaxValue = 256 << 20;  ///< bytes; a damaged file may claim any length
+constexpr int kPatience_ms = 2000;    ///< with somebody else's lock
 
 }  // namespace
 
@@ -26,7 +26,7 @@ Database::Database(const std::filesystem::path& path, Mode mode) {
   const int code = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);
   if (code != SQLITE_OK) fail(code);
-  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kLongestValue);
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kMaxValue);
   sqlite3_busy_timeout(handle, kPatience_ms);
   // A file from elsewhere may hold views and triggers that do what nobody expects.
   sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
@@ -43,8 +43,8 @@ void Database::fail(int code) const {
   if (error != 0 && of_the_system) what += std::string(", ") + std::strerror(error);
   if (error == 0 && of_the_system) what += " (SQLite " + std::to_string(code) + ")";
   // It may quote what a damaged file holds.
-  constexpr std::size_t kLongest = 200;
-  what = what.substr(0, kLongest);
+  constexpr std::size_t kMax = 200;
+  what = what.substr(0, kMax);
   for (char& c : what) {
     if (static_cast<unsigned char>(c) < ' ' || static_cast<unsigned char>(c) > '~') c = ' ';
   }

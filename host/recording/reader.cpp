@@ -15,7 +15,7 @@
 namespace tagwrench::record {
 namespace {
 
-constexpr int kMostKeys = 1000;
+constexpr int kMaxKeys = 1000;
 
 /// A crash leaves FILE-wal beside the file. Where nobody else has it open and the folder can be
 /// written, it becomes one file again.
@@ -165,9 +165,9 @@ void RecordingReader::read_head() {
   std::string keep;
   Statement meta(database, "SELECT key, CAST(value AS TEXT) FROM meta");
   for (int keys = 0; meta.step(); ++keys) {
-    if (keys == kMostKeys) damaged("its head does not end");
-    const std::string key(meta.text(0).substr(0, kLongestText));
-    const std::string value(meta.text(1).substr(0, kLongestText));
+    if (keys == kMaxKeys) damaged("its head does not end");
+    const std::string key(meta.text(0).substr(0, kMaxText));
+    const std::string value(meta.text(1).substr(0, kMaxText));
     std::int64_t number = 0;
     std::from_chars(value.data(), value.data() + value.size(), number);
     if (key == "created")
@@ -189,7 +189,7 @@ void RecordingReader::read_head() {
     else
       head_.more.emplace_back(key, value);
   }
-  if (width < 1 || width > kLargest_px || height < 1 || height > kLargest_px)
+  if (width < 1 || width > kMax_px || height < 1 || height > kMax_px)
     damaged(fmt::format("its frames have the size {}x{}", width, height));
   if (period < 1 || period > 1'000'000'000'000) damaged(fmt::format("period_ns is {}", period));
   if (!keep_of(keep)) damaged(fmt::format("keep is '{}'", keep.substr(0, 40)));
@@ -200,12 +200,12 @@ void RecordingReader::read_head() {
 
   Statement files(database, "SELECT role, name, content FROM files");
   for (int roles = 0; files.step(); ++roles) {
-    if (roles == kMostKeys) damaged("its files do not end");
+    if (roles == kMaxKeys) damaged("its files do not end");
     const std::string role(files.text(0));
     const auto bytes = files.blob(2);
     std::string content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     if (role == "sensor.yaml") {
-      head_.sensor_name = std::string(files.text(1).substr(0, kLongestText));
+      head_.sensor_name = std::string(files.text(1).substr(0, kMaxText));
       head_.sensor_yaml = std::move(content);
     } else if (role == "appearance") {
       head_.appearance = std::move(content);

@@ -35,9 +35,9 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "blobs are copied as they are");
 
 /// ns, so that a damaged file's times can be subtracted and added; 95 years.
-constexpr std::int64_t kLongest_ns = 3'000'000'000'000'000'000;
+constexpr std::int64_t kMax_ns = 3'000'000'000'000'000'000;
 
-Duration duration(std::int64_t ns) { return Duration(std::clamp(ns, -kLongest_ns, kLongest_ns)); }
+Duration duration(std::int64_t ns) { return Duration(std::clamp(ns, -kMax_ns, kMax_ns)); }
 
 std::optional<Status> status_of(std::string_view text) {
   for (const Status s :
@@ -127,7 +127,7 @@ Entry frame_entry(const Statement& row, const Head& head) {
     entry.raw.fourcc = entry.raw.fourcc << 8 | static_cast<std::uint8_t>(code[i]);
   entry.crop = code == "CROP";
   const std::int64_t stride = row.integer(5);
-  entry.raw.stride = stride < 0 || stride > 8 * kLargest_px ? 0 : static_cast<int>(stride);
+  entry.raw.stride = stride < 0 || stride > 8 * kMax_px ? 0 : static_cast<int>(stride);
   entry.first = region(row, 6, head.width, head.height);
   entry.all = region(row, 10, head.width, head.height);
   if (!row.is_null(14)) entry.latency = duration(row.integer(14));
@@ -150,7 +150,7 @@ Entry trouble_entry(const Statement& row) {
                : kind == EventKind::disconnected ? Entry::Kind::disconnected
                                                  : Entry::Kind::reconnected;
   entry.time = time_point(row.integer(2));
-  entry.text = std::string(row.text(3).substr(0, kLongestText));
+  entry.text = std::string(row.text(3).substr(0, kMaxText));
   if (!row.is_null(4)) entry.latency = duration(row.integer(4));
   return entry;
 }
@@ -163,13 +163,13 @@ TrackRecord track_record(const Statement& row) {
   if (!status) throw impossible(fmt::format("track {} has an unknown status", record.id));
   Track& track = record.track;
   track.status = *status;
-  const std::int64_t hint = row.integer(3);
-  if (hint >= 0 && hint <= static_cast<std::int64_t>(Hint::rest_elsewhere))
-    track.hint = static_cast<Hint>(hint);
+  const std::int64_t diagnostic = row.integer(3);
+  if (diagnostic >= 0 && diagnostic <= static_cast<std::int64_t>(Diagnostic::rest_elsewhere))
+    track.diagnostic = static_cast<Diagnostic>(diagnostic);
   track.displacement = vector6(row, 4);
   read_covariance(doubles(row.blob(10)), track.covariance);
   track.residual_px = row.real(11);
-  track.residual_part = row.real(12);
+  track.residual_fraction = row.real(12);
   track.blur_px2 = row.real(13);
   track.tags_held = static_cast<std::uint8_t>(std::clamp<std::int64_t>(row.integer(14), 0, 255));
   read_corners(doubles(row.blob(15)), track);
@@ -191,7 +191,7 @@ Sample sample_record(const Statement& row) {
   sample.wrench = vector6(row, 19);
   sample.wrench_sigma = vector6(row, 25);
   sample.zero = vector6(row, 31);
-  sample.motion = vector6(row, 37);
+  sample.deflection = vector6(row, 37);
   sample.zero_state = static_cast<ZeroState>(
       std::clamp<std::int64_t>(row.integer(43), 0, static_cast<int>(ZeroState::following)));
   sample.touched = row.integer(44) != 0;
@@ -223,17 +223,17 @@ EventRecord event_record(const Statement& row) {
   const auto kind = kind_of(row.text(2));
   if (!kind) throw impossible(fmt::format("event {} is of an unknown kind", event.id));
   event.kind = *kind;
-  event.step = static_cast<int>(std::clamp<std::int64_t>(row.integer(3), -1, kHighestStep));
+  event.step = static_cast<int>(std::clamp<std::int64_t>(row.integer(3), -1, kMaxStep));
   event.value = row.integer(4);
-  event.text = std::string(row.text(5).substr(0, kLongestText));
+  event.text = std::string(row.text(5).substr(0, kMaxText));
   return event;
 }
 
 MarkRecord mark_record(const Statement& row) {
   const std::int64_t step = row.integer(2);
-  if (step < 0 || step > kHighestStep) throw impossible(fmt::format("a mark is of step {}", step));
+  if (step < 0 || step > kMaxStep) throw impossible(fmt::format("a mark is of step {}", step));
   const std::int64_t value = row.integer(3);
-  if (value < kMarkWithdrawn || value > kHighestStep)
+  if (value < kMarkWithdrawn || value > kMaxStep)
     throw impossible(fmt::format("a mark has the value {}", value));
   const auto zero = static_cast<int>(std::max<std::int64_t>(value - kMarkBegins, 0));
   return {{static_cast<int>(step), value >= kMarkBegins, time_point(row.integer(1)), row.integer(0),

@@ -11,9 +11,9 @@
 
 namespace tagwrench::record {
 
-inline constexpr std::int64_t kLargest_px = 16384;       ///< side of a picture
-inline constexpr std::size_t kLongestText = 1 << 20;     ///< bytes
-inline constexpr std::int64_t kHighestStep = 1'000'000;  ///< of a plan
+inline constexpr std::int64_t kMax_px = 16384;       ///< side of a picture
+inline constexpr std::size_t kMaxText = 1 << 20;     ///< bytes
+inline constexpr std::int64_t kMaxStep = 1'000'000;  ///< of a plan
 
 /// A mark as it was set.
 struct MarkRecord {

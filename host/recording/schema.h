@@ -21,9 +21,10 @@
 // frames     seq, t_ns, origin_ns, dropped; fourcc, stride and bytes of the frame as it came
 //            (keep: raw), or CROP and the luminance of the part all_* (keep: region), or
 //            NULL; first_* is the part that was decoded first, all_* what was decoded in the end
-// tracks     status, hint (number of tagwrench::Hint), displacement, covariance (its upper
-//            triangle, row by row, 21 numbers), residual_px, residual_part, blur_px2, tags_held,
-//            corners (for each tag 9 numbers: id, then x, y of four corners, px)
+// tracks     status, hint (number of tagwrench::Diagnostic), displacement, covariance (its
+// upper
+//            triangle, row by row, 21 numbers), residual_px, residual_fraction, blur_px2,
+//            tags_held, corners (for each tag 9 numbers: id, then x, y of four corners, px)
 // samples    as the outputs got them
 // reference  load cells (axes 1, channel) and six-axis sensors (axes 6): counts, value (N, N m),
 //            sigma, each of the `axes` first columns; sigma_ns of the time; lost_before readings

@@ -169,11 +169,11 @@ void Sink::track(std::int64_t id, const Track& track) {
   }
   track_.bind(1, id);
   track_.bind(2, std::string_view(name(track.status)));
-  track_.bind(3, static_cast<std::int64_t>(track.hint));
+  track_.bind(3, static_cast<std::int64_t>(track.diagnostic));
   bind6(track_, 4, track.displacement);
   track_.bind(10, bytes_of(covariance.data(), covariance.size()));
   track_.bind(11, track.residual_px);
-  track_.bind(12, track.residual_part);
+  track_.bind(12, track.residual_fraction);
   track_.bind(13, track.blur_px2);
   track_.bind(14, std::int64_t{track.tags_held});
   track_.bind(15, bytes_of(corners.data(), 9 * tags));
@@ -193,7 +193,7 @@ void Sink::sample(std::int64_t id, const Sample& sample) {
   bind6(sample_, 20, sample.wrench);
   bind6(sample_, 26, sample.wrench_sigma);
   bind6(sample_, 32, sample.zero);
-  bind6(sample_, 38, sample.motion);
+  bind6(sample_, 38, sample.deflection);
   sample_.bind(44, static_cast<std::int64_t>(sample.zero_state));
   sample_.bind(45, std::int64_t{sample.touched});
   sample_.execute();

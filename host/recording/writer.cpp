@@ -20,13 +20,13 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr Duration kNap = milliseconds(50);  ///< between looks at the buffer
-constexpr std::size_t kLeastBuffer = 8UL << 20;
-constexpr std::size_t kMostBuffer = 512UL << 20;
+constexpr std::size_t kMinBuffer = 8UL << 20;
+constexpr std::size_t kMaxBuffer = 512UL << 20;
 /// Of the buffer, kept for what is small, so that a disk that cannot follow costs pixels first.
 constexpr std::size_t kSpare = 2UL << 20;
-constexpr std::size_t kLongestText = 4000;
+constexpr std::size_t kMaxText = 4000;
 /// Bytes, after which a commit does not wait for its time.
-constexpr std::size_t kMostUncommitted = 8UL << 20;
+constexpr std::size_t kMaxUncommitted = 8UL << 20;
 /// What must be left on the disk so that the log can be moved into the file.
 constexpr std::uint64_t kDiskReserve = 4ULL << 20;
 
@@ -36,8 +36,8 @@ std::size_t buffer_bytes(const WriterOptions& options, const Head& head) {
   const double frame = 2.0 * std::max(head.width, 1) * std::max(head.height, 1) + 8192;
   const double seconds = std::max(1e-3, std::chrono::duration<double>(head.period).count());
   const double two_seconds = head.keep == Keep::none ? 0 : 2 * frame / seconds;
-  return kSpare + static_cast<std::size_t>(
-                      std::clamp(two_seconds, double{kLeastBuffer}, double{kMostBuffer}));
+  return kSpare +
+         static_cast<std::size_t>(std::clamp(two_seconds, double{kMinBuffer}, double{kMaxBuffer}));
 }
 
 /// The memory is taken before there is a file.
@@ -204,7 +204,7 @@ void RecordingWriter::reference(const ReferenceRecord& reading) noexcept {
 
 void RecordingWriter::event(EventKind kind, TimePoint time, std::string_view text,
                             std::int64_t value, int step) noexcept {
-  text = text.substr(0, kLongestText);
+  text = text.substr(0, kMaxText);
   Filled<EventRow>* item = put<EventRow>(text.size(), 0);
   if (item == nullptr) {
     lost_others_.fetch_add(1, std::memory_order_relaxed);
@@ -276,7 +276,7 @@ void RecordingWriter::drain(Transaction& transaction, bool all) {
     if (failed_) continue;  // emptied all the same: somebody may wait for room
     const Item& item = *reinterpret_cast<const Item*>(record.data());
     if (item.kind == ItemKind::frame && transaction.open &&
-        (transaction.age() >= options_.commit_period || transaction.bytes >= kMostUncommitted))
+        (transaction.age() >= options_.commit_period || transaction.bytes >= kMaxUncommitted))
       commit(transaction);
     if (!transaction.open) {
       sink_->begin();

@@ -38,7 +38,7 @@ void check_header(const std::filesystem::path& path, const std::vector<std::uint
 
 }  // namespace
 
-RestImage load_rest_image(const std::filesystem::path& path, const CameraModel& camera) {
+ReferenceImage load_reference_image(const std::filesystem::path& path, const CameraModel& camera) {
   std::error_code error;  // a pipe or a device may never end
   std::ifstream in;
   if (std::filesystem::is_regular_file(path, error)) in.open(path, std::ios::binary);
@@ -47,12 +47,12 @@ RestImage load_rest_image(const std::filesystem::path& path, const CameraModel& 
   check_header(path, bytes, camera);
   std::vector<std::uint16_t> counts;
   if (!decode_png(bytes, camera.width_px, camera.height_px, counts)) refuse(path, "is damaged");
-  RestImage image;
+  ReferenceImage image;
   image.width = camera.width_px;
   image.height = camera.height_px;
   image.level.reserve(counts.size());
   for (const std::uint16_t count : counts)
-    image.level.push_back(static_cast<float>(count) / kRestCountsPerLevel);
+    image.level.push_back(static_cast<float>(count) / kReferenceCountsPerLevel);
   return image;
 }
 

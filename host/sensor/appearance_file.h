@@ -10,14 +10,14 @@
 
 namespace tagwrench {
 
-inline constexpr float kRestCountsPerLevel = 256.0F;
+inline constexpr float kReferenceCountsPerLevel = 256.0F;
 
 /// Leaves `frames` at zero. Throws ConfigError, one line with path and remedy: no such file, no
 /// PNG, damaged, not 16-bit grey, not of the camera's size.
-RestImage load_rest_image(const std::filesystem::path& path, const CameraModel& camera);
+ReferenceImage load_reference_image(const std::filesystem::path& path, const CameraModel& camera);
 
 /// Replaces the file as a whole or not at all. Throws std::runtime_error if it cannot be written,
 /// std::invalid_argument for an image whose size and levels do not agree.
-void save_rest_image(const std::filesystem::path& path, const RestImage& image);
+void save_reference_image(const std::filesystem::path& path, const ReferenceImage& image);
 
 }  // namespace tagwrench

@@ -10,7 +10,7 @@
 
 namespace tagwrench {
 
-void save_rest_image(const std::filesystem::path& path, const RestImage& image) {
+void save_reference_image(const std::filesystem::path& path, const ReferenceImage& image) {
   if (image.width <= 0 || image.height <= 0 ||
       image.level.size() !=
           static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
@@ -19,7 +19,7 @@ void save_rest_image(const std::filesystem::path& path, const RestImage& image) 
   std::vector<std::uint16_t> counts(image.level.size());
   std::transform(image.level.begin(), image.level.end(), counts.begin(), [](float level) {
     return static_cast<std::uint16_t>(
-        std::clamp(std::round(level * kRestCountsPerLevel), 0.0F, 65535.0F));
+        std::clamp(std::round(level * kReferenceCountsPerLevel), 0.0F, 65535.0F));
   });
   const std::vector<std::uint8_t> bytes = encode_png(counts.data(), image.width, image.height);
   write_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});

@@ -18,9 +18,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uintmax_t kLargestFile = 16 << 20;  // a quadratic model has 0.4 MB
-constexpr double kLargest = 1e12;                  // of any number, SI ...
-constexpr double kLargestCovariance = 1e24;        // ... but its square: of N/m^2, 1 N at 1 um
+constexpr std::uintmax_t kMaxFile = 16 << 20;  // a quadratic model has 0.4 MB
+constexpr double kMax = 1e12;                  // of any number, SI ...
+constexpr double kMaxCovariance = 1e24;        // ... but its square: of N/m^2, 1 N at 1 um
 
 /// Every access checks; every complaint names the file.
 class CalibrationReader {
@@ -29,7 +29,7 @@ class CalibrationReader {
     std::error_code error;  // a pipe or a device may never end
     std::ifstream in;
     if (std::filesystem::is_regular_file(path, error)) {
-      if (std::filesystem::file_size(path, error) > kLargestFile)
+      if (std::filesystem::file_size(path, error) > kMaxFile)
         fail("is too large to be a calibration");
       in.open(path, std::ios::binary);
     }
@@ -60,7 +60,7 @@ class CalibrationReader {
     return object.is_object() && object.contains(key);
   }
 
-  double number(const json& value, const std::string& key, double largest = kLargest) const {
+  double number(const json& value, const std::string& key, double largest = kMax) const {
     if (!value.is_number()) fail(fmt::format("\"{}\" must be a number", key));
     const double out = value.get<double>();
     if (!std::isfinite(out)) fail(fmt::format("\"{}\" holds a number that is not finite", key));
@@ -70,7 +70,7 @@ class CalibrationReader {
   }
 
   std::vector<double> numbers(const json& list, const std::string& key, std::size_t count,
-                              double largest = kLargest) const {
+                              double largest = kMax) const {
     const auto refuse = [&] {
       fail(fmt::format("\"{}\" must have {} number{}", key, count, count == 1 ? "" : "s"));
     };
@@ -97,8 +97,8 @@ class CalibrationReader {
   }
 
   std::string text(const json& value, const std::string& key) const {
-    constexpr std::size_t kLongest = 10'000;
-    if (!value.is_string() || value.get_ref<const std::string&>().size() > kLongest)
+    constexpr std::size_t kMaxText = 10'000;
+    if (!value.is_string() || value.get_ref<const std::string&>().size() > kMaxText)
       fail(fmt::format("\"{}\" must be a text", key));
     return value.get<std::string>();
   }
@@ -209,7 +209,7 @@ Eigen::MatrixXd read_lower_triangle(const CalibrationReader& file, const std::st
   for (int i = 0; i < size; ++i) {
     const auto count = static_cast<std::size_t>(i) + 1;
     const std::vector<double> row =
-        file.numbers(rows[static_cast<std::size_t>(i)], key, count, kLargestCovariance);
+        file.numbers(rows[static_cast<std::size_t>(i)], key, count, kMaxCovariance);
     for (int j = 0; j <= i; ++j) out(i, j) = out(j, i) = row[static_cast<std::size_t>(j)];
   }
   check_covariance(file, key, out);
@@ -330,7 +330,7 @@ std::string completed_axes(const std::filesystem::path& path) {
 }
 
 void load_calibration(const std::string& path, const CameraModel& camera,
-                      const TargetDescription& target, const RestOptions& rest,
+                      const TargetDescription& target, const ReferenceOptions& rest,
                       WrenchModel& model) {
   const CalibrationReader file(path);
   const std::string differs = difference(read_sensor(file), identity_of(camera, target, rest));

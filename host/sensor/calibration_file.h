@@ -78,6 +78,7 @@ void save_calibration(const std::filesystem::path& path, const Calibration& cali
 /// Reads the model's numbers into `model`; leaves the tool transform alone. Throws ConfigError as
 /// read_calibration, and if it was made for another sensor or another target, saying which.
 void load_calibration(const std::string& path, const CameraModel& camera,
-                      const TargetDescription& target, const RestOptions& rest, WrenchModel& model);
+                      const TargetDescription& target, const ReferenceOptions& rest,
+                      WrenchModel& model);
 
 }  // namespace tagwrench

@@ -20,10 +20,10 @@ namespace tagwrench {
 namespace {
 
 constexpr double kMm = 1e-3;
-constexpr double kLongestFocal_px = 1e6;
+constexpr double kMaxFocal_px = 1e6;
 constexpr double kFarthestCentre_px = 1e5;
-constexpr double kSmallestTag_mm = 0.01;
-constexpr double kLargestTag_mm = 10'000;
+constexpr double kMinTag_mm = 0.01;
+constexpr double kMaxTag_mm = 10'000;
 
 Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
 
@@ -144,8 +144,8 @@ CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record, do
   CameraModel camera;
   camera.width_px = node.integer("width", 16, 16384);
   camera.height_px = node.integer("height", 16, 16384);
-  camera.fx_px = node.within("fx", 1, kLongestFocal_px);
-  camera.fy_px = node.within("fy", 1, kLongestFocal_px);
+  camera.fx_px = node.within("fx", 1, kMaxFocal_px);
+  camera.fy_px = node.within("fy", 1, kMaxFocal_px);
   camera.cx_px = node.within("cx", -kFarthestCentre_px, kFarthestCentre_px);
   camera.cy_px = node.within("cy", -kFarthestCentre_px, kFarthestCentre_px);
   const std::vector<double> distortion = node.numbers_or("distortion", std::vector<double>(5, 0.0));
@@ -169,8 +169,8 @@ TargetDescription read_target(YamlReader node) {
   std::vector<std::string_view> families;
   for (int i = 0; i < kTagFamilies; ++i) families.push_back(name(static_cast<TagFamily>(i)));
   target.family = static_cast<TagFamily>(node.one_of("family", families));
-  target.tag_size = node.within("tag_size_mm", kSmallestTag_mm, kLargestTag_mm) * kMm;
-  if (node.has("border_mm")) target.border = node.within("border_mm", 0, kLargestTag_mm) * kMm;
+  target.tag_size = node.within("tag_size_mm", kMinTag_mm, kMaxTag_mm) * kMm;
+  if (node.has("border_mm")) target.border = node.within("border_mm", 0, kMaxTag_mm) * kMm;
   target.tags.clear();
   for (YamlReader& entry : node.children("tags")) {
     Tag tag;
@@ -195,8 +195,8 @@ std::filesystem::path beside(const YamlReader& node, const std::filesystem::path
   return std::filesystem::path(node.file()).parent_path() / written;
 }
 
-RestOptions read_rest(YamlReader node, const CameraModel& camera) {
-  RestOptions rest;
+ReferenceOptions read_rest(YamlReader node, const CameraModel& camera) {
+  ReferenceOptions rest;
   rest.frames = node.integer_or("frames", 1, 1000, rest.frames);
   rest.camera_T_platform = optional_pose(node);
   if (node.has("appearance")) {
@@ -207,7 +207,7 @@ RestOptions read_rest(YamlReader node, const CameraModel& camera) {
     }
     const std::string file = node.text("appearance");
     if (file.empty()) node.fail("appearance", "names no file; name one, or leave the key out");
-    rest.appearance = load_rest_image(beside(node, file), camera);
+    rest.appearance = load_reference_image(beside(node, file), camera);
     rest.appearance->frames = rest.frames;
   }
   node.finish();

@@ -41,7 +41,7 @@ struct SensorConfig {
   std::optional<CameraRecord> camera_calibrated;
   double camera_latency = 0;  ///< from the middle of the exposure to the frame's time, s
   TargetDescription target;
-  RestOptions rest;
+  ReferenceOptions rest;
   WrenchModel wrench;
   std::optional<Matrix6> spring_stiffness;  ///< of wrench.springs, also where a calibration is used
   std::string calibration;                  ///< path of wrench.calibration; empty: none

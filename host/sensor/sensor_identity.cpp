@@ -23,7 +23,7 @@ std::string pose_text(const std::optional<Eigen::Isometry3d>& pose) {
                      rounded(rotation.x()), rounded(rotation.y()), rounded(rotation.z()));
 }
 
-std::string target_hash(const TargetDescription& target, const RestOptions& rest) {
+std::string target_hash(const TargetDescription& target, const ReferenceOptions& rest) {
   std::string text = fmt::format("family {}\ntag_size {}\n", name(target.family),
                                  std::llround(target.tag_size * 1e9));
   for (const Tag& tag : target.tags)
@@ -46,7 +46,7 @@ bool same(double a, double b) { return std::abs(a - b) <= 1e-6 * std::max(1.0, s
 }  // namespace
 
 SensorIdentity identity_of(const CameraModel& camera, const TargetDescription& target,
-                           const RestOptions& rest) {
+                           const ReferenceOptions& rest) {
   SensorIdentity out;
   out.family = std::string(name(target.family));
   for (const Tag& tag : target.tags) out.tag_ids.push_back(tag.id);

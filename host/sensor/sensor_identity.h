@@ -25,7 +25,7 @@ struct SensorIdentity {
 /// where they are known, places of the tags (um and urad) and rest pose; then the picture at rest,
 /// 16 bits a pixel.
 SensorIdentity identity_of(const CameraModel& camera, const TargetDescription& target,
-                           const RestOptions& rest);
+                           const ReferenceOptions& rest);
 
 /// What differs, for people: "its tag_ids is [5,3], sensor.yaml has [5,2]"; empty if nothing does.
 /// What one of them does not know does not differ.

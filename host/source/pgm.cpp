@@ -5,7 +5,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::uint32_t kMostCounts = 65535;
+constexpr std::uint32_t kMaxCounts = 65535;
 
 bool is_space(std::uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
@@ -22,7 +22,7 @@ std::optional<std::uint32_t> number(std::span<const std::uint8_t> bytes, std::si
   std::optional<std::uint32_t> value;
   for (; at < bytes.size() && bytes[at] >= '0' && bytes[at] <= '9'; ++at) {
     value = value.value_or(0) * 10 + (bytes[at] - '0');
-    if (*value > kMostCounts) return std::nullopt;
+    if (*value > kMaxCounts) return std::nullopt;
   }
   return value;
 }

@@ -49,8 +49,8 @@ double rate_of(const v4l2_fract& interval) {
   return static_cast<double>(interval.denominator) / interval.numerator;
 }
 
-/// Bounded, because a wild stamp must not overflow nanoseconds; the ledger judges whether it makes
-/// sense.
+/// Bounded, because a wild stamp must not overflow nanoseconds; the capture_queue judges whether it
+/// makes sense.
 TimePoint time_of(const timeval& stamp) {
   const auto seconds = std::clamp<std::int64_t>(stamp.tv_sec, 0, 4'000'000'000);
   const auto micros = std::clamp<std::int64_t>(stamp.tv_usec, 0, 999'999);

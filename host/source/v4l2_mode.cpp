@@ -57,9 +57,9 @@ bool same_rate(double a, double b) { return std::abs(a - b) <= kRateTolerance * 
 double distance(const V4l2Mode& mode, const V4l2Options& options) {
   if (mode.width == options.preferred_width && mode.height == options.preferred_height) return -1;
   const double area = static_cast<double>(mode.width) * mode.height;
-  const double wish =
+  const double request =
       std::max(1.0, static_cast<double>(options.preferred_width) * options.preferred_height);
-  return std::abs(std::log(area / wish));
+  return std::abs(std::log(area / request));
 }
 
 /// The rate to ask of this mode, or nothing if it does not have the rate asked.

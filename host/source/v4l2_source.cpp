@@ -51,17 +51,17 @@ V4l2Choice choose(const V4l2Device& device, const V4l2Options& options) {
         "start what feeds it first",
         options.path, device.capability().card));
   }
-  std::string wish = asked ? fmt::format("{}x{}", options.width, options.height) : "such a mode";
-  if (options.fps > 0) wish += fmt::format("@{:.4g}", options.fps);
-  if (options.pixels) wish += fmt::format(" {}", name(*options.pixels));
-  throw ConfigError(fmt::format("{}: the camera does not have {}; it has {}", options.path, wish,
+  std::string request = asked ? fmt::format("{}x{}", options.width, options.height) : "such a mode";
+  if (options.fps > 0) request += fmt::format("@{:.4g}", options.fps);
+  if (options.pixels) request += fmt::format(" {}", name(*options.pixels));
+  throw ConfigError(fmt::format("{}: the camera does not have {}; it has {}", options.path, request,
                                 describe(modes, 8)));
 }
 
 }  // namespace
 
 V4l2Source::V4l2Source(const V4l2Options& options)
-    : path_(options.path), stable_path_(stable_path(options.path)), ledger_(Duration{}) {
+    : path_(options.path), stable_path_(stable_path(options.path)), capture_queue_(Duration{}) {
   device_ = std::make_unique<V4l2Device>(path_);
   choice_ = choose(*device_, options);
   epoll_.reset(::epoll_create1(EPOLL_CLOEXEC));
@@ -72,21 +72,21 @@ V4l2Source::V4l2Source(const V4l2Options& options)
   watch(timer_.get());
   const V4l2Stream stream = device_->set_mode(choice_);
   format_ = {stream.width, stream.height, stream.period, {}};
-  ledger_ = FrameLedger(stream.period);
+  capture_queue_ = CaptureQueueTracker(stream.period);
   decoder_.emplace(stream.pixels, stream.width, stream.height, stream.stride);
   stride_ = stream.stride;
   device_->start();
   settle(options.exposure_us);
   watch_camera();
-  ledger_.number_from_zero();
+  capture_queue_.number_from_zero();
   last_buffer_ = last_drain_ = Clock::now();
   arm(stall_after(), Duration{});
   const double fps = 1 / std::chrono::duration<double>(stream.period).count();
   format_.description = fmt::format(
       "{} ({}, {}): {}x{} {} at {:.4g} fps, {}; {}", path_, device_->capability().card,
       device_->capability().driver, stream.width, stream.height, name(stream.pixels), fps,
-      ledger_.trusts_driver_clock() ? "kernel capture times"
-                                    : "times of dequeuing (the driver's are not usable)",
+      capture_queue_.trusts_driver_clock() ? "kernel capture times"
+                                           : "times of dequeuing (the driver's are not usable)",
       controls_.description());
 }
 
@@ -177,7 +177,7 @@ void V4l2Source::watch_camera() {
     V4l2Buffer buffer;
     int error = 0;
     while (device_->dequeue(buffer, error) == V4l2Device::Dequeue::buffer) {
-      ledger_.note(buffer.stamp, false);
+      capture_queue_.note(buffer.stamp, false);
       if (!device_->requeue(buffer.index)) break;
     }
     watch(device_->fd());
@@ -199,7 +199,7 @@ Duration V4l2Source::stall_after() const noexcept {
 void V4l2Source::settle(int exposure_us) {
   V4l2ControlPort port(device_->fd());
   controls_.remember(port);
-  ledger_.stream_started();
+  capture_queue_.stream_started();
   const int frames = controls_.needs_settling() ? kSettleFrames : kClockFrames;
   const TimePoint until = Clock::now() + kSettleAtMost;
   for (int seen = 0; seen < frames && milliseconds_left(until) > 0;) {
@@ -208,7 +208,7 @@ void V4l2Source::settle(int exposure_us) {
     const auto got = device_->dequeue(buffer, error);
     if (got == V4l2Device::Dequeue::failed) break;
     if (got == V4l2Device::Dequeue::buffer) {
-      if (ledger_.note(buffer.stamp, true)) ++seen;
+      if (capture_queue_.note(buffer.stamp, true)) ++seen;
       device_->requeue(buffer.index);
       continue;
     }
@@ -257,7 +257,7 @@ ReadStatus V4l2Source::drain(unsigned queued, Frame& frame) noexcept {
     if (got == V4l2Device::Dequeue::failed) return lose(std::strerror(error));
     ++taken;
     last_buffer_ = buffer.stamp.dequeued;
-    const bool usable = ledger_.note(buffer.stamp, false) && !buffer.damaged;
+    const bool usable = capture_queue_.note(buffer.stamp, false) && !buffer.damaged;
     if (newest) device_->requeue(newest->index);
     newest.reset();
     if (usable) {
@@ -293,7 +293,7 @@ ReadStatus V4l2Source::deliver(const V4l2Buffer& newest, bool queue_was_full,
     return ReadStatus::reconnected;
   }
   const TimePoint now = Clock::now();
-  const bool stale = ledger_.stale(now, last_drain_, queue_was_full);
+  const bool stale = capture_queue_.stale(now, last_drain_, queue_was_full);
   last_drain_ = now;
   const bool usable = !stale && decoder_->decode(newest.bytes, newest.bytes_used, wanted_,
                                                  frame.image, frame.decoded);
@@ -303,9 +303,9 @@ ReadStatus V4l2Source::deliver(const V4l2Buffer& newest, bool queue_was_full,
     return ReadStatus::nothing;
   }
   held_ = newest;
-  frame.capture_time = frame.latency_origin = ledger_.capture_time();
-  frame.sequence = ledger_.sequence();
-  frame.dropped = ledger_.take();
+  frame.capture_time = frame.latency_origin = capture_queue_.capture_time();
+  frame.sequence = capture_queue_.sequence();
+  frame.dropped = capture_queue_.take();
   return ReadStatus::frame;
 }
 
@@ -333,7 +333,7 @@ void V4l2Source::open_device() {
   // The driver may pad its rows otherwise this time.
   decoder_.emplace(stream.pixels, stream.width, stream.height, stream.stride);
   stride_ = stream.stride;
-  ledger_.stream_started();
+  capture_queue_.stream_started();
   device_ = std::move(device);
   watch_camera();
 }

@@ -10,9 +10,9 @@
 #include "host/core/os/unique_fd.h"
 #include "host/source/camera_light.h"
 #include "host/source/frame_source.h"
+#include "host/source/v4l2_capture_queue.h"
 #include "host/source/v4l2_controls.h"
 #include "host/source/v4l2_device.h"
-#include "host/source/v4l2_ledger.h"
 #include "host/source/v4l2_mode.h"
 
 namespace tagwrench {
@@ -85,7 +85,7 @@ class V4l2Source final : public FrameSource, private CameraLight {
   UniqueFd timer_;
   std::unique_ptr<V4l2Device> device_;
   std::optional<Decoder> decoder_;
-  FrameLedger ledger_;
+  CaptureQueueTracker capture_queue_;
   ControlLock controls_;
   std::optional<V4l2Buffer> held_;  ///< of the last Frame, until the next read()
   int stride_ = 0;                  ///< of its rows in bytes, 0 for mjpg

@@ -55,15 +55,15 @@ double perimeter(const Square& square) {
 /// outside, and both may be listed: the outside is the square. An id in two places cannot be told
 /// apart from its double.
 std::optional<std::size_t> only(int id, const SquareList& list, bool& twice) {
-  constexpr double kSamePlacePart = 0.1;  // of the square's perimeter
+  constexpr double kSamePlaceFraction = 0.1;  // of the square's perimeter
   std::optional<std::size_t> best;
   twice = false;
   double longest_px = 0;
   for (std::size_t i = 0; i < list.ids.size(); ++i) {
     if (list.ids[i] != id) continue;
     const double perimeter_px = perimeter(list.tags[i]);
-    if (best &&
-        (centre(list.tags[i]) - centre(list.tags[*best])).norm() > kSamePlacePart * perimeter_px) {
+    if (best && (centre(list.tags[i]) - centre(list.tags[*best])).norm() >
+                    kSamePlaceFraction * perimeter_px) {
       twice = true;
       return std::nullopt;
     }

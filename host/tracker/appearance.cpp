@@ -16,11 +16,11 @@ constexpr double kPoseHalf_px = 3.5;
 constexpr int kSpreadIterations = 15;
 constexpr int kClusterPoints = 12;  // in a row, of three cells' sides
 constexpr int kOffsetPasses = 3;
-constexpr double kLargestOffset_px = 2.0;
-constexpr float kLeastContrastPart = 0.3F;  // of the tag's median
-constexpr double kLeastPart = 0.5;          // of a tag's points
+constexpr double kMaxOffset_px = 2.0;
+constexpr float kMinContrastFraction = 0.3F;  // of the tag's median
+constexpr double kMinFraction = 0.5;          // of a tag's points
 constexpr double kTukey = 4.685;
-constexpr double kLeastScale_px = 0.05;
+constexpr double kMinScale_px = 0.05;
 constexpr double kLengthScale = 5e-3;    // m per unit of translation in the normal equations
 constexpr double kSpreadScale = 1e-4;    // m
 constexpr double kSpreadPrior_px = 1.0;  // keeps a spread that the pattern cannot tell near zero
@@ -44,7 +44,7 @@ double robust_cut(const Measurements& all) {
       if (m.valid) offsets.push_back(std::abs(m.offset_px));
     }
   }
-  return kTukey * std::max(kLeastScale_px, kMadToSigma * median(std::move(offsets)));
+  return kTukey * std::max(kMinScale_px, kMadToSigma * median(std::move(offsets)));
 }
 
 double common_gain(const std::vector<EdgeMeasurement>& tag) {
@@ -145,20 +145,20 @@ bool learn_appearance(const EdgeMeter& meter, const PixelView<float>& image, Edg
     for (const EdgeMeasurement& m : measured) {
       if (m.valid) contrasts.push_back(m.contrast);
     }
-    const double least = kLeastContrastPart * median(std::move(contrasts));
+    const double least = kMinContrastFraction * median(std::move(contrasts));
     std::vector<EdgePoint> kept;
     std::size_t measurable = 0;  // a narrow white margin leaves nothing of the outer edge
     for (std::size_t i = 0; i < before; ++i) {
       const EdgeMeasurement& m = measured[i];
       measurable += m.too_near ? 0 : 1;
-      if (!m.valid || m.contrast < least || std::abs(moved_px[i]) > kLargestOffset_px) continue;
+      if (!m.valid || m.contrast < least || std::abs(moved_px[i]) > kMaxOffset_px) continue;
       kept.push_back(tag.points[i]);
       kept.back().contrast = static_cast<float>(m.contrast);
       squares += moved_px[i] * moved_px[i];
       count += 1;
     }
     if (kept.empty() ||
-        static_cast<double>(kept.size()) < kLeastPart * static_cast<double>(measurable)) {
+        static_cast<double>(kept.size()) < kMinFraction * static_cast<double>(measurable)) {
       return false;
     }
     tag.points = std::move(kept);

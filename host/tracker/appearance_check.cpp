@@ -9,12 +9,12 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kLeastLikeness = 0.7;  // glare over a quarter of a tag leaves more
-constexpr double kLeastSeen = 0.5;      // of a tag's cells
-constexpr double kLeastContrast = 4;    // grey levels, standard deviation over the cells
+constexpr double kMinLikeness = 0.7;  // glare over a quarter of a tag leaves more
+constexpr double kMinSeen = 0.5;      // of a tag's cells
+constexpr double kMinContrast = 4;    // grey levels, standard deviation over the cells
 
 /// Grey level at a pixel of the image after flipping back; empty outside.
-std::optional<double> level_at(const RestImage& image, bool mirrored,
+std::optional<double> level_at(const ReferenceImage& image, bool mirrored,
                                const Eigen::Vector2d& pixel) {
   if (!(pixel.x() > -0.5 && pixel.x() < image.width - 0.5 && pixel.y() > -0.5 &&
         pixel.y() < image.height - 0.5)) {
@@ -28,7 +28,7 @@ std::optional<double> level_at(const RestImage& image, bool mirrored,
 }
 
 /// Of the cells within the black frame, which all tags share.
-double likeness(const CameraModel& camera, const RestImage& image, const TagPattern& pattern,
+double likeness(const CameraModel& camera, const ReferenceImage& image, const TagPattern& pattern,
                 const Eigen::Isometry3d& camera_T_tag) {
   const double cell = pattern.size / pattern.cells;
   Eigen::ArrayXd levels(pattern.cells * pattern.cells);
@@ -47,10 +47,10 @@ double likeness(const CameraModel& camera, const RestImage& image, const TagPatt
     }
   }
   const int inside = pattern.cells - 2;
-  if (static_cast<double>(seen) < kLeastSeen * inside * inside) return 0;
+  if (static_cast<double>(seen) < kMinSeen * inside * inside) return 0;
   const Eigen::ArrayXd a = levels.head(seen) - levels.head(seen).mean();
   const Eigen::ArrayXd b = printed.head(seen) - printed.head(seen).mean();
-  if (!(std::sqrt(a.square().mean()) > kLeastContrast)) return 0;
+  if (!(std::sqrt(a.square().mean()) > kMinContrast)) return 0;
   const double size = std::sqrt(a.square().sum() * b.square().sum());
   return size > 0 ? (a * b).sum() / size : 0;
 }
@@ -59,7 +59,7 @@ double likeness(const CameraModel& camera, const RestImage& image, const TagPatt
 
 std::optional<AppearanceMismatch> check_appearance(const CameraModel& camera,
                                                    const TargetDescription& target,
-                                                   const RestOptions& rest) {
+                                                   const ReferenceOptions& rest) {
   if (!rest.appearance || !rest.camera_T_platform) return std::nullopt;
   for (const Tag& tag : target.tags) {
     if (!tag.platform_T_tag) continue;
@@ -67,7 +67,7 @@ std::optional<AppearanceMismatch> check_appearance(const CameraModel& camera,
         likeness(camera, *rest.appearance,
                  tag_pattern(target.family, tag.id, target.tag_size, target.border),
                  *rest.camera_T_platform * *tag.platform_T_tag);
-    if (!(found >= kLeastLikeness)) return AppearanceMismatch{tag.id, found};
+    if (!(found >= kMinLikeness)) return AppearanceMismatch{tag.id, found};
   }
   return std::nullopt;
 }

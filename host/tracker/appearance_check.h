@@ -19,6 +19,6 @@ struct AppearanceMismatch {
 /// nothing can be said: without a picture, a rest pose or the tags' places.
 std::optional<AppearanceMismatch> check_appearance(const CameraModel& camera,
                                                    const TargetDescription& target,
-                                                   const RestOptions& rest);
+                                                   const ReferenceOptions& rest);
 
 }  // namespace tagwrench

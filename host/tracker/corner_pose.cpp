@@ -10,7 +10,7 @@ namespace tagwrench {
 namespace {
 
 constexpr double kReachRotation = 0.6;  ///< rad
-constexpr double kReachDistancePart =
+constexpr double kReachDistanceFraction =
     0.5;  ///< translation, as a part of the distance from the lens at rest
 constexpr int kIterations = 12;
 constexpr double kUnfit_px = 8.0;  ///< RMS beyond which corners and target do not belong together
@@ -59,7 +59,8 @@ bool within_reach(const Eigen::Isometry3d& rest_camera_T_platform,
                   const Eigen::Isometry3d& camera_T_platform) {
   const Vector6 motion = motion_between(rest_camera_T_platform, camera_T_platform);
   return motion.tail<3>().norm() < kReachRotation &&
-         motion.head<3>().norm() < kReachDistancePart * rest_camera_T_platform.translation().norm();
+         motion.head<3>().norm() <
+             kReachDistanceFraction * rest_camera_T_platform.translation().norm();
 }
 
 std::optional<Eigen::Isometry3d> pose_from_corners(

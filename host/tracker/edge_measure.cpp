@@ -12,10 +12,10 @@ namespace {
 constexpr double kReachUsed = 0.85;
 
 /// Less contrast than this is noise, grey levels.
-constexpr float kLeastContrast = 12.0F;
+constexpr float kMinContrast = 12.0F;
 
 /// And less than this part of the contrast at rest is not the edge that was learned.
-constexpr float kLeastContrastPart = 0.35F;
+constexpr float kMinContrastFraction = 0.35F;
 
 /// A falling gradient of up to this size is noise as well, grey levels per px.
 constexpr float kCoarseNoise = 3.0F;
@@ -45,7 +45,7 @@ bool inside(const PixelView<Pixel>& image, double x, double y) {
 
 EdgeMeter::EdgeMeter(const CameraModel& camera) : camera_(camera) {
   for (int k = 0; k < kWindows; ++k) {
-    const double half = kSmallestHalf_px + k * kHalfStep_px;
+    const double half = kMinHalf_px + k * kHalfStep_px;
     Window& window = windows_[static_cast<std::size_t>(k)];
     window.reach_px = std::min(kReach_px, static_cast<int>(std::ceil(half)));
     for (int i = 0; i < 2 * window.reach_px; ++i) {
@@ -149,12 +149,11 @@ void EdgeMeter::measure(const PixelView<Pixel>& image, const EdgeTag& tag,
     }
     const double half =
         std::min({half_width_px, kReachUsed * point.reach * m.px_per_m, kWidestHalf_px});
-    m.too_near = !(half >= kSmallestHalf_px);
+    m.too_near = !(half >= kMinHalf_px);
     if (m.too_near) continue;
-    const auto window =
-        static_cast<std::size_t>(std::lround((half - kSmallestHalf_px) / kHalfStep_px));
+    const auto window = static_cast<std::size_t>(std::lround((half - kMinHalf_px) / kHalfStep_px));
     take(image, projected.pixel, direction, windows_[std::min<std::size_t>(window, kWindows - 1)],
-         coarse, std::max(kLeastContrast, kLeastContrastPart * point.contrast), m);
+         coarse, std::max(kMinContrast, kMinContrastFraction * point.contrast), m);
     if (!m.valid) continue;
     const Eigen::Vector3d pull = projected.jacobian.transpose() * direction;
     m.row.head<3>() = pull;

@@ -64,7 +64,7 @@ class EdgeMeter {
  private:
   static constexpr int kReach_px = 10;          // samples to each side at most
   static constexpr int kSteps = 2 * kReach_px;  // gradients lie between samples
-  static constexpr double kSmallestHalf_px = 1.5;
+  static constexpr double kMinHalf_px = 1.5;
   static constexpr double kHalfStep_px = 0.25;
   static constexpr int kWindows = 35;  // 1.5 .. 10 px
 

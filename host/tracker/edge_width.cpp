@@ -13,16 +13,16 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kWhite = 250;        // grey levels: beyond, the sensor is at its end
-constexpr double kMostPixels = 2500;  // of a tag; a grid of them where there are more
+constexpr double kWhite = 250;       // grey levels: beyond, the sensor is at its end
+constexpr double kMaxPixels = 2500;  // of a tag; a grid of them where there are more
 constexpr double kPixelVariance = 1.0 / 12;
-constexpr double kLeastVariance = 0.01;
-constexpr double kMostBlur_px = 30;
-constexpr double kLeastContrast = 8;    // grey levels
-constexpr double kMostResidual = 0.12;  // of the contrast
-constexpr double kMostShift = 1;        // of a corner, cells
-constexpr double kMargin = 0.3;         // of white around the square that is looked at, cells
-constexpr double kClear = 2;            // blurs between that and the paper's end
+constexpr double kMinVariance = 0.01;
+constexpr double kMaxBlur_px = 30;
+constexpr double kMinContrast = 8;     // grey levels
+constexpr double kMaxResidual = 0.12;  // of the contrast
+constexpr double kMaxShift = 1;        // of a corner, cells
+constexpr double kMargin = 0.3;        // of white around the square that is looked at, cells
+constexpr double kClear = 2;           // blurs between that and the paper's end
 
 /// Corners (8), logarithm of the blur, gain, its slopes to the right and down, offset.
 constexpr int kBlur = 8, kGain = 9, kOffset = 12, kUnknowns = 13;
@@ -107,7 +107,7 @@ class TagFit {
     white_ = 0;
     if (!(low.array() < high.array()).all()) return;
     const double area = (high - low).prod();
-    const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(area / kMostPixels))));
+    const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(area / kMaxPixels))));
     for (int row = static_cast<int>(low.y()); row <= high.y(); row += step) {
       for (int column = static_cast<int>(low.x()); column <= high.x(); column += step) {
         const Eigen::Vector2d at = (to_cells * Eigen::Vector3d(column, row, 1)).hnormalized();
@@ -120,7 +120,7 @@ class TagFit {
     }
   }
 
-  double white_part() const {
+  double white_fraction() const {
     return pixels_.empty() ? 0 : static_cast<double>(white_) / static_cast<double>(pixels_.size());
   }
 
@@ -233,7 +233,7 @@ Unknowns converge(TagFit& fit, Unknowns x) {
   Sums here = fit.sums(x);
   for (int i = 0; i < kSteps && damping < 1e6; ++i) {
     Unknowns there = x + step(here, damping, 0);
-    there[kBlur] = std::clamp(there[kBlur], 0.5 * std::log(kPixelVariance), std::log(kMostBlur_px));
+    there[kBlur] = std::clamp(there[kBlur], 0.5 * std::log(kPixelVariance), std::log(kMaxBlur_px));
     const Sums sums = fit.sums(there);
     if (!(sums.squares < here.squares)) {
       damping *= 10;
@@ -279,18 +279,18 @@ std::optional<EdgeWidth> edge_width(const ImageView& image, const TagPattern& pa
   if (!x.allFinite() || sums.pixels < 10 * kUnknowns) return std::nullopt;
   EdgeWidth out;
   const double total = std::exp(2 * x[kBlur]);
-  out.blur_px = std::sqrt(std::max(total - kPixelVariance, kLeastVariance));
+  out.blur_px = std::sqrt(std::max(total - kPixelVariance, kMinVariance));
   out.contrast = x[kGain];
-  out.white_part = fit.white_part();
-  out.residual_part = std::sqrt(sums.squares / sums.pixels) / std::abs(out.contrast);
+  out.white_fraction = fit.white_fraction();
+  out.residual_fraction = std::sqrt(sums.squares / sums.pixels) / std::abs(out.contrast);
   double shift = 0;
   for (int i = 0; i < 4; ++i) {
     const auto k = static_cast<std::size_t>(i);
     out.corners_px[k] = x.segment<2>(2 * i);
     shift = std::max(shift, (out.corners_px[k] - corners_px[k]).norm());
   }
-  const bool alike = out.contrast > kLeastContrast && out.residual_part < kMostResidual &&
-                     shift < kMostShift * cell && out.blur_px < 0.9 * kMostBlur_px;
+  const bool alike = out.contrast > kMinContrast && out.residual_fraction < kMaxResidual &&
+                     shift < kMaxShift * cell && out.blur_px < 0.9 * kMaxBlur_px;
   return alike ? std::optional(out) : std::nullopt;
 }
 

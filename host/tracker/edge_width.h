@@ -14,12 +14,12 @@ namespace tagwrench {
 using SquareCorners = std::array<Eigen::Vector2d, 4>;  ///< as printed: top left first, clockwise
 
 struct EdgeWidth {
-  double blur_px = 0;        ///< standard deviation of the Gaussian point spread before the pixels
-                             ///< average over their own width
-  double contrast = 0;       ///< grey levels from ink to paper, in the middle of the tag
-  double white_part = 0;     ///< of the tag's pixels, at the sensor's upper end
-  double residual_part = 0;  ///< RMS of what the fit leaves, over the contrast
-  SquareCorners corners_px;  ///< of the black square, fitted
+  double blur_px = 0;         ///< standard deviation of the Gaussian point spread before the pixels
+                              ///< average over their own width
+  double contrast = 0;        ///< grey levels from ink to paper, in the middle of the tag
+  double white_fraction = 0;  ///< of the tag's pixels, at the sensor's upper end
+  double residual_fraction = 0;  ///< RMS of what the fit leaves, over the contrast
+  SquareCorners corners_px;      ///< of the black square, fitted
 };
 
 /// Below 0.7 px a pixel's own width hides much of it: good to a third there.

@@ -23,10 +23,10 @@ constexpr double kVarianceFactor = 1.0193;
 /// A patch is believed when its residuals are at most this many times the typical ones and most of
 /// its pixels count.
 constexpr double kWorstPatch = 3.0;
-constexpr float kLeastWeights = 0.7F;
-constexpr float kLeastInside = 0.7F;
+constexpr float kMinWeights = 0.7F;
+constexpr float kMinInside = 0.7F;
 /// A tag is held when this part of its pixels is believed.
-constexpr double kLeastTagPart = 0.35;
+constexpr double kMinTagFraction = 0.35;
 /// The typical patch is the one at this rank from below: more than half of them may be covered.
 constexpr double kTypicalRank = 0.3;
 
@@ -34,7 +34,7 @@ constexpr double kTypicalRank = 0.3;
 /// translations. Fewer groups than patches would otherwise be blamed for what is common to all.
 constexpr double kGroupsFitted = 3;
 
-constexpr int kMostSteps = 10;
+constexpr int kMaxSteps = 10;
 constexpr int kFirstSteps = 3;  ///< by then residuals have fallen, or never will
 /// Squared sizes of steps, in standard deviations, all parameters together. A step shrinks to a few
 /// percent of the one before, squared: what one as small as kSmallStep leaves is lost in the noise
@@ -118,7 +118,7 @@ void PhotometricAligner::view_patches(const Eigen::Isometry3d& pose, const Vecto
 double PhotometricAligner::typical_residual() noexcept {
   std::size_t count = 0;
   for (std::size_t n = 0; n < sums_.size(); ++n) {
-    if (sums_[n].inside >= kLeastInside * static_cast<float>(template_.patches[n].pixels))
+    if (sums_[n].inside >= kMinInside * static_cast<float>(template_.patches[n].pixels))
       scratch_[count++] = sums_[n].squares / std::max(1.0F, sums_[n].weights);
   }
   if (count == 0) return 0;
@@ -134,10 +134,10 @@ void PhotometricAligner::judge_patches(double typical, bool near) noexcept {
   std::array<double, kMaxTags> all{};
   std::array<double, kMaxTags> believed{};
   for (std::size_t n = 0; n < sums_.size(); ++n) {
-    const PatchSums& s = sums_[n];
+    const NormalEquations& s = sums_[n];
     const PixelPatch& patch = template_.patches[n];
-    bool good = s.inside >= kLeastInside * static_cast<float>(patch.pixels);
-    if (near && good) good = s.squares < worst * s.weights && s.weights > kLeastWeights * s.inside;
+    bool good = s.inside >= kMinInside * static_cast<float>(patch.pixels);
+    if (near && good) good = s.squares < worst * s.weights && s.weights > kMinWeights * s.inside;
     good_[n] = good ? 1 : 0;
     all[patch.tag] += static_cast<double>(patch.pixels);
     if (good) believed[patch.tag] += static_cast<double>(patch.pixels);
@@ -145,7 +145,7 @@ void PhotometricAligner::judge_patches(double typical, bool near) noexcept {
   if (!near) return;
   for (std::size_t n = 0; n < sums_.size(); ++n) {
     const std::size_t tag = template_.patches[n].tag;
-    if (believed[tag] < kLeastTagPart * all[tag]) good_[n] = 0;
+    if (believed[tag] < kMinTagFraction * all[tag]) good_[n] = 0;
   }
 }
 
@@ -241,7 +241,7 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
   double step_size = 1e30;
   double first_typical = 0;
   bool near = false;  // once patches are judged they stay so: taking them back would begin anew
-  for (int i = 0; i < kMostSteps; ++i) {
+  for (int i = 0; i < kMaxSteps; ++i) {
     view_patches(fit.camera_T_platform, velocity, now);
     sum_patches(template_, image, views_, inverse_cut, step_size < kKeepStep, pairs_, sums_);
     const double typical = typical_residual();
@@ -290,7 +290,7 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
   }
   fit.good = believed / all;
   fit.residual = std::sqrt(squares / inside / kMeanWeightedSquare);
-  fit.residual_part = fit.residual * (noise / inside) / template_.contrast;
+  fit.residual_fraction = fit.residual * (noise / inside) / template_.contrast;
   for (const bool h : held) fit.tags_held = static_cast<std::uint8_t>(fit.tags_held + (h ? 1 : 0));
 
   const double variance = std::max(1.0, squared(fit.residual)) * (1.0 + 1.0 / template_.frames);
@@ -333,7 +333,7 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
         ++groups->count;
       }
     }
-    // Few groups leave little to compare: then the patches must do.
+    // StaticVector groups leave little to compare: then the patches must do.
     if (groups->count < 1.2 * kFitted) continue;
     const double freedom = groups->count - kGroupsFitted;
     const double excess = groups->ratio * groups->count / freedom - 1;

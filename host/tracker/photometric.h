@@ -32,9 +32,9 @@ struct PhotometricFit {
   /// Of the motion, camera axes, m and rad: from the noise, and from how the residuals of the
   /// patches disagree.
   Matrix6 covariance = Matrix6::Zero();
-  double residual = 0;       ///< RMS of whitened residuals: 1 when nothing but noise is left
-  double residual_part = 0;  ///< RMS of residuals relative to the template's contrast
-  double good = 0;           ///< part of the template's pixels that the fit believes, 0..1
+  double residual = 0;           ///< RMS of whitened residuals: 1 when nothing but noise is left
+  double residual_fraction = 0;  ///< RMS of residuals relative to the template's contrast
+  double good = 0;               ///< part of the template's pixels that the fit believes, 0..1
   std::uint8_t tags_held = 0;
   bool converged = false;
 };
@@ -87,7 +87,7 @@ class PhotometricAligner {
 
   PixelTemplate template_;
   std::vector<PatchView> views_;
-  std::vector<PatchSums> sums_;
+  std::vector<NormalEquations> sums_;
   PixelPairs pairs_;
   std::vector<std::uint8_t> good_;
   std::vector<float> scratch_;

@@ -14,11 +14,11 @@ constexpr int kWhite = 250;  ///< grey levels: beyond, the sensor is at its end
 constexpr int kFine = 1;
 constexpr int kCoarse = 8;
 /// What makes an edge: grey levels over the coarse distance, and part of the picture's contrast.
-constexpr int kLeastEdge = 16;
-constexpr double kLeastEdgePart = 0.3;
-constexpr std::size_t kLeastEdges = 50;
-constexpr double kSharpestPart = 0.3;
-constexpr double kMostBlur_px = 12;
+constexpr int kMinEdge = 16;
+constexpr double kMinEdgeFraction = 0.3;
+constexpr std::size_t kMinEdges = 50;
+constexpr double kSharpestFraction = 0.3;
+constexpr double kMaxBlur_px = 12;
 
 /// 2 x 2 pixels added up.
 struct Halved {
@@ -55,7 +55,7 @@ void add_edges(const int* line, int count, std::ptrdiff_t stride, int least,
 
 /// The blur that leaves this part of a step over the fine distance.
 double blur_from(double ratio) {
-  double sharp = 0.1, soft = kMostBlur_px;
+  double sharp = 0.1, soft = kMaxBlur_px;
   for (int i = 0; i < 20; ++i) {
     const double sigma = 0.5 * (sharp + soft);
     const double fine = std::erf(2 * kFine / (sigma * std::sqrt(2.0)));
@@ -67,16 +67,16 @@ double blur_from(double ratio) {
 
 std::optional<double> blur_px(const ImageView& image, double contrast) {
   const Halved half(image);
-  const int least = std::max(4 * kLeastEdge, static_cast<int>(4 * kLeastEdgePart * contrast));
+  const int least = std::max(4 * kMinEdge, static_cast<int>(4 * kMinEdgeFraction * contrast));
   std::vector<float> ratios;
   for (int y = 0; y < half.height; ++y)
     add_edges(half.level.data() + static_cast<std::ptrdiff_t>(y) * half.width, half.width, 1, least,
               ratios);
   for (int x = 0; x < half.width; ++x)
     add_edges(half.level.data() + x, half.height, half.width, least, ratios);
-  if (ratios.size() < kLeastEdges) return std::nullopt;
+  if (ratios.size() < kMinEdges) return std::nullopt;
   const auto at = ratios.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(ratios.size()) *
-                                                               (1 - kSharpestPart));
+                                                               (1 - kSharpestFraction));
   std::nth_element(ratios.begin(), at, ratios.end());
   return blur_from(*at);
 }
@@ -99,7 +99,7 @@ PictureQuality picture_quality(const ImageView& image) {
     below += histogram[static_cast<std::size_t>(level)];
     if (below * 100 <= pixels) quality.dark_counts = level + 1;
     if (below * 100 < pixels * 99) quality.bright_counts = level + 1;
-    if (level == kWhite - 1) quality.white_part = 1 - static_cast<double>(below) / pixels;
+    if (level == kWhite - 1) quality.white_fraction = 1 - static_cast<double>(below) / pixels;
   }
   quality.blur_px = blur_px(image, quality.bright_counts - quality.dark_counts);
   return quality;

@@ -113,7 +113,7 @@ HWY_NOINLINE void find_pixels(const PixelTemplate& t, const Lens& lens, const Pi
 
 HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchView& view,
                           float inverse_cut, std::size_t first, std::size_t count,
-                          const PixelPairs& pairs, const Block& block, PatchSums& sums) {
+                          const PixelPairs& pairs, const Block& block, NormalEquations& sums) {
   const Float d;
   const auto set = [&](float value) { return hn::Set(d, value); };
   const V zero = hn::Zero(d);
@@ -213,7 +213,7 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
 }
 
 void sum_patches(const PixelTemplate& t, const PixelWindow& image, std::span<const PatchView> views,
-                 float inverse_cut, bool keep, PixelPairs& pairs, std::span<PatchSums> sums) {
+                 float inverse_cut, bool keep, PixelPairs& pairs, std::span<NormalEquations> sums) {
   const auto& k = t.camera.distortion;
   const Lens lens{std::any_of(k.begin(), k.end(), [](double c) { return c != 0; }),
                   static_cast<float>(t.camera.fx_px),
@@ -254,9 +254,9 @@ HWY_EXPORT(sum_patches);
 
 void sum_patches(const PixelTemplate& pixels, const PixelWindow& image,
                  std::span<const PatchView> views, float inverse_cut, bool keep, PixelPairs& pairs,
-                 std::span<PatchSums> sums) noexcept {
+                 std::span<NormalEquations> sums) noexcept {
   if (image.pixels == nullptr || image.left >= image.right || image.top >= image.bottom) {
-    std::fill(sums.begin(), sums.end(), PatchSums{});
+    std::fill(sums.begin(), sums.end(), NormalEquations{});
     return;
   }
   HWY_DYNAMIC_DISPATCH(sum_patches)(pixels, image, views, inverse_cut, keep, pairs, sums);

@@ -23,7 +23,7 @@ struct PatchView {
   std::array<float, 2> blur{};  ///< b = blur[0] + blur[1] * depth, px^2
 };
 
-struct PatchSums {
+struct NormalEquations {
   /// Weighted sums of the whitened columns times the whitened residual, in the order of
   /// PatchVector.
   std::array<float, kPatchParameters> right{};
@@ -57,6 +57,6 @@ struct PixelPairs {
 /// `pairs` one for each pixel; they are kept as they are when `keep` is set.
 void sum_patches(const PixelTemplate& pixels, const PixelWindow& image,
                  std::span<const PatchView> views, float inverse_cut, bool keep, PixelPairs& pairs,
-                 std::span<PatchSums> sums) noexcept;
+                 std::span<NormalEquations> sums) noexcept;
 
 }  // namespace tagwrench

@@ -12,10 +12,10 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kBorderUsed = 1.05;    // of the white margin: the paper's edge tells as well
-constexpr double kSaturated = 250.0;    // grey level
-constexpr int kMargin_px = 8;           // around the tags, for the spline
-constexpr double kLeastVariance = 0.1;  // rounding alone makes 1/12
+constexpr double kBorderUsed = 1.05;  // of the white margin: the paper's edge tells as well
+constexpr double kSaturated = 250.0;  // grey level
+constexpr int kMargin_px = 8;         // around the tags, for the spline
+constexpr double kMinVariance = 0.1;  // rounding alone makes 1/12
 
 struct Candidate {
   int x = 0, y = 0;
@@ -298,7 +298,7 @@ class Builder {
 }  // namespace
 
 double PixelNoise::variance(double level) const {
-  return std::max(kLeastVariance, constant + slope * level);
+  return std::max(kMinVariance, constant + slope * level);
 }
 
 CameraModel raw_camera(const CameraModel& camera) {

@@ -26,10 +26,10 @@ constexpr double kFineLeastScale_px = 0.04;
 /// Tukey's biweight at 95 % efficiency for normal errors (Holland and Welsch 1977).
 constexpr double kTukey = 4.685;
 
-constexpr int kLeastPoints = 24;
-constexpr double kLeastInlierPart = 0.5;    ///< of a tag's points, for the tag to be held
-constexpr double kLeastCellsInView = 0.6;   ///< of a tag's cells
-constexpr double kLeastCorrelation = 0.75;  ///< of cell grey levels with those expected
+constexpr int kMinPoints = 24;
+constexpr double kMinInlierFraction = 0.5;  ///< of a tag's points, for the tag to be held
+constexpr double kMinCellsInView = 0.6;     ///< of a tag's cells
+constexpr double kMinCorrelation = 0.75;    ///< of cell grey levels with those expected
 
 /// RMS residuals beyond these are doubted, px: a target learned at rest fits to noise, a bare
 /// pattern to its print.
@@ -170,7 +170,7 @@ Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
     right += m.weight * m.offset_px * row;
   }
   fit.inliers = inliers;
-  if (inliers < kLeastPoints) return {};
+  if (inliers < kMinPoints) return {};
   // All points share one gain: a single profile's is noisy.
   const double gain = std::clamp(gains / weights, 0.3, 1.3);
   const Matrix6 full = normal.selfadjointView<Eigen::Lower>();
@@ -209,7 +209,7 @@ int Refiner::judge_tags(const PixelView<Pixel>& image, const Refinement& fit) no
       inliers += m.weight > 0.2 ? 1 : 0;
       measurable += m.too_near ? 0 : 1;
     }
-    const bool enough = measurable > 0 && inliers >= kLeastInlierPart * measurable;
+    const bool enough = measurable > 0 && inliers >= kMinInlierFraction * measurable;
     if (enough && looks_like_tag(image, target_.tags[t], fit.camera_T_platform)) {
       ++held;
     } else {
@@ -241,11 +241,11 @@ bool Refiner::looks_like_tag(const PixelView<Pixel>& image, const EdgeTag& tag,
     sbb += b * b;
     sab += a * b;
   }
-  if (n < kLeastCellsInView * static_cast<double>(tag.cells.size())) return false;
+  if (n < kMinCellsInView * static_cast<double>(tag.cells.size())) return false;
   const double var_a = saa - sa * sa / n;
   const double var_b = sbb - sb * sb / n;
   if (!(var_a > n) || !(var_b > n)) return false;
-  return (sab - sa * sb / n) > kLeastCorrelation * std::sqrt(var_a * var_b);
+  return (sab - sa * sb / n) > kMinCorrelation * std::sqrt(var_a * var_b);
 }
 
 }  // namespace tagwrench

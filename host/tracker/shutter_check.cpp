@@ -15,9 +15,9 @@ constexpr double kUnit = 10e-3;  // s
 constexpr double kReadouts[] = {1, 2, 3, 4};
 /// A shear must be seen to be mended: motion of the platform in the image
 /// during kUnit, px.
-constexpr double kLeastMotion_px = 0.5;
-constexpr int kEnough = 8;          ///< pictures mended
-constexpr double kMostOfAll = 0.5;  ///< of the pictures tried
+constexpr double kMinMotion_px = 0.5;
+constexpr int kEnough = 8;         ///< pictures mended
+constexpr double kMaxOfAll = 0.5;  ///< of the pictures tried
 
 }  // namespace
 
@@ -25,11 +25,11 @@ bool ShutterCheck::rolls(const PhotometricAligner& aligner, const PixelWindow& i
                          TimePoint time, const Eigen::Isometry3d& pose,
                          const PhotometricState& light) noexcept {
   if (done_) return false;
-  const Vector6 velocity = motion_.velocity(time, pose);
+  const Vector6 velocity = predictor_.velocity(time, pose);
   const CameraModel& camera = aligner.pixels().camera;
   const double speed_px =
       camera.fy_px * velocity.head<2>().norm() / std::max(1e-3, pose.translation().z());
-  if (!(speed_px * kUnit > kLeastMotion_px)) return false;
+  if (!(speed_px * kUnit > kMinMotion_px)) return false;
   try {
     if (!trial_.ready()) {
       PixelTemplate pixels = aligner.pixels();
@@ -42,7 +42,7 @@ bool ShutterCheck::rolls(const PhotometricAligner& aligner, const PixelWindow& i
   }
   ++tried_;
   if (mended(image, pose, velocity, light)) ++mended_;
-  done_ = mended_ >= kEnough && mended_ > kMostOfAll * tried_;
+  done_ = mended_ >= kEnough && mended_ > kMaxOfAll * tried_;
   return done_;
 }
 

@@ -2,8 +2,8 @@
 // sensor does not say so?
 #pragma once
 
-#include "host/tracker/motion.h"
 #include "host/tracker/photometric.h"
+#include "host/tracker/predictor.h"
 
 namespace tagwrench {
 
@@ -14,9 +14,9 @@ class ShutterCheck {
  public:
   /// Where the target is in the frame of this time, trusted or not.
   void seen(TimePoint time, const Eigen::Isometry3d& camera_T_platform) noexcept {
-    motion_.add(time, camera_T_platform);
+    predictor_.add(time, camera_T_platform);
   }
-  void lost() noexcept { motion_.start({}, Eigen::Isometry3d::Identity()); }
+  void lost() noexcept { predictor_.start({}, Eigen::Isometry3d::Identity()); }
 
   /// Before seen(): the picture of a fit that was not trusted, its pose, and the light before it.
   /// True once, when enough pictures have been mended and few have not. Allocates once. Never
@@ -29,7 +29,7 @@ class ShutterCheck {
               const PhotometricState& light) noexcept;
 
   PhotometricAligner trial_;
-  Motion motion_;  ///< through doubted frames too
+  ConstantVelocityPredictor predictor_;  ///< through doubted frames too
   int mended_ = 0;
   int tried_ = 0;
   bool done_ = false;

@@ -11,17 +11,17 @@
 namespace tagwrench {
 namespace {
 
-constexpr int kCell_px = 8;          ///< of the picture that is read
-constexpr int kMargin_px = 2;        ///< of a cell, not looked at
-constexpr double kLeastCell_px = 4;  ///< of the square in the image
-constexpr std::size_t kMostSquares = 12;
+constexpr int kCell_px = 8;        ///< of the picture that is read
+constexpr int kMargin_px = 2;      ///< of a cell, not looked at
+constexpr double kMinCell_px = 4;  ///< of the square in the image
+constexpr std::size_t kMaxSquares = 12;
 /// Of the looked-at pixels of all cells, those that may differ from most of their cell's.
-constexpr double kMostImpure = 0.06;
-constexpr double kLeastContrast = 30;  ///< grey levels, between black and white
-constexpr double kLeastWhite = 0.1;    ///< of the cells inside the border; and of black ones
+constexpr double kMaxImpure = 0.06;
+constexpr double kMinContrast = 30;  ///< grey levels, between black and white
+constexpr double kMinWhite = 0.1;    ///< of the cells inside the border; and of black ones
 
 /// Families that hold all others of their size.
-constexpr TagFamily kLargest[] = {
+constexpr TagFamily kMax[] = {
     TagFamily::aruco_original, TagFamily::aruco_4x4_1000, TagFamily::aruco_5x5_1000,
     TagFamily::aruco_6x6_1000, TagFamily::aruco_7x7_1000, TagFamily::apriltag_16h5,
     TagFamily::apriltag_25h9,  TagFamily::apriltag_36h10, TagFamily::apriltag_36h11,
@@ -118,7 +118,7 @@ Bits read_bits(const ImageView& image, const Square& square, int bits) {
   FlatSquare flat(image, square, cells);
   flat.part();
   Bits read;
-  if (flat.contrast() < kLeastContrast) return read;
+  if (flat.contrast() < kMinContrast) return read;
 
   constexpr int kLook_px = kCell_px - 2 * kMargin_px;
   std::vector<std::uint8_t> inside;
@@ -135,10 +135,10 @@ Bits read_bits(const ImageView& image, const Square& square, int bits) {
       white_cells += is_white ? 1 : 0;
     }
   }
-  const double white_part = static_cast<double>(white_cells) / (bits * bits);
-  if (white_part < kLeastWhite || white_part > 1 - kLeastWhite) return read;
+  const double white_fraction = static_cast<double>(white_cells) / (bits * bits);
+  if (white_fraction < kMinWhite || white_fraction > 1 - kMinWhite) return read;
   read.impurity = static_cast<double>(differing) / (cells * cells * kLook_px * kLook_px);
-  if (read.impurity < kMostImpure) read.inside = std::move(inside);
+  if (read.impurity < kMaxImpure) read.inside = std::move(inside);
   return read;
 }
 
@@ -165,7 +165,7 @@ std::optional<ReadSquare> recognise(const std::vector<std::uint8_t>& white, int 
     if (const auto as_it_is = identify_tag(expected, white))
       return ReadSquare{expected, *as_it_is, false};
   }
-  for (const TagFamily family : kLargest) {
+  for (const TagFamily family : kMax) {
     if (bits_per_side(family) != bits) continue;
     if (const auto id = identify_tag(family, white))
       return ReadSquare{smallest(family, *id), *id, false};
@@ -179,7 +179,7 @@ std::optional<ReadSquare> read_square(const ImageView& image, const Square& squa
   std::optional<ReadSquare> best;
   double least = 1;
   for (const int bits : {4, 5, 6, 7, bits_per_side(TagFamily::grid_10x10)}) {
-    if (shortest_side_px(square) < kLeastCell_px * (bits + 2)) continue;
+    if (shortest_side_px(square) < kMinCell_px * (bits + 2)) continue;
     const Bits read = read_bits(image, square, bits);
     if (read.inside.empty() || read.impurity >= least) continue;
     const std::optional<ReadSquare> tag = recognise(read.inside, bits, expected, missing);
@@ -195,7 +195,7 @@ std::optional<ReadSquare> read_square(const ImageView& image, const Square& squa
 std::vector<ReadSquare> read_squares(const ImageView& image, const std::vector<Square>& squares,
                                      TagFamily expected, std::span<const std::int16_t> missing) {
   std::vector<Square> largest = squares;
-  const std::size_t most = std::min(largest.size(), kMostSquares);
+  const std::size_t most = std::min(largest.size(), kMaxSquares);
   std::partial_sort(
       largest.begin(), largest.begin() + static_cast<std::ptrdiff_t>(most), largest.end(),
       [](const Square& a, const Square& b) { return shortest_side_px(a) > shortest_side_px(b); });

@@ -58,18 +58,18 @@ struct TargetDescription {
 };
 
 /// The averaged picture of the sensor at rest, flipped or not as the camera delivers it.
-struct RestImage {
+struct ReferenceImage {
   int width = 0;
   int height = 0;
   int frames = 0;            ///< averaged
   std::vector<float> level;  ///< grey levels 0..255, row by row, no padding
 };
 
-struct RestOptions {
+struct ReferenceOptions {
   int frames = 25;  ///< the first frames, taken at rest
   std::optional<Eigen::Isometry3d>
       camera_T_platform;  ///< known rest pose; learned from the rest frames when absent
-  std::optional<RestImage> appearance;  ///< as calibrated, seen from camera_T_platform
+  std::optional<ReferenceImage> appearance;  ///< as calibrated, seen from camera_T_platform
 };
 
 }  // namespace tagwrench

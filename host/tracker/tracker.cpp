@@ -7,12 +7,12 @@
 #include "host/core/config_error.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/corner_pose.h"
-#include "host/tracker/diagnosis.h"
+#include "host/tracker/diagnostics.h"
 #include "host/tracker/geometry_uncertainty.h"
-#include "host/tracker/motion.h"
 #include "host/tracker/photometric.h"
+#include "host/tracker/predictor.h"
+#include "host/tracker/reference.h"
 #include "host/tracker/refine.h"
-#include "host/tracker/rest.h"
 #include "host/tracker/shutter_check.h"
 #include "host/tracker/tag_corners.h"
 #include "host/tracker/trust.h"
@@ -56,18 +56,19 @@ PixelView<std::uint8_t> view(const ImageView& image) {
 }  // namespace
 
 struct Tracker::State {
-  State(const CameraModel& model, const TargetDescription& description, const RestOptions& options)
+  State(const CameraModel& model, const TargetDescription& description,
+        const ReferenceOptions& options)
       : camera(model),
         target(description),
         acquirer(model, description),
         refiner(model),
         learner(model, description, options, acquirer.patterns()),
-        diagnostician(model, description) {
+        diagnostics(model, description) {
     rest.given = options.camera_T_platform.has_value();
     const bool placed = std::all_of(description.tags.begin(), description.tags.end(),
                                     [](const Tag& tag) { return tag.platform_T_tag.has_value(); });
     if (!placed || !rest.given) return;
-    LearnedRest given;
+    LearnedReference given;
     given.camera_T_platform = given.seen_from = *options.camera_T_platform;
     for (std::size_t t = 0; t < description.tags.size(); ++t) {
       const Tag& tag = description.tags[t];
@@ -79,15 +80,15 @@ struct Tracker::State {
     adopt(given);
   }
 
-  void adopt(const LearnedRest& learned) {
+  void adopt(const LearnedReference& learned) {
     rest.camera_T_platform = learned.camera_T_platform;
     refiner.set_target(learned.target);
     rest.platform_T_tag.clear();
     for (const EdgeTag& tag : learned.target.tags)
       rest.platform_T_tag.push_back(tag.platform_T_tag);
-    motion.start({}, rest.camera_T_platform);
+    predictor.start({}, rest.camera_T_platform);
     rest.known = true;
-    const RestImage& image = learned.image;
+    const ReferenceImage& image = learned.image;
     if (image.level.empty() || image.width != camera.width_px || image.height != camera.height_px)
       return;
     aligner.set_template(
@@ -104,8 +105,8 @@ struct Tracker::State {
            image.height == camera.height_px && image.stride >= image.width;
   }
 
-  Hint flip_hint() const {
-    return camera.mirrored ? Hint::image_looks_unmirrored : Hint::image_looks_mirrored;
+  Diagnostic flip_diagnostic() const {
+    return camera.mirrored ? Diagnostic::image_looks_unmirrored : Diagnostic::image_looks_mirrored;
   }
 
   void find(const Frame& frame, Track& track);
@@ -115,7 +116,7 @@ struct Tracker::State {
   Refinement find_near(const Frame& frame) noexcept;
   Refinement find_anywhere(const Frame& frame, Track& track) noexcept;
   PhotometricFit finish(const Frame& frame, const Refinement& edges) noexcept;
-  bool believed(const PhotometricFit& fit) const noexcept;
+  bool accepted(const PhotometricFit& fit) const noexcept;
   Refinement reacquire(const Frame& frame, Track& track);
   Refinement refine_within_reach(const Frame& frame, const Eigen::Isometry3d& start) noexcept;
   PhotometricFit align(const Frame& frame, const Eigen::Isometry3d& start) noexcept;
@@ -130,14 +131,14 @@ struct Tracker::State {
   TargetDescription target;
   Acquirer acquirer;
   Refiner refiner;
-  RestLearner learner;
-  Diagnostician diagnostician;
+  ReferenceEstimator learner;
+  TrackingDiagnostics diagnostics;
   ShutterCheck shutter;
   Finding finding;        ///< the last one
   bool searched = false;  ///< it is of this frame
   bool learning = false;  ///< this frame counted for rest
   bool appearance_loaded = false;
-  KnownRest rest;
+  KnownReference rest;
   bool had_target = false;
   bool holding = false;
   int misfits = 0;
@@ -146,7 +147,7 @@ struct Tracker::State {
   std::optional<TimePoint> still_since;  ///< only while that is open
   Vector6 still_at = Vector6::Zero();    ///< m, rad, from rest
   bool still_by_picture = false;         ///< not by edges, which lie a little elsewhere
-  Motion motion;
+  ConstantVelocityPredictor predictor;
   PhotometricAligner aligner;
   PhotometricState light;
   GeometryUncertainty geometry;
@@ -156,21 +157,22 @@ struct Tracker::State {
 void Tracker::State::find(const Frame& frame, Track& track) {
   finding = acquirer.find(frame.image);
   searched = finding.looked;
-  if (finding.other_way_round) track.hint = flip_hint();
+  if (finding.other_way_round) track.diagnostic = flip_diagnostic();
 }
 
 Track Tracker::State::learn(const Frame& frame) {
   Track track;
   if (learner.wants_finding()) find(frame, track);
-  const RestLearner::Progress progress = learner.add(frame.image, finding);
-  learning = progress == RestLearner::Progress::learning;
+  const ReferenceEstimator::Progress progress = learner.add(frame.image, finding);
+  learning = progress == ReferenceEstimator::Progress::learning;
   track.tags_held = static_cast<std::uint8_t>(learner.tags_seen());
-  if (progress == RestLearner::Progress::moved) track.hint = Hint::moved_while_learning;
-  if (progress == RestLearner::Progress::done) {
+  if (progress == ReferenceEstimator::Progress::moved)
+    track.diagnostic = Diagnostic::moved_while_learning;
+  if (progress == ReferenceEstimator::Progress::done) {
     adopt(learner.learned());
     had_target = holding = true;
-    motion.start(frame.capture_time, rest.camera_T_platform);
-    track.hint = Hint::rest_learned;
+    predictor.start(frame.capture_time, rest.camera_T_platform);
+    track.diagnostic = Diagnostic::rest_learned;
   }
   return track;
 }
@@ -179,10 +181,10 @@ Track Tracker::State::learn(const Frame& frame) {
 /// stands still, wherever that is.
 void Tracker::State::learn_picture(const Frame& frame) {
   finding = learner.wants_finding() ? acquirer.find(frame.image) : Finding{};
-  if (learner.add(frame.image, finding) != RestLearner::Progress::done) return;
-  const Eigen::Isometry3d now = motion.last();
+  if (learner.add(frame.image, finding) != ReferenceEstimator::Progress::done) return;
+  const Eigen::Isometry3d now = predictor.last();
   adopt(learner.learned());
-  motion.start(frame.capture_time, now);
+  predictor.start(frame.capture_time, now);
 }
 
 Refinement Tracker::State::refine_within_reach(const Frame& frame,
@@ -205,9 +207,9 @@ Refinement Tracker::State::reacquire(const Frame& frame, Track& track) {
 /// The edges find a target that is further away than alignment reaches.
 Refinement Tracker::State::find_near(const Frame& frame) noexcept {
   if (!holding) return {};
-  const Refinement fit = refine_within_reach(frame, motion.predict(frame.capture_time));
+  const Refinement fit = refine_within_reach(frame, predictor.predict(frame.capture_time));
   // A motion that stops dead is nearer to where it was than to where it was going.
-  return fit.verdict != Verdict::lost ? fit : refine_within_reach(frame, motion.last());
+  return fit.verdict != Verdict::lost ? fit : refine_within_reach(frame, predictor.last());
 }
 
 Refinement Tracker::State::find_anywhere(const Frame& frame, Track& track) noexcept {
@@ -229,7 +231,7 @@ PhotometricFit Tracker::State::finish(const Frame& frame, const Refinement& edge
   return fit;
 }
 
-bool Tracker::State::believed(const PhotometricFit& fit) const noexcept {
+bool Tracker::State::accepted(const PhotometricFit& fit) const noexcept {
   return fit.converged && (!aligner.ready() || trusted(fit, light));
 }
 
@@ -238,10 +240,10 @@ PhotometricFit Tracker::State::align(const Frame& frame, const Eigen::Isometry3d
   const PixelWindow window{frame.image.pixels,  frame.image.stride,  part.x, part.y,
                            part.x + part.width, part.y + part.height};
   PhotometricFit fit =
-      aligner.align(window, start, motion.velocity(frame.capture_time, start), light);
+      aligner.align(window, start, predictor.velocity(frame.capture_time, start), light);
   if (fit.converged && camera.readout > 0) {
     fit = aligner.align(window, fit.camera_T_platform,
-                        motion.velocity(frame.capture_time, fit.camera_T_platform), light);
+                        predictor.velocity(frame.capture_time, fit.camera_T_platform), light);
   }
   if (fit.converged && !within_reach(rest.camera_T_platform, fit.camera_T_platform))
     fit.converged = false;
@@ -250,14 +252,15 @@ PhotometricFit Tracker::State::align(const Frame& frame, const Eigen::Isometry3d
 
 /// What the next frame must show, supposing that it comes after the same time as this one.
 Region Tracker::State::region(TimePoint time) const noexcept {
-  return aligner.region(motion.predict(time + motion.period()), kMargin_px);
+  return aligner.region(predictor.predict(time + predictor.period()), kMargin_px);
 }
 
 /// Once, when a picture of the target that was loaded does not show what the camera sees.
 void Tracker::State::say_misfit(bool fits, Track& track) noexcept {
   if (!appearance_loaded) return;
   misfits = fits ? 0 : misfits + 1;
-  if (misfits >= kMisfits && track.hint == Hint::none) track.hint = Hint::appearance_does_not_fit;
+  if (misfits >= kMisfits && track.diagnostic == Diagnostic::none)
+    track.diagnostic = Diagnostic::appearance_does_not_fit;
 }
 
 /// Once, when the target has stood still, but not where rest was given; never after it was seen
@@ -277,7 +280,7 @@ void Tracker::State::say_far_from_rest(TimePoint time, Track& track) noexcept {
   if (far && time - *still_since < kStillTime) return;
   far_from_rest_told = true;
   if (!far) return;
-  track.hint = Hint::far_from_rest;
+  track.diagnostic = Diagnostic::far_from_rest;
   track.details.offset = offset;
   track.details.rest_given = true;
 }
@@ -288,8 +291,9 @@ void Tracker::State::say_shutter(const Frame& frame, const Eigen::Isometry3d& po
   if (camera.readout > 0 || !aligner.ready()) return;
   const PixelWindow window{frame.image.pixels, frame.image.stride, 0, 0,
                            frame.image.width,  frame.image.height};
-  if (shutter.rolls(aligner, window, frame.capture_time, pose, light) && track.hint == Hint::none) {
-    track.hint = Hint::shutter_rolls;
+  if (shutter.rolls(aligner, window, frame.capture_time, pose, light) &&
+      track.diagnostic == Diagnostic::none) {
+    track.diagnostic = Diagnostic::shutter_rolls;
   }
 }
 
@@ -300,23 +304,23 @@ void Tracker::State::check_geometry(const Frame& frame, Track& track) {
   geometry_checked = true;
   if (finding.tags.size() != target.tags.size()) return;
   const Diagnosis diagnosis = diagnose(camera, target, rest, frame.image, finding);
-  if (diagnosis.cause != Hint::other_scale && diagnosis.cause != Hint::other_places) return;
+  if (diagnosis.cause != Diagnostic::other_scale && diagnosis.cause != Diagnostic::other_places)
+    return;
   far_from_rest_told = true;  // a wrong scale looks like a wrong distance
-  track.hint = diagnosis.cause;
+  track.diagnostic = diagnosis.cause;
   track.details = diagnosis.details;
 }
 
 /// Why there are no numbers, now and then.
 void Tracker::State::explain(const Frame& frame, Track& track) noexcept {
   if (track.status == Status::ok || learning) {
-    diagnostician.held();
-    if (!learning && track.hint == Hint::none) check_geometry(frame, track);
+    diagnostics.held();
+    if (!learning && track.diagnostic == Diagnostic::none) check_geometry(frame, track);
     return;
   }
-  if (!searched || track.needs_whole_frame || track.hint != Hint::none) return;
-  const Diagnosis diagnosis =
-      diagnostician.not_held(frame.capture_time, rest, frame.image, finding);
-  track.hint = diagnosis.cause;
+  if (!searched || track.needs_whole_frame || track.diagnostic != Diagnostic::none) return;
+  const Diagnosis diagnosis = diagnostics.not_held(frame.capture_time, rest, frame.image, finding);
+  track.diagnostic = diagnosis.cause;
   track.details = diagnosis.details;
 }
 
@@ -327,17 +331,17 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
   const bool partial = !frame.readable().contains(whole);
 
   PhotometricFit fit;
-  if (holding && aligner.ready()) fit = align(frame, motion.predict(frame.capture_time));
+  if (holding && aligner.ready()) fit = align(frame, predictor.predict(frame.capture_time));
   bool followed = holding;
   Refinement edges;
-  if (!believed(fit)) {
+  if (!accepted(fit)) {
     if (partial) {
       track.needs_whole_frame = true;
       return track;
     }
     edges = find_near(frame);
     if (edges.verdict != Verdict::lost) fit = finish(frame, edges);
-    if (edges.verdict == Verdict::lost || !believed(fit)) {
+    if (edges.verdict == Verdict::lost || !accepted(fit)) {
       const Refinement anew = find_anywhere(frame, track);
       if (anew.verdict != Verdict::lost) {
         edges = anew;
@@ -353,19 +357,19 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
     }
   }
   holding = had_target = true;
-  const bool good = believed(fit);
+  const bool good = accepted(fit);
   const Eigen::Isometry3d& pose = fit.converged ? fit.camera_T_platform : edges.camera_T_platform;
   if (!good) say_shutter(frame, pose, track);
   shutter.seen(frame.capture_time, pose);
   if (followed) {
-    motion.add(frame.capture_time, pose);
+    predictor.add(frame.capture_time, pose);
   } else {
-    motion.start(frame.capture_time, pose);
+    predictor.start(frame.capture_time, pose);
   }
   track.tags_held = fit.converged ? fit.tags_held : edges.tags_held;
   track.residual_px = edges.residual_px;
   if (fit.converged) {
-    track.residual_part = fit.residual_part;
+    track.residual_fraction = fit.residual_fraction;
     track.blur_px2 = 2 * light.blur[0];
   }
   track.status = Status::doubtful;
@@ -378,8 +382,8 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
                      geometry.covariance(track.displacement) + pose_covariance;
   say_far_from_rest(frame.capture_time, track);
   if (aligner.ready()) track.wanted = region(frame.capture_time);
-  if (!aligner.ready() && motion.step().head<3>().norm() < kStill &&
-      motion.step().tail<3>().norm() < kStillAngle) {
+  if (!aligner.ready() && predictor.step().head<3>().norm() < kStill &&
+      predictor.step().tail<3>().norm() < kStillAngle) {
     try {
       learn_picture(frame);
     } catch (const std::exception&) {
@@ -390,12 +394,12 @@ Track Tracker::State::follow(const Frame& frame) noexcept {
 }
 
 Tracker::Tracker(const CameraModel& camera, const TargetDescription& target,
-                 const RestOptions& rest)
+                 const ReferenceOptions& rest)
     : state_(std::make_unique<State>(camera, target, rest)) {}
 
 Tracker::~Tracker() = default;
 
-const KnownRest& Tracker::rest() const noexcept { return state_->rest; }
+const KnownReference& Tracker::rest() const noexcept { return state_->rest; }
 
 Track Tracker::track(const Frame& frame) noexcept {
   if (!state_->readable(frame.image)) {

@@ -14,11 +14,11 @@
 
 namespace tagwrench {
 
-struct KnownRest;  // tracker/diagnosis.h
+struct KnownReference;  // tracker/diagnosis.h
 
 class Tracker {
  public:
-  Tracker(const CameraModel& camera, const TargetDescription& target, const RestOptions& rest);
+  Tracker(const CameraModel& camera, const TargetDescription& target, const ReferenceOptions& rest);
   ~Tracker();
   Tracker(const Tracker&) = delete;
   Tracker& operator=(const Tracker&) = delete;
@@ -27,7 +27,7 @@ class Tracker {
   Track track(const Frame& frame) noexcept;
 
   /// The rest as it was given, or as it has been learned since.
-  const KnownRest& rest() const noexcept;
+  const KnownReference& rest() const noexcept;
 
  private:
   struct State;

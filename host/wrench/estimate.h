@@ -22,8 +22,8 @@ struct WrenchModel {
   Eigen::Matrix3d camera_R_wrench_frame = Eigen::Matrix3d::Identity();  ///< axes of wrench_frame
 
   FeatureSpec features;
-  Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMostFeatures - 6> extra =
-      Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMostFeatures - 6>::Zero(6, 0);
+  Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxFeatures - 6> extra =
+      Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxFeatures - 6>::Zero(6, 0);
   /// Of the fit: (K, extra, B) column by column, 6 (features + 1) square; empty: not known.
   Eigen::MatrixXd parameter_covariance;
   Vector6 error_at_full_load = Vector6::Zero();  ///< standard deviation that grows with the load,
@@ -47,8 +47,8 @@ class WrenchEstimator {
   const Matrix6& tool() const noexcept { return tool_; }
 
  private:
-  using Quadratic = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFeatures + 1,
-                                  kMostFeatures + 1>;
+  using Quadratic =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxFeatures + 1, kMaxFeatures + 1>;
 
   void set_parameter_variances();
   Vector6 parameter_variance(const FeatureVector& features) const noexcept;

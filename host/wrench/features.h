@@ -20,7 +20,7 @@ enum class FeatureKind : std::uint8_t {
 };
 
 constexpr int kFeatureKinds = 4;
-constexpr int kMostFeatures = 27;
+constexpr int kMaxFeatures = 27;
 
 constexpr std::string_view name(FeatureKind kind) {
   switch (kind) {
@@ -47,8 +47,8 @@ struct FeatureSpec {
 };
 
 /// The first six are the displacement.
-using FeatureVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostFeatures, 1>;
-using FeatureJacobian = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, kMostFeatures, 6>;
+using FeatureVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxFeatures, 1>;
+using FeatureJacobian = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, kMaxFeatures, 6>;
 
 /// Turns one displacement after the other into features. No heap after construction.
 class Features {

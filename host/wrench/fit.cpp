@@ -203,9 +203,9 @@ void set_common(const Problem& problem, const Judged& judged, WrenchFit& out) {
   const double most = std::sqrt(2 * std::log(std::max(n, 1.0) / kFalseAlarms));
   for (std::size_t c = 0; c < problem.common_names.size(); ++c) {
     const int at = problem.common_at(static_cast<int>(c));
-    CommonEstimate common{.name = problem.common_names[c],
-                          .value = judged.solution.unknowns[at],
-                          .sigma = std::sqrt(judged.solution.covariance(at, at))};
+    CorrelatedEstimate common{.name = problem.common_names[c],
+                              .value = judged.solution.unknowns[at],
+                              .sigma = std::sqrt(judged.solution.covariance(at, at))};
     if (std::abs(common.value) > most) {
       out.warnings.push_back(
           fmt::format("{}: off by {:.1f} times its stated uncertainty, if the other steps are "

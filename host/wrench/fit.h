@@ -23,7 +23,7 @@ namespace tagwrench {
 
 /// An error that observations share: a mass's, the direction of gravity in a mounting, a point's
 /// place. If it is off by one standard deviation, the true wrench is wrench + effect.
-struct CommonError {
+struct CorrelatedError {
   std::string name;  ///< the same name: the same error. For people: "mass 50 g", "point left, x"
   Vector6 effect = Vector6::Zero();  ///< N, N m
 };
@@ -31,7 +31,7 @@ struct CommonError {
 /// What two of them do together, or one with itself, beyond the sum of both: a force that is tilted
 /// at a point that lies elsewhere. If each is off by one standard deviation, the true wrench is
 /// further off by `effect`.
-struct CommonProduct {
+struct CorrelatedProduct {
   std::size_t first = 0, second = 0;  ///< indices into Observation::common
   Vector6 effect = Vector6::Zero();   ///< N, N m
 };
@@ -43,8 +43,8 @@ struct Observation {
   Matrix6 displacement_covariance = Matrix6::Zero();  ///< of the mean over a hold, or of a frame
   Vector6 wrench = Vector6::Zero();                   ///< N, N m, about the platform origin
   Matrix6 wrench_covariance = Matrix6::Zero();        ///< of what is this observation's alone
-  std::vector<CommonError> common;                    ///< of what it shares with others
-  std::vector<CommonProduct> products;                ///< optional; without them, guessed at
+  std::vector<CorrelatedError> common;                ///< of what it shares with others
+  std::vector<CorrelatedProduct> products;            ///< optional; without them, guessed at
   int step = 0;  ///< of the plan; what belongs to one step is held out, or rejected, together
   int zero = 0;  ///< observations with the same number count from the same, unknown, offset
 };
@@ -128,7 +128,7 @@ struct HeldOut {
 };
 
 /// What became of an error that observations share.
-struct CommonEstimate {
+struct CorrelatedEstimate {
   std::string name;
   double value = 0;  ///< in its prior standard deviations
   double sigma = 0;  ///< 1: the data say nothing about it
@@ -141,7 +141,7 @@ struct WrenchFit {
   std::vector<BlockFit> blocks;
   std::vector<ModelTrial> trials;
   std::vector<HeldOut> held_out;  ///< of blocks that were not rejected
-  std::vector<CommonEstimate> common;
+  std::vector<CorrelatedEstimate> common;
   std::array<double, 6> inside_95{};  ///< share of held-out residuals within 1.96 sigma, by axis
   std::vector<std::string> warnings;  ///< one line each
 };

@@ -16,7 +16,7 @@ namespace {
 constexpr double kReachedRatio = 0.25;  // standard deviation after over before
 constexpr double kReachedError = 0.10;  // of full load, in all six numbers together
 constexpr double kMissing = 0.02;       // singular value over the largest
-constexpr double kTakesPart = 0.3;      // in a combination
+constexpr double kTakesFraction = 0.3;  // in a combination
 
 /// Sum over the six answers to a motion d of their variances, in natural scales, is d^T A d.
 Matrix6 answer_variance(const Problem& problem, const Eigen::MatrixXd& covariance) {
@@ -83,7 +83,7 @@ std::vector<Vector6> missing_loads(const Problem& problem, const std::vector<dou
 std::string missing_name(const Vector6& combination) {
   std::vector<std::string> names;
   for (int i = 0; i < 6; ++i) {
-    if (std::abs(combination[i]) > kTakesPart)
+    if (std::abs(combination[i]) > kTakesFraction)
       names.emplace_back(kWrenchAxes[static_cast<std::size_t>(i)]);
   }
   return names.size() == 1 ? names[0]
@@ -106,10 +106,10 @@ std::string missing_reason(int axis, const std::vector<Vector6>& missing, double
     return axis < 3 ? fmt::format("no force along {} was applied", names[axis])
                     : fmt::format("no torque about {} was applied", names[axis - 3]);
   }
-  if (where != nullptr && part > kTakesPart) {
+  if (where != nullptr && part > kTakesFraction) {
     std::vector<std::string> others;
     for (int i = 0; i < 6; ++i) {
-      if (std::abs((*where)[i]) > kTakesPart)
+      if (std::abs((*where)[i]) > kTakesFraction)
         others.emplace_back(kWrenchAxes[static_cast<std::size_t>(i)]);
     }
     return fmt::format("{} were only applied together", fmt::join(others, " and "));

@@ -30,8 +30,8 @@ constexpr std::array<Hypothesis, 6> kHypotheses{{
     {0.03, true, 1.5},
     {0.03, false, 2.0},
 }};
-constexpr double kMostLeftOut = 0.25;  // of the steps with a load
-constexpr double kDoubt = 20;          // of chi^2: another step is e^10 times less likely
+constexpr double kMaxLeftOut = 0.25;  // of the steps with a load
+constexpr double kDoubt = 20;         // of chi^2: another step is e^10 times less likely
 
 constexpr double kBroken = 3;  // standard deviations of reciprocity
 // Of the geometric mean of two stiffnesses. Friction makes some hundredths; this is a load that is
@@ -60,7 +60,7 @@ std::size_t most_left_out(const Problem& steps) {
   const auto loaded =
       std::count_if(steps.blocks.begin(), steps.blocks.end(),
                     [&](const Block& step) { return steps.rows[step.members.front()].load > 0; });
-  return static_cast<std::size_t>(kMostLeftOut * static_cast<double>(loaded));
+  return static_cast<std::size_t>(kMaxLeftOut * static_cast<double>(loaded));
 }
 
 struct Attempt {
@@ -74,7 +74,7 @@ struct Attempt {
 Attempt take_out(const Problem& steps, double model_error, std::size_t most) {
   Attempt out;
   Weighting weighting{
-      .error = {kConstantPart * model_error * steps.scale, model_error * steps.scale},
+      .error = {kConstantFraction * model_error * steps.scale, model_error * steps.scale},
       .block = std::vector<double>(steps.blocks.size(), 1.0)};
   Eigen::VectorXd start;
   double margin = std::numeric_limits<double>::infinity();  // between the last one and the next

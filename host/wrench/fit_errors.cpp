@@ -12,7 +12,7 @@ namespace {
 constexpr double kMedianChi2 = 5.348 / 6;   // of chi^2 with 6 degrees of freedom, over them
 constexpr double kOutlierChi2 = 27.86 / 6;  // exceeded once in 10,000
 constexpr double kWorthRejecting = 0.015;   // of full load: less is what model errors are for
-constexpr double kMostRejected = 0.25;      // of the blocks
+constexpr double kMaxRejected = 0.25;       // of the blocks
 constexpr double kStudent = 4;              // degrees of freedom of the robust weights
 constexpr int kRobustRounds = 5;
 constexpr int kRounds = 4;
@@ -29,7 +29,7 @@ double largest_error(const Problem& problem, const std::vector<Prediction>& bloc
 ErrorModel robust_error(const Problem& problem,
                         const std::vector<std::vector<Prediction>>& held_out) {
   const auto of_size = [&](double size) {
-    return ErrorModel{size * kConstantPart * problem.scale, size * problem.scale};
+    return ErrorModel{size * kConstantFraction * problem.scale, size * problem.scale};
   };
   const auto too_small = [&](double size) {
     return median(block_chi2(problem, held_out, of_size(size))) > kMedianChi2;
@@ -149,7 +149,7 @@ bool reject(const Problem& problem, const std::vector<std::vector<Prediction>>& 
     if (off) ++rejected;
   }
   const auto most =
-      static_cast<std::size_t>(kMostRejected * static_cast<double>(problem.blocks.size()));
+      static_cast<std::size_t>(kMaxRejected * static_cast<double>(problem.blocks.size()));
   if (rejected <= most) return true;
   for (std::size_t b = 0; b < weight.size(); ++b) weight[b] = left_out[b] ? 0.0 : 1.0;
   return false;

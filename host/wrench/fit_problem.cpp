@@ -47,10 +47,10 @@ void check(const Observation& o, std::size_t index) {
   if (!is_covariance(o.displacement_covariance))
     refuse("a displacement_covariance that is no covariance");
   if (!is_covariance(o.wrench_covariance)) refuse("a wrench_covariance that is no covariance");
-  for (const CommonError& error : o.common) {
+  for (const CorrelatedError& error : o.common) {
     if (!error.effect.allFinite()) refuse("a common error that is not finite");
   }
-  for (const CommonProduct& product : o.products) {
+  for (const CorrelatedProduct& product : o.products) {
     if (!product.effect.allFinite() || std::max(product.first, product.second) >= o.common.size())
       refuse("a product of common errors that is none");
   }
@@ -191,9 +191,9 @@ Problem make_problem(std::span<const Observation> observations, std::span<const 
     row.displacement_covariance = o.displacement_covariance;
     row.wrench_covariance = o.wrench_covariance;
     row.zero = index_of(problem.zeros, o.zero);
-    for (const CommonError& error : o.common)
+    for (const CorrelatedError& error : o.common)
       row.common.emplace_back(index_of(problem.common_names, error.name), error.effect);
-    for (const CommonProduct& product : o.products) {
+    for (const CorrelatedProduct& product : o.products) {
       row.products.push_back(
           {row.common[product.first].first, row.common[product.second].first, product.effect});
     }

@@ -9,7 +9,7 @@
 namespace tagwrench::fit {
 namespace {
 
-constexpr int kMostIterations = 12;
+constexpr int kMaxIterations = 12;
 constexpr double kConverged = 1e-9;  // of the scaled unknowns
 constexpr double kFloor = 3e-5;      // of full load: no bench is better
 constexpr double kVagueOffset = 10;  // of full load
@@ -183,7 +183,7 @@ Solution solve(const Problem& problem, const Weighting& weighting, const Eigen::
     Eigen::Map<Eigen::MatrixXd>(solution.unknowns.data(), 6, problem.feature_columns()) =
         problem.prior_mean;
   }
-  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     const bool adjust = iteration > 0 || start.size() == n;
     solution.total = prior;
     solution.blocks.assign(problem.blocks.size(),

@@ -8,7 +8,7 @@
 
 namespace tagwrench::fit {
 
-inline constexpr double kConstantPart = 0.1;  ///< of the model's error, without load
+inline constexpr double kConstantFraction = 0.1;  ///< of the model's error, without load
 
 /// What noise and reference do not explain: variance constant^2 + proportional^2 * Row::load.
 struct ErrorModel {

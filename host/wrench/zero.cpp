@@ -6,22 +6,22 @@ namespace tagwrench {
 namespace {
 
 /// Scatter that counts as noise whatever is said of the noise, and that never does, of the range.
-constexpr double kLeastScatter = 1e-4;
-constexpr double kMostScatter = 3e-3;
+constexpr double kMinScatter = 1e-4;
+constexpr double kMaxScatter = 3e-3;
 
 bool known(double range) { return range > 0 && range < kUnknownRange; }
 
-Vector6 known_part(Vector6 range) {
+Vector6 known_fraction(Vector6 range) {
   for (int i = 0; i < 6; ++i) {
     if (!known(range[i])) range[i] = 0;
   }
   return range;
 }
 
-StillMeter::Options scatter(const Vector6& range) {
-  StillMeter::Options options;
-  options.least = range * kLeastScatter;
-  options.most = range * kMostScatter;
+StationarityDetector::Options scatter(const Vector6& range) {
+  StationarityDetector::Options options;
+  options.least = range * kMinScatter;
+  options.most = range * kMaxScatter;
   for (int i = 0; i < 6; ++i) {
     if (range[i] == 0) options.least[i] = options.most[i] = 1e150;  // not looked at
   }
@@ -32,7 +32,8 @@ double seconds(Duration time) { return std::chrono::duration<double>(time).count
 
 }  // namespace
 
-void StillMeter::add(TimePoint time, const Vector6& value, const Vector6& sigma) noexcept {
+void StationarityDetector::add(TimePoint time, const Vector6& value,
+                               const Vector6& sigma) noexcept {
   if (!started_ || time <= last_ || time - last_ > options_.longest_gap) {
     started_ = true;
     moves_ = false;
@@ -54,7 +55,7 @@ void StillMeter::add(TimePoint time, const Vector6& value, const Vector6& sigma)
 
 ZeroTracking::ZeroTracking(const ZeroOptions& options)
     : options_(options),
-      range_(known_part(options.range)),
+      range_(known_fraction(options.range)),
       follow_(options.follow && range_.maxCoeff() > 0),
       meter_(scatter(range_)) {}
 

@@ -13,7 +13,7 @@ namespace tagwrench {
 
 /// Whether six numbers stand still: their running standard deviation is no more than noise, and
 /// has been for a while.
-class StillMeter {
+class StationarityDetector {
  public:
   struct Options {
     /// Scatter up to `sigmas` standard deviations of a reading is noise; never less than `least`,
@@ -25,7 +25,7 @@ class StillMeter {
     Duration settled = std::chrono::seconds(1);
     Duration longest_gap = std::chrono::milliseconds(500);  ///< a longer one starts it again
   };
-  explicit StillMeter(const Options& options) : options_(options) {}
+  explicit StationarityDetector(const Options& options) : options_(options) {}
 
   /// Times grow; one that does not starts it again.
   void add(TimePoint time, const Vector6& value, const Vector6& sigma) noexcept;
@@ -116,7 +116,7 @@ class ZeroTracking {
   ZeroOptions options_;
   Vector6 range_;  ///< 0 for axes that are not followed
   bool follow_;
-  StillMeter meter_;
+  StationarityDetector meter_;
   bool felt_ = false;  ///< somebody, since the start
   bool asked_ = false;
   bool woke_ = false;

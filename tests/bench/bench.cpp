@@ -227,7 +227,7 @@ std::string bench(const char* title, const sim::Scenario& scenario, PixelFormat 
     estimator.estimate(tracked, sample);
     shaping.shape(sample);
     const TimePoint t3 = Clock::now();
-    const Counts6 counts = dithered(to_counts(sample.motion, kSpacemouseLimit_counts), last);
+    const Counts6 counts = dithered(to_counts(sample.deflection, kSpacemouseLimit_counts), last);
     last = counts;
     const SpacemouseReport motion = spacemouse_report(counts);
     const WrenchReport reading = wrench_report(sample);

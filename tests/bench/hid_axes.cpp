@@ -83,9 +83,9 @@ double half_way(const FilterOptions& filter, double fps, double rise) {
                   .status = Status::ok};
     sample.wrench[0] = 0.25 * (1 - std::cos(M_PI * phase)) * options.full_scale[0];
     shaping.shape(sample);
-    if (sample.motion[0] >= 0.25)
-      return time - (sample.motion[0] - 0.25) / (sample.motion[0] - before) / fps;
-    before = sample.motion[0];
+    if (sample.deflection[0] >= 0.25)
+      return time - (sample.deflection[0] - 0.25) / (sample.deflection[0] - before) / fps;
+    before = sample.deflection[0];
     if (time > 60) return std::numeric_limits<double>::quiet_NaN();
   }
 }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/motion/desk.h"
+#include "host/motion/profile_manager.h"
 #include "host/output/hid_report.h"
 #include "host/sensor/default_profile.h"
 #include "host/sensor/sensor_config.h"
@@ -37,7 +37,7 @@ class SimulatedDevice {
     last_ = sample;
     if (!carries_numbers(sample.status) || desk_.period() == Duration::zero()) {
       next_move_.reset();
-      moved(sample.capture_time, to_counts(sample.motion, kSpacemouseLimit_counts));
+      moved(sample.capture_time, to_counts(sample.deflection, kSpacemouseLimit_counts));
     } else if (!next_move_) {
       next_move_ = sample.capture_time;
     }
@@ -50,7 +50,7 @@ class SimulatedDevice {
     return options;
   }
 
-  Desk desk_;
+  ProfileManager desk_;
   ZeroTracking zero_;
   Sample last_;
   std::optional<TimePoint> next_move_;

@@ -93,7 +93,7 @@ class Probe final : public Output {
   };
   Probe() { moves.reserve(1 << 16); }
   SendStatus move(const Sample& sample) noexcept override {
-    const bool zero = spnav_counts(sample.motion) == Counts6{};
+    const bool zero = spnav_counts(sample.deflection) == Counts6{};
     moves.push_back(
         {std::chrono::steady_clock::now(), sample.latency_origin, sample.sequence, zero});
     return SendStatus::ok;
@@ -107,7 +107,7 @@ struct LiveFigures {
   std::vector<Probe::Move> moves;
   std::vector<SpnavEvent> events;
   double loop_cpu = 0;    ///< of one core
-  double keeper_cpu = 0;  ///< of one core
+  double daemon_cpu = 0;  ///< of one core
   RunReport report;
 };
 
@@ -142,7 +142,7 @@ LiveFigures run_live(const HidClip& clip, const Script& script, double rate_hz,
                      Bystanders* bystanders = nullptr) {
   const HidFolder folder;
   const std::string path = folder.file("spnav.sock");
-  HidKeeper keeper(path);
+  HidHolder daemon(path);
   SpnavListener listener(path);
   UniqueFd slow;
   if (bystanders != nullptr) slow = connect_as_program(path);
@@ -150,7 +150,8 @@ LiveFigures run_live(const HidClip& clip, const Script& script, double rate_hz,
   ClipSource source(clip, script.pictures, static_cast<std::size_t>(1.5 * clip.fps));
   Tracker tracker(clip.sensor.camera, clip.sensor.target, clip.sensor.rest);
   WrenchEstimator wrench(clip.sensor.wrench);
-  Desk desk(ProfileFiles(profile(folder, rate_hz), default_profile(clip.sensor)), {}, {});
+  ProfileManager profiles(ProfileFiles(profile(folder, rate_hz), default_profile(clip.sensor)), {},
+                          {});
   ZeroOptions zero_options;
   zero_options.range = clip.sensor.wrench.range;
   ZeroTracking zero(zero_options);
@@ -163,14 +164,14 @@ LiveFigures run_live(const HidClip& clip, const Script& script, double rate_hz,
   if (bystanders != nullptr)
     outputs.push_back(std::make_unique<JsonlOutput>(
         fmt::format("/proc/self/fd/{}", bystanders->slow_pipe), /*lossless=*/false));
-  DeadMan dead_man({});
-  Pipeline pipeline(source, tracker, wrench, desk, outputs, dead_man, /*stop_fd=*/-1);
+  Watchdog watchdog({});
+  Pipeline pipeline(source, tracker, wrench, profiles, outputs, watchdog, /*stop_fd=*/-1);
   pipeline.follow_zero(zero);
 
   LiveFigures figures;
-  const double keeper_before = keeper.cpu_seconds();
+  const double daemon_before = daemon.cpu_seconds();
   figures.report = pipeline.run({});
-  figures.keeper_cpu = (keeper.cpu_seconds() - keeper_before) /
+  figures.daemon_cpu = (daemon.cpu_seconds() - daemon_before) /
                        std::chrono::duration<double>(figures.report.elapsed).count();
   if (bystanders != nullptr) drain(slow, *bystanders);
   figures.loop_cpu = source.cpu_share();
@@ -228,7 +229,7 @@ int idle_events(const LiveFigures& live, double rest) {
 }
 
 const std::vector<std::string> kAboutLive = {
-    "The program's own loop in this process, its outputs, the spnav keeper and a program on its "
+    "The program's own loop in this process, its outputs, the spnav daemon and a program on its "
     "socket, live;",
     "640x480 GREY, rendered before, handed over as a camera's mapped buffers are (V4L2's own calls "
     "are not in it)."};
@@ -320,9 +321,9 @@ void bench_cpu(Table& table) {
     const LiveFigures live = run_live(clip, script, 125);
     table.line(
         fmt::format("{:.0f} fps: {} pictures, {} with numbers, {} lost; {} events; the "
-                    "keeper takes {:.2f} % more",
+                    "daemon takes {:.2f} % more",
                     c.fps, live.report.frames, live.report.with_numbers, live.report.dropped,
-                    live.events.size(), 100 * live.keeper_cpu));
+                    live.events.size(), 100 * live.daemon_cpu));
     table.at_most(fmt::format("{:.0f} fps: processor time of the loop", c.fps), 100 * live.loop_cpu,
                   c.limit, "%");
   }

@@ -25,24 +25,24 @@ HidFolder::~HidFolder() {
   std::filesystem::remove_all(path_, ignored);
 }
 
-HidKeeper::HidKeeper(const std::string& path) {
+HidHolder::HidHolder(const std::string& path) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
     throw std::runtime_error("no socket pair");
   stop_.reset(ends[0]);
   stopped_.reset(ends[1]);
   std::optional<SpnavSockets> sockets = listen_spnav(path);
-  if (!sockets) throw std::runtime_error("a keeper is there already: " + path);
-  keeper_.emplace(std::move(*sockets), SpnavKeeperOptions{}, stopped_.get());
-  thread_ = std::thread([this] { keeper_->run(); });
+  if (!sockets) throw std::runtime_error("a daemon is there already: " + path);
+  daemon_.emplace(std::move(*sockets), SpnavDaemonOptions{}, stopped_.get());
+  thread_ = std::thread([this] { daemon_->run(); });
 }
 
-HidKeeper::~HidKeeper() {
+HidHolder::~HidHolder() {
   stop_.reset();
   thread_.join();
 }
 
-double HidKeeper::cpu_seconds() const {
+double HidHolder::cpu_seconds() const {
   clockid_t clock{};
   timespec used{};
   auto& thread = const_cast<std::thread&>(thread_);
@@ -56,11 +56,11 @@ UniqueFd connect_as_program(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   path.copy(address.sun_path, sizeof address.sun_path - 1);
-  const std::uint32_t wish = 0x7faa5501;
+  const std::uint32_t request = 0x7faa5501;
   std::uint32_t answer = 0;
   if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-      ::send(fd.get(), &wish, sizeof wish, MSG_NOSIGNAL) != sizeof wish ||
-      ::recv(fd.get(), &answer, sizeof answer, MSG_WAITALL) != sizeof answer || answer != wish)
+      ::send(fd.get(), &request, sizeof request, MSG_NOSIGNAL) != sizeof request ||
+      ::recv(fd.get(), &answer, sizeof answer, MSG_WAITALL) != sizeof answer || answer != request)
     throw std::runtime_error(path + ": " + std::strerror(errno));
   return fd;
 }

@@ -1,4 +1,4 @@
-// Both ends of the spnav socket within the benchmark: its keeper, and a program that reads events.
+// Both ends of the spnav socket within the benchmark: its daemon, and a program that reads events.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/core/types.h"
-#include "host/output/spnav_keeper.h"
+#include "host/output/spnav_daemon.h"
 
 namespace tagwrench::bench {
 
@@ -28,19 +28,19 @@ class HidFolder {
   std::string path_;
 };
 
-/// The keeper, in a thread instead of a process.
-class HidKeeper {
+/// The daemon, in a thread instead of a process.
+class HidHolder {
  public:
-  explicit HidKeeper(const std::string& path);
-  ~HidKeeper();
-  HidKeeper(const HidKeeper&) = delete;
-  HidKeeper& operator=(const HidKeeper&) = delete;
+  explicit HidHolder(const std::string& path);
+  ~HidHolder();
+  HidHolder(const HidHolder&) = delete;
+  HidHolder& operator=(const HidHolder&) = delete;
   double cpu_seconds() const;  ///< so far
 
  private:
   UniqueFd stop_;
   UniqueFd stopped_;
-  std::optional<SpnavKeeper> keeper_;
+  std::optional<SpnavDaemon> daemon_;
   std::thread thread_;
 };
 
@@ -53,7 +53,7 @@ struct SpnavEvent {
 /// Connects as libspnav does, version 1 of the protocol.
 UniqueFd connect_as_program(const std::string& path);
 
-/// Reads motion events until the keeper ends.
+/// Reads motion events until the daemon ends.
 class SpnavListener {
  public:
   explicit SpnavListener(const std::string& path);

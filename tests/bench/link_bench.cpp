@@ -27,8 +27,8 @@ double cpu_seconds() {
 
 template <class Message>
 void append(Bytes& stream, const Message& message, std::uint8_t& sequence) {
-  std::uint8_t body[link::kMostBodyBytes];
-  std::uint8_t frame[link::kMostFrameBytes];
+  std::uint8_t body[link::kMaxBodyBytes];
+  std::uint8_t frame[link::kMaxFrameBytes];
   const std::uint8_t count = link::encode(message, sequence++, body);
   const std::uint8_t bytes = link::write_frame(body, count, frame);
   stream.insert(stream.end(), frame, frame + bytes);
@@ -102,7 +102,7 @@ void bench_parser(Table& table) {
   session->take(greeting, now);
   begin = cpu_seconds();
   constexpr std::size_t kChunk = 64;  // as a USB adapter delivers
-  std::uint8_t out[link::BoardSession::kMostBytesOut];
+  std::uint8_t out[link::BoardSession::kMaxBytesOut];
   std::size_t taken = 0;
   for (std::size_t at = 0; at < stream.size(); at += kChunk) {
     now += std::chrono::microseconds(20 * kChunk * 5);

@@ -23,8 +23,8 @@
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
-#include "host/web/server/ask.h"
 #include "host/web/server/live_feed.h"
+#include "host/web/server/page_request.h"
 #include "host/wrench/estimate.h"
 #include "tests/bench/hid_figures.h"
 
@@ -38,9 +38,9 @@ constexpr Duration kPeriod = std::chrono::nanoseconds(1'000'000'000 / 120);
 constexpr int kFrames = 60;
 constexpr int kTurns = 40;  // of each, a second long
 
-struct Silent final : AskHandler {
+struct Silent final : PageRequestHandler {
   explicit Silent(WebServer& to) : server(to) {}
-  void ask(Ask ask) override { server.answer(ask.page, ask.id, true, ""); }
+  void handle(PageRequest request) override { server.answer(request.page, request.id, true, ""); }
   WebServer& server;
 };
 
@@ -58,12 +58,12 @@ int read_all(std::uint16_t port) {
       "\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
       "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\nSec-WebSocket-Protocol: tagwrench.v1\r\n\r\n";
   std::vector<char> bytes(65536);
-  if (::send(socket.get(), ask.data(), ask.size(), 0) < 0) return 1;
+  if (::send(socket.get(), request.data(), request.size(), 0) < 0) return 1;
   if (::recv(socket.get(), bytes.data(), bytes.size(), 0) <= 0) return 1;
-  const std::string wish = R"({"id":1,"ask":"pictures","on":true})";
-  ask =
-      "\x81" + std::string(1, static_cast<char>(0x80 | wish.size())) + std::string(4, '\0') + wish;
-  if (::send(socket.get(), ask.data(), ask.size(), 0) < 0) return 1;
+  const std::string request = R"({"id":1,"ask":"pictures","on":true})";
+  ask = "\x81" + std::string(1, static_cast<char>(0x80 | request.size())) + std::string(4, '\0') +
+        request;
+  if (::send(socket.get(), request.data(), request.size(), 0) < 0) return 1;
   while (::recv(socket.get(), bytes.data(), bytes.size(), 0) > 0) {
   }
   return 0;

@@ -19,7 +19,7 @@ namespace {
 constexpr int kFolds = 5;
 constexpr double kForceSigma = 1e-6;   // N, of the ideal reference: that of interpolation
 constexpr double kTorqueSigma = 1e-8;  // N m
-constexpr double kMostUsPerSample = 2;
+constexpr double kMaxUsPerSample = 2;
 
 std::vector<Observation> observations_of(const Readings& readings, const ReferenceRecord& reference,
                                          double lag) {
@@ -207,7 +207,7 @@ void print_sample_cost(const WrenchModel& model, const std::vector<Observation>&
                   cost.us / cost.matrix_us, cost.matrix_us, track_us, track_us / cost.us));
   table.line(fmt::format("the paper's way to poses {:.0f} us, {:.0f} times as much", usual_us,
                          usual_us / cost.us));
-  table.at_most("estimator, per sample", cost.us, kMostUsPerSample, "us");
+  table.at_most("estimator, per sample", cost.us, kMaxUsPerSample, "us");
 }
 
 }  // namespace

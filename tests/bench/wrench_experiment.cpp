@@ -13,8 +13,8 @@ namespace tagwrench::bench {
 namespace {
 
 constexpr double kPaperWeight = 0.2;
-constexpr double kLeastR2 = 0.999;
-constexpr double kLeastGainFz = 50;
+constexpr double kMinR2 = 0.999;
+constexpr double kMinGainFz = 50;
 
 enum Row : std::uint8_t { kTruth, kPaper, kUnfiltered, kBestOpenCv, kOurs };
 
@@ -61,11 +61,11 @@ std::vector<Scored> with_ideal_reference(const std::vector<Readings>& readings,
   table.line("that they carry: a lag of its own for each mode, where the fit has one for all.");
 
   SixFigures limit{};
-  limit.fill(kLeastR2);
+  limit.fill(kMinR2);
   table.columns("targets", kAxisHeads);
   table.figures("(c) held-out R^2", all[kOurs].r2, 6);
   table.at_least("(c) held-out R^2", all[kOurs].r2, limit, 6);
-  table.at_least("Fz RMSE, (a) / (c)", all[kPaper].rmse[2] / all[kOurs].rmse[2], kLeastGainFz,
+  table.at_least("Fz RMSE, (a) / (c)", all[kPaper].rmse[2] / all[kOurs].rmse[2], kMinGainFz,
                  "times");
   return all;
 }

@@ -18,7 +18,7 @@ constexpr double kNoise_counts = 1;
 constexpr double kCorner_hz = 15;
 constexpr double kLag = 0.040;  // s, of filter and transport together at low frequencies
 // s. Its crystal is 100 ppm off, so that its readings drift past the frames by one of its periods
-// in 100 s, and interpolation between them is the same for no two stretches of time.
+// in 100 s, and interpolation between them is the same for no two segments of time.
 constexpr double kPeriod = 0.010 * (1 + 1e-4);
 constexpr int kSteps = 10;  // of the filter, in a period
 // Its surface touches the sensor's base, which is a spring's length and a lens distance below.

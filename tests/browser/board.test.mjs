@@ -64,7 +64,7 @@ test('a page sees the board\'s light and load cells in newtons', { skip }, async
   assert.ok(shown.cells.every((cell) => Number.isFinite(cell.n) && Number.isFinite(cell.sigma_n)), JSON.stringify(shown));
 });
 
-test('the light is as a page wishes, and then again as it was settled', { skip }, async () => {
+test('the light is as a page requests, and then again as it was settled', { skip }, async () => {
   const { board: first } = await stateWith((b) => b.led > 0);
   assert.equal((await page.ask('led', { level: 0.07 })).ok, true);
   await stateWith((b) => Math.abs(b.led - 0.07) < 0.002);

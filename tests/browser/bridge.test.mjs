@@ -51,7 +51,7 @@ function jobOf(pid) {
   return 0;
 }
 
-/** A wish that fails, and says why. */
+/** A request that fails, and says why. */
 async function refused(page, what, args, why) {
   const answer = await page.ask(what, args);
   assert.equal(answer.ok, false, `${what} ${JSON.stringify(args)}: ${answer.text}`);
@@ -68,7 +68,7 @@ after(() => {
   rmSync(folder, { recursive: true, force: true });
 });
 
-test('a page sees samples and state, and its wishes are answered', { skip: lacks }, async () => {
+test('a page sees samples and state, and its requests are answered', { skip: lacks }, async () => {
   const { child, page, hello } = await startBridge(['--profile', 'cad', '--profile', 'game']);
   assert.equal(hello.protocol, 1);
   assert.deepEqual(hello.can.jobs, ['doctor']); // there is no sensor.yaml to write to

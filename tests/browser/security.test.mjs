@@ -208,7 +208,7 @@ describe('sockets', { skip }, () => {
     page.destroy();
   });
 
-  test('wrong wishes are answered, each once', async () => {
+  test('wrong requests are answered, each once', async () => {
     const page = await web.page();
     for (const ask of ['', 'Zero', 'a b', 7, null]) {
       page.send({ id: 9, ask });

@@ -174,8 +174,8 @@ test('once loaded it starts and measures without a network, with the sensor of l
 test('an unplugged camera is told, and opened again when it is back', { skip }, async () => {
   const { page } = await openPage(browser, host.url, { init: () => {
     const ask = navigator.mediaDevices.getUserMedia.bind(navigator.mediaDevices);
-    navigator.mediaDevices.getUserMedia = async (...wish) => {
-      const stream = await ask(...wish);
+    navigator.mediaDevices.getUserMedia = async (...request) => {
+      const stream = await ask(...request);
       window.lastTrack = stream.getVideoTracks()[0];
       return stream;
     };

@@ -119,7 +119,7 @@ test('one button holds all automatics at what they have found, and lets them go 
     const now = { exposureMode: 'continuous', focusMode: 'continuous', exposureTime: 35 };
     const settings = MediaStreamTrack.prototype.getSettings;
     MediaStreamTrack.prototype.getSettings = function () { return { ...settings.call(this), ...now }; };
-    MediaStreamTrack.prototype.applyConstraints = async ({ advanced: [wish] }) => void Object.assign(now, (window.asked = wish));
+    MediaStreamTrack.prototype.applyConstraints = async ({ advanced: [request] }) => void Object.assign(now, (window.asked = request));
   });
   await started(page);
   const hold = page.getByRole('button', { name: /[Ee]xposure and focus/ });

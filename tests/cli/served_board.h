@@ -78,7 +78,7 @@ class ServedBoard {
   }
 
   void send_samples() {
-    for (std::uint8_t channel = 0; channel < kMostCells; ++channel) {
+    for (std::uint8_t channel = 0; channel < kMaxCells; ++channel) {
       if ((wired_ >> channel & 1) != 0) {
         model_.send_cell(channel, counts_ + 10 * channel + (sequence_ % 3) - 1, now(), sequence_);
       } else if (!fault_sent_) {

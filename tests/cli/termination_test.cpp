@@ -154,7 +154,7 @@ TEST_F(Termination, EndsTheWaitForADeviceToRead) {
   expect_ends({.arguments = {"read", "no-such-serial-71c2", "--wait"}, .message = "waiting for"});
 }
 
-TEST_F(Termination, EndsTheKeeperOfTheSpnavSocketWhichTakesItAway) {
+TEST_F(Termination, EndsTheDaemonOfTheSpnavSocketWhichTakesItAway) {
   expect_ends({.arguments = {"spnav", "--socket", path("spnav.sock")}, .message = "serving"});
   EXPECT_EQ(sockets(), std::vector<std::string>());
 }
@@ -165,11 +165,12 @@ TEST_F(Termination, EndsTheFocusGuide) {
 }
 
 TEST_F(Termination, EndsABandwidthMeasurementWithoutAReport) {
-  expect_ends({.arguments = {"bandwidth", "--source", "sim:" TAGWRENCH_SCENARIOS "/bandwidth.yaml",
-                             "--port", "sim", "--seconds", "20"},
-               .message = "LED steady",
-               .status = 1,
-               .last_words = "stopped"});
+  expect_ends(
+      {.arguments = {"camera-timing", "--source", "sim:" TAGWRENCH_SCENARIOS "/camera_timing.yaml",
+                     "--port", "sim", "--seconds", "20"},
+       .message = "LED steady",
+       .status = 1,
+       .last_words = "stopped"});
 }
 
 TEST_F(Termination, EndsWhatTalksToABoard) {

@@ -101,7 +101,7 @@ void BoardClient::take_frame(VirtualTime end) {
 link::Configure full_configuration() {
   link::Configure configuration{};
   configuration.host_timeout_ms = 5000;
-  configuration.cell_count = link::kMostCells;
+  configuration.cell_count = link::kMaxCells;
   for (link::CellInput& input : configuration.cells) input = link::CellInput::a128;
   configuration.cell_rate_sps = 80;
   configuration.adc_mask = 3;

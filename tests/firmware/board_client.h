@@ -33,8 +33,8 @@ class BoardClient {
 
   template <typename Message>
   Sent send(const Message& message) {
-    std::uint8_t body[link::kMostBodyBytes];
-    std::uint8_t frame[link::kMostFrameBytes];
+    std::uint8_t body[link::kMaxBodyBytes];
+    std::uint8_t frame[link::kMaxFrameBytes];
     const std::uint8_t sequence = sequence_++;
     const std::uint8_t count = link::encode(message, sequence, body);
     const std::uint8_t bytes = link::write_frame(body, count, frame);

@@ -60,10 +60,10 @@ class ForceCourse {
  public:
   explicit ForceCourse(const SteadyTime& start) : start_(start) {}
   void add(std::int64_t time_ns, double force_n) {
-    constexpr std::size_t kMost = 4096;  // points; those of some seconds
+    constexpr std::size_t kMax = 4096;  // points; those of some seconds
     if (!points_.empty() && time_ns <= points_.back().time_ns) return;
     points_.push_back({time_ns, force_n});
-    if (points_.size() > kMost) points_.pop_front();
+    if (points_.size() > kMax) points_.pop_front();
   }
   double operator()(VirtualTime time) const {
     const std::int64_t t = (start_ + time).time_since_epoch().count();

@@ -108,7 +108,7 @@ class ClockRun {
 
   void send(VirtualTime now) {
     if (session_.next_poll() > host(now)) return;
-    std::array<std::uint8_t, link::BoardSession::kMostBytesOut> bytes;
+    std::array<std::uint8_t, link::BoardSession::kMaxBytesOut> bytes;
     const std::size_t count = session_.poll(host(now), bytes.data());
     if (count > 0) board_.write_at(to_board_.out(now, true), {bytes.data(), count});
   }

@@ -24,7 +24,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 sim::Scenario small_scenario() {
-  sim::Scenario scenario = load_scenario(std::string(TAGWRENCH_SCENARIOS) + "/bandwidth.yaml");
+  sim::Scenario scenario = load_scenario(std::string(TAGWRENCH_SCENARIOS) + "/camera_timing.yaml");
   scenario.camera.width_px = 320;
   scenario.camera.height_px = 240;
   scenario.camera.fx_px = scenario.camera.fy_px = 402.5;
@@ -163,12 +163,12 @@ TEST_F(ClosedInstrument, BandwidthRecoversTheCameraThroughTheBoard) {
   LockstepCamera camera(scenario, host);
   BoardPatternLamp lamp(
       host.session(), [] {}, -1);
-  BandwidthOptions options;
+  CameraTimingOptions options;
   options.seconds = 8;
   options.reference_seconds = 1;
-  const BandwidthMeasurement measured = measure_bandwidth(camera, lamp, options);
+  const CameraTimingMeasurement measured = measure_camera_timing(camera, lamp, options);
   ASSERT_EQ(measured.refusal, "");
-  const BandwidthResult& r = measured.result;
+  const CameraTimingResult& r = measured.result;
   fmt::print(
       "rate {:.5f} +- {:.5f} Hz, latency {:.3f} +- {:.3f} ms, jitter {:.3f} ms, read-out {:.4f} +- "
       "{:.4f} ms, exposure {:.4f} ms, {} frames, {} timed, {} stale, {} strange, {} missing; clock "

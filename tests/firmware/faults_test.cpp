@@ -292,8 +292,8 @@ TEST_F(Inputs, NoiseOnTheLineCostsFramesNotTheBoard) {
   client.forget();
   constexpr int kRequests = 300;
   for (int i = 0; i < kRequests; ++i) {
-    std::uint8_t body[link::kMostBodyBytes];
-    std::uint8_t frame[link::kMostFrameBytes];
+    std::uint8_t body[link::kMaxBodyBytes];
+    std::uint8_t frame[link::kMaxFrameBytes];
     const std::uint8_t count =
         link::encode(link::TimeRequest{}, static_cast<std::uint8_t>(i), body);
     const std::uint8_t bytes = link::write_frame(body, count, frame);
@@ -350,8 +350,8 @@ TEST_F(Inputs, HalfAFrameIsForgottenWithTheNext) {
 }
 
 TEST_F(Inputs, AnUnknownRequestIsAnswered) {
-  std::uint8_t body[link::kMostBodyBytes] = {0x55, 200, 1, 2, 3};
-  std::uint8_t frame[link::kMostFrameBytes];
+  std::uint8_t body[link::kMaxBodyBytes] = {0x55, 200, 1, 2, 3};
+  std::uint8_t frame[link::kMaxFrameBytes];
   const std::uint8_t bytes = link::write_frame(body, 5, frame);
   board.write({frame, bytes});
   const auto answer = client.next<link::Answer>();

@@ -7,8 +7,8 @@ namespace tagwrench::emulator {
 
 namespace {
 
-constexpr std::int32_t kHighest = 0x7FFFFF;
-constexpr std::int32_t kLowest = -0x800000;
+constexpr std::int32_t kMax = 0x7FFFFF;
+constexpr std::int32_t kMin = -0x800000;
 constexpr VirtualTime kPowerDown = std::chrono::microseconds(60);
 /// No further pulse for so long: the read-out is over. The datasheet limits the clock's high time
 /// only.
@@ -91,17 +91,16 @@ void Hx711::convert(Cycle when) {
       scale * (bridge_.offset_counts + bridge_.counts_per_newton * bridge_.force(now)) +
       bridge_.noise_counts * noise(random_);
   const auto clipped =
-      static_cast<std::int32_t>(std::clamp(std::round(counts), double{kLowest}, double{kHighest}));
+      static_cast<std::int32_t>(std::clamp(std::round(counts), double{kMin}, double{kMax}));
   shift_ = static_cast<std::uint32_t>(clipped) & 0xFFFFFF;
   if (unread_now_) {
     ++unread_;
     const Cycle edge = when + core_.cycles_of(kReplaced);
-    conversions_.push_back(
-        {core_.time_of(edge), clipped, clipped == kHighest || clipped == kLowest});
+    conversions_.push_back({core_.time_of(edge), clipped, clipped == kMax || clipped == kMin});
     set_data(true);
     ready_edge_.at(edge);
   } else {
-    conversions_.push_back({now, clipped, clipped == kHighest || clipped == kLowest});
+    conversions_.push_back({now, clipped, clipped == kMax || clipped == kMin});
     set_data(false);
   }
   unread_now_ = true;

@@ -134,9 +134,9 @@ TEST_F(InstrumentCalibration, TheLoadCellPlanFindsTheSpringsAndTheCamerasLatency
   const SensorConfig sensor = parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor");
   Tracker tracker(sensor.camera, sensor.target, sensor.rest);
 
-  constexpr int kMostFrames = 25 * 240;
+  constexpr int kMaxFrames = 25 * 240;
   int frames = 0;
-  for (; frames < kMostFrames && !guide.done(); ++frames) {
+  for (; frames < kMaxFrames && !guide.done(); ++frames) {
     for (ReferenceReading reading; cell->next(reading);) {
       ReferenceSample sample;
       sample.time = seconds(reading.time);

@@ -14,7 +14,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 /// 15 bits of light in a row, the most that the pattern has.
-constexpr std::uint16_t kLongestLight = 21845;
+constexpr std::uint16_t kMaxLight = 21845;
 
 struct LedAbuseTest : testing::Test {
   EmulatedBoard board{TAGWRENCH_FIRMWARE_ELF};
@@ -82,13 +82,13 @@ TEST_F(LedAbuseTest, AStrobeOrderedAnewAtEachPulseIsLimitedByItsTrueLight) {
 
 TEST_F(LedAbuseTest, APatternOrderedAnewWithinItsFirstBitIsLimitedByItsTrueLight) {
   abuse(milliseconds(100),
-        [&](int) { client.send(pattern(1000000, kLongestLight, microseconds(2500))); });
+        [&](int) { client.send(pattern(1000000, kMaxLight, microseconds(2500))); });
 }
 
 TEST_F(LedAbuseTest, ALongRunOfLightOrderedAgainAndAgainIsLimitedByItsTrueLight) {
   abuse(milliseconds(100), [&](int i) {
     if (i % 140 == 0) {
-      client.send(pattern(1000000, kLongestLight, microseconds(2500)));
+      client.send(pattern(1000000, kMaxLight, microseconds(2500)));
     } else {
       client.send(link::TimeRequest{});
     }
@@ -105,7 +105,7 @@ TEST_F(LedAbuseTest, ModesInQuickTurnAreLimitedByTheirTrueLight) {
         client.send(strobe(22000, 19000, microseconds(1500)));
         break;
       case 2:
-        client.send(pattern(20000, kLongestLight, microseconds(1500)));
+        client.send(pattern(20000, kMaxLight, microseconds(1500)));
         break;
       default:
         client.send(strobe(1000000, 20000, microseconds(1500)));

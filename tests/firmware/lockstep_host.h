@@ -45,7 +45,7 @@ class LockstepHost {
   void exchange() {
     for (const SentByte& byte : board_.read())
       session_.take({&byte.value, 1}, host_time(byte.end + kDelay));
-    std::uint8_t out[link::BoardSession::kMostBytesOut];
+    std::uint8_t out[link::BoardSession::kMaxBytesOut];
     const std::size_t count = session_.poll(host_time(board_.now()), out);
     if (count > 0) board_.write_at(board_.now() + kDelay, {out, count});
   }

@@ -24,8 +24,8 @@ void OtherVersion::forge() {
   link::Hello hello{};
   if (!link::decode(reader_.message(), reader_.message_bytes(), hello)) return;
   hello.protocol_major = *major_;
-  std::array<std::uint8_t, link::kMostBodyBytes> body{};
-  std::array<std::uint8_t, link::kMostFrameBytes> frame{};
+  std::array<std::uint8_t, link::kMaxBodyBytes> body{};
+  std::array<std::uint8_t, link::kMaxFrameBytes> frame{};
   const std::uint8_t count = link::encode(hello, reader_.sequence(), body.data());
   const std::uint8_t bytes = link::write_frame(body.data(), count, frame.data());
   frame_.assign(frame.begin(), frame.begin() + bytes);

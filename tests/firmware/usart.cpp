@@ -15,7 +15,7 @@ constexpr double kBits = 10;
 /// The receiver samples the middle of the stop bit.
 constexpr double kReceivedBits = 9.5;
 /// Receiver tolerance at 8 data bits (datasheet, table 19-2, recommended: 1.5 to 2 %).
-constexpr double kMostBaudError = 0.025;
+constexpr double kMaxBaudError = 0.025;
 
 }  // namespace
 
@@ -125,8 +125,7 @@ void Usart::arrive() {
   const double board_baud = kNominalHz / static_cast<double>(bit_cycles());
   std::uint8_t& status = core_.data(reg::kUcsr0a);
   status = static_cast<std::uint8_t>(status & ~kFrameError);
-  if (std::abs(board_baud / baud_ - 1) >
-      kMostBaudError) {  // what is heard has little to do with it
+  if (std::abs(board_baud / baud_ - 1) > kMaxBaudError) {  // what is heard has little to do with it
     value = static_cast<std::uint8_t>(value * 37 + 11);
     status |= kFrameError;
   }

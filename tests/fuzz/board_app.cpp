@@ -15,7 +15,7 @@ using tagwrench::expect;
 using tagwrench::board::fake_board;
 using tagwrench::board::FakeBoard;
 
-constexpr std::uint32_t kLongestTimeoutUs = 60000000;
+constexpr std::uint32_t kMaxTimeoutUs = 60000000;
 
 class Input {
  public:
@@ -71,7 +71,7 @@ class Play {
   void fall_silent() {
     board_.room = 255;
     for (std::size_t i = 0; i < 100 || !board_.incoming.empty(); ++i) run(1000);
-    for (std::uint32_t t = 0; t < kLongestTimeoutUs; t += 50000) run(50000);
+    for (std::uint32_t t = 0; t < kMaxTimeoutUs; t += 50000) run(50000);
     run(1000);
     expect(board_.dark(), "the LED is dark when the host is silent");
   }
@@ -83,11 +83,11 @@ class Play {
   }
   void receive(std::uint8_t byte) { board_.incoming.push_back({byte, board_.now_us}); }
   void receive_frame() {
-    std::uint8_t body[kMostBodyBytes];
+    std::uint8_t body[kMaxBodyBytes];
     const auto count = static_cast<std::uint8_t>(kHeaderBytes + input_.byte() % 40);
     for (std::uint8_t i = 0; i < count; ++i) body[i] = input_.byte();
     body[0] = static_cast<std::uint8_t>(body[0] % 16);
-    std::uint8_t frame[kMostFrameBytes];
+    std::uint8_t frame[kMaxFrameBytes];
     const std::uint8_t bytes = write_frame(body, count, frame);
     for (std::uint8_t i = 0; i < bytes; ++i) receive(frame[i]);
   }

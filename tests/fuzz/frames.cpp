@@ -22,7 +22,7 @@ void read_anything(const std::uint8_t* bytes, std::size_t count) {
     const Received received = reader.take(bytes[i]);
     if (received == Received::damaged) ++damaged;
     if (received == Received::frame) {
-      std::uint8_t frame[kMostFrameBytes];
+      std::uint8_t frame[kMaxFrameBytes];
       const std::uint8_t length = write_frame(reader.body(), reader.body_bytes(), frame);
       expect(std::ranges::equal(since_delimiter, std::vector(frame, frame + length)),
              "an accepted frame is what the writer writes");
@@ -39,7 +39,7 @@ void read_anything(const std::uint8_t* bytes, std::size_t count) {
   // Whatever came before: after a delimiter the next frame is read.
   reader.take(0);
   const std::uint8_t body[] = {0x04, 0x01};
-  std::uint8_t frame[kMostFrameBytes];
+  std::uint8_t frame[kMaxFrameBytes];
   const std::uint8_t length = write_frame(body, sizeof body, frame);
   Received last = Received::nothing;
   for (std::uint8_t i = 0; i < length; ++i) last = reader.take(frame[i]);
@@ -48,10 +48,10 @@ void read_anything(const std::uint8_t* bytes, std::size_t count) {
 
 void write_and_read(const std::uint8_t* bytes, std::size_t count) {
   const std::vector<std::uint8_t> body(bytes, bytes + std::min<std::size_t>(count, 255));
-  std::vector<std::uint8_t> frame(kMostFrameBytes);
+  std::vector<std::uint8_t> frame(kMaxFrameBytes);
   const std::uint8_t length =
       write_frame(body.data(), static_cast<std::uint8_t>(body.size()), frame.data());
-  const bool fits = body.size() >= kHeaderBytes && body.size() <= kMostBodyBytes;
+  const bool fits = body.size() >= kHeaderBytes && body.size() <= kMaxBodyBytes;
   expect((length > 0) == fits, "a body is written exactly if its length is right");
   FrameReader reader;
   for (std::uint8_t i = 0; i < length; ++i) {

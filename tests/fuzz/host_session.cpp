@@ -40,7 +40,7 @@ BoardSessionOptions options() {
 
 /// What it sends are whole frames of requests.
 void check_sent(const std::uint8_t* bytes, std::size_t count) {
-  expect(count <= BoardSession::kMostBytesOut, "one poll fits its room");
+  expect(count <= BoardSession::kMaxBytesOut, "one poll fits its room");
   expect(count == 0 || bytes[count - 1] == 0, "frames are sent whole");
   FrameReader reader;
   for (std::size_t i = 0; i < count; ++i) {
@@ -77,7 +77,7 @@ class World {
 
  private:
   void take_frame(std::span<const std::uint8_t> body) {
-    std::uint8_t frame[kMostFrameBytes];
+    std::uint8_t frame[kMaxFrameBytes];
     const std::uint8_t length =
         write_frame(body.data(), static_cast<std::uint8_t>(body.size()), frame);
     session_.take({frame, length}, now_);
@@ -90,7 +90,7 @@ class World {
     hello.boot_id = input.byte();
     hello.session = kSession;
     hello.unique_id.count = input.byte() % 9;
-    std::uint8_t body[kMostBodyBytes];
+    std::uint8_t body[kMaxBodyBytes];
     take_frame({body, encode(hello, input.byte(), body)});
   }
 
@@ -105,10 +105,10 @@ class World {
   }
 
   void step() {
-    std::uint8_t out[BoardSession::kMostBytesOut];
+    std::uint8_t out[BoardSession::kMaxBytesOut];
     check_sent(out, session_.poll(now_, out));
     for (CellReading reading; session_.next(reading);) {
-      expect(reading.channel < kMostCells, "a channel that is told exists");
+      expect(reading.channel < kMaxCells, "a channel that is told exists");
       check_time(reading.time);
     }
     for (AdcReading reading; session_.next(reading);) {
@@ -117,7 +117,7 @@ class World {
     }
     for (ButtonReading reading; session_.next(reading);) check_time(reading.time);
     for (FaultReading reading; session_.next(reading);) check_time(reading.time);
-    for (News news; session_.next(news);) {
+    for (BoardEvent news; session_.next(news);) {
       const std::string line = text(news);
       expect(!line.empty() && line.find('\n') == std::string::npos, "news are one line");
     }

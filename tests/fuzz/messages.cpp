@@ -23,7 +23,7 @@ void check(Kind kind, const std::vector<std::uint8_t>& bytes) {
     return;
   }
   const Bytes body = body_of(read, 0xA5);
-  expect(body.size() >= kHeaderBytes && body.size() <= kMostBodyBytes, "a message fits in a body");
+  expect(body.size() >= kHeaderBytes && body.size() <= kMaxBodyBytes, "a message fits in a body");
   expect(body[0] == static_cast<std::uint8_t>(kind) && body[1] == 0xA5, "the header is right");
   Message again{};
   expect(decode(body.data() + kHeaderBytes, static_cast<std::uint8_t>(body.size() - kHeaderBytes),

@@ -13,7 +13,7 @@ namespace {
 using namespace tagwrench;
 using namespace tagwrench::link;
 
-constexpr std::size_t kLongestFrame = 34;
+constexpr std::size_t kMaxFrame = 34;
 
 std::vector<std::uint8_t> good_frame() {
   std::vector<std::uint8_t> out{0xAA, 0x07, 0x08, 0x0A, 0x12, 0x34, 0, 0, 1, 2, 3, 4, 5, 6};
@@ -52,10 +52,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t cou
   expect(counters.frames == frames, "each frame is counted once");
   expect(counters.interruptions <= counters.frames, "an interruption lies between two frames");
   const std::uint64_t used = frame_bytes + counters.skipped_bytes + 7 * counters.replies;
-  expect(used <= count && count - used < kLongestFrame, "every byte is accounted for");
+  expect(used <= count && count - used < kMaxFrame, "every byte is accounted for");
 
   // Whatever came before: after zeros that no frame can hold back, the next frame is read.
-  parser.take(std::vector<std::uint8_t>(kLongestFrame, 0), use);
+  parser.take(std::vector<std::uint8_t>(kMaxFrame, 0), use);
   bool read = false;
   parser.take(good_frame(), [&](const OptoforceFrame& frame) { read = frame.counter == 0x1234; });
   expect(read, "the parser resynchronises");

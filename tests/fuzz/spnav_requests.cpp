@@ -15,8 +15,7 @@ using namespace tagwrench;
 
 void check_answer(const SpnavDialogue& dialogue, std::span<const std::uint8_t> answer) {
   if (answer.empty()) return;
-  expect(answer.size() <= SpnavDialogue::kMostAnswers * sizeof(SpnavRecord),
-         "an answer is bounded");
+  expect(answer.size() <= SpnavDialogue::kMaxAnswers * sizeof(SpnavRecord), "an answer is bounded");
   const bool version = answer.size() == 4;
   expect(version || (answer.size() % sizeof(SpnavRecord) == 0 && dialogue.version() == 1),
          "an answer is a version, or whole records in version 1");
@@ -41,8 +40,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t cou
   device.name.fill('x');  // without an end
   SpnavDialogue dialogue;
   if (count % 4 != 0) {  // the word that random bytes do not hit upon
-    const auto wish = std::bit_cast<std::array<std::uint8_t, 4>>(0x7faa5501);
-    check_answer(dialogue, dialogue.take(wish, nullptr, ""));
+    const auto request = std::bit_cast<std::array<std::uint8_t, 4>>(0x7faa5501);
+    check_answer(dialogue, dialogue.take(request, nullptr, ""));
     expect(dialogue.version() == 1, "version 1 is granted");
   }
   std::span<const std::uint8_t> left(bytes, count);

@@ -1,11 +1,11 @@
-// What anybody may send to the pages' server: a wish, and on lines of their own a request's target,
-// Host, Origin, protocols and Authorization.
+// What anybody may send to the pages' server: a request, and on lines of their own a request's
+// target, Host, Origin, protocols and Authorization.
 #include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>
 
-#include "host/web/server/ask_message.h"
+#include "host/web/server/page_message.h"
 #include "host/web/server/request_guard.h"
 #include "host/web/server/site_path.h"
 #include "tests/fuzz/expect.h"
@@ -16,19 +16,20 @@ using namespace tagwrench;
 
 constexpr std::string_view kToken = "0123456789abcdef";
 
-void check_wish(std::string_view text) {
-  const AskMessage ask = parse_ask(text);
-  if (!ask.fault.empty()) return;
-  expect(ask.id && *ask.id >= 0, "a wish has an id");
-  expect(!ask.what.empty() && ask.what.size() <= 32, "a wish is a word");
-  expect(ask.arguments.is_object() && ask.arguments.size() <= AskMessage::kMostArguments,
+void check_request(std::string_view text) {
+  const PageMessage request = parse_page_message(text);
+  if (!request.fault.empty()) return;
+  expect(request.id && *request.id >= 0, "a request has an id");
+  expect(!request.what.empty() && request.what.size() <= 32, "a request is a word");
+  expect(request.arguments.is_object() && request.arguments.size() <= PageMessage::kMaxArguments,
          "arguments are some");
-  expect(!ask.arguments.contains("id") && !ask.arguments.contains("ask"),
-         "arguments are those of the wish alone");
+  expect(!request.arguments.contains("id") && !request.arguments.contains("ask"),
+         "arguments are those of the request alone");
   // Shown to others again: what was taken can be told.
-  const std::string told = nlohmann::json{{"id", *ask.id}, {"ask", ask.what}}.dump();
-  const AskMessage again = parse_ask(told);
-  expect(again.id == ask.id && again.what == ask.what, "a wish that is told is the same wish");
+  const std::string told = nlohmann::json{{"id", *request.id}, {"ask", request.what}}.dump();
+  const PageMessage again = parse_page_message(told);
+  expect(again.id == request.id && again.what == request.what,
+         "a request that is told is the same request");
 }
 
 void check_target(std::string_view target) {
@@ -70,7 +71,7 @@ void check_headers(const WebRequest& request) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t count) {
   const std::string_view text(reinterpret_cast<const char*>(bytes), count);
-  check_wish(text);
+  check_request(text);
   std::string_view lines[5];
   std::string_view left = text;
   for (std::string_view& line : lines) {

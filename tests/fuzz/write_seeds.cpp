@@ -62,11 +62,11 @@ RowWriter impossible() {
   constexpr int kFrame = 2;
   constexpr int kTrack = 1;
   constexpr int kSample = 0;
-  constexpr std::uint8_t kLowest = 0;  // of kEdges
-  constexpr std::uint8_t kHighest = 1;
+  constexpr std::uint8_t kMin = 0;  // of kEdges
+  constexpr std::uint8_t kMax = 1;
   RowWriter rows = recording();
   add_frame(rows, Word::grey);
-  rows.change(kSample, 3).edge(kLowest).change(kSample, 4).edge(kHighest);  // a latency
+  rows.change(kSample, 3).edge(kMin).change(kSample, 4).edge(kMax);  // a latency
   add_frame(rows, Word::grey);
   rows.change(kTrack, 14).reals(9 * 20, 5).change(kTrack, 9).reals(200, 1);  // corners, covariance
   add_frame(rows, Word::crop);
@@ -74,12 +74,12 @@ RowWriter impossible() {
   return rows;
 }
 
-/// Headers and a wish, each on its line, as web_messages.cpp takes them.
+/// Headers and a request, each on its line, as web_messages.cpp takes them.
 void write_web(const std::filesystem::path& dir) {
   const auto text = [&](const char* name, std::string_view lines) {
     write(dir / name, Bytes(lines.begin(), lines.end()));
   };
-  text("wish", R"({"id":17,"ask":"try","name":"cad","text":"a: [1, {}]\n"})");
+  text("request", R"({"id":17,"ask":"try","name":"cad","text":"a: [1, {}]\n"})");
   text("headers",
        "/sensor/assets/%61.js?x\nlocalhost:8137\nhttp://localhost:8137\n"
        "tagwrench.v1, tagwrench.token.MDEyMzQ1Njc4OWFiY2RlZg\nBearer 0123456789abcdef");

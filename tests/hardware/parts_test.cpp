@@ -49,12 +49,12 @@ TEST_F(VariantParts, AreClosedSolidsOfOnePiece) {
 }
 
 TEST_F(VariantParts, LieOnTheBedAndPrintWithoutSupports) {
-  constexpr double kLongestBridge_mm = 10,
+  constexpr double kMaxBridge_mm = 10,
                    kStrandsInTheAir_mm2 = 3;  // at the crown of holes that lie
   for (const DrawnPart& part : sensor().parts) {
     EXPECT_NEAR(box(part.printed).min().z(), 0, 1e-3) << part.name;
     const Overhang worst =
-        worst_overhang(part.printed, kToMm * parameters().printing.layer, kLongestBridge_mm);
+        worst_overhang(part.printed, kToMm * parameters().printing.layer, kMaxBridge_mm);
     EXPECT_LE(worst.area, kStrandsInTheAir_mm2)
         << part.name << ": " << worst.area << " mm^2 hang in the air at " << worst.at.transpose();
   }

@@ -52,7 +52,7 @@ class DeskDevice {
     }
     return felt;
   }
-  const Vector6& unheld() const noexcept { return unheld_.motion; }
+  const Vector6& unheld() const noexcept { return unheld_.deflection; }
   const ZeroTracking& zero() const noexcept { return zero_; }
 
  private:
@@ -89,7 +89,7 @@ DeskCount read_an_hour(std::uint64_t seed, DeskReadingOptions options) {
     Sample sample = readings.next();
     time = std::chrono::duration<double>(sample.capture_time.time_since_epoch()).count();
     const GestureResult felt = device.feel(sample, options.noise);
-    judge.add(time, felt, sample.motion, device.unheld());
+    judge.add(time, felt, sample.deflection, device.unheld());
   }
   return judge.count(time);
 }
@@ -169,7 +169,7 @@ TEST(DeskHour, WithPicturesLikewise) {
     ++statuses[static_cast<int>(sample.status)];
     const GestureResult felt = device.feel(sample, wrench.noise(track));
     time = std::chrono::duration<double>(source.truth().time).count();
-    judge.add(time, felt, sample.motion, device.unheld());
+    judge.add(time, felt, sample.deflection, device.unheld());
 
     if (frame == 1000) memory = resident_memory();
   }

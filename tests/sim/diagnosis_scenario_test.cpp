@@ -20,7 +20,7 @@ struct Said {
   double most_visible = 0;  ///< of the tag that was best to see in the second before
 };
 
-/// All hints but the one that the rest pose is learned.
+/// All diagnostics but the one that the rest pose is learned.
 std::vector<Said> listen(const sim::Scenario& scenario, int frames, const CameraModel* camera,
                          int* doubted = nullptr) {
   const SensorConfig sensor = parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor");
@@ -37,12 +37,13 @@ std::vector<Said> listen(const sim::Scenario& scenario, int frames, const Camera
     doubtful += track.status == Status::doubtful ? 1 : 0;
     const sim::Truth& truth = source.truth();
     visible.push_back(*std::max_element(truth.visible.begin(), truth.visible.end()));
-    if (track.hint == Hint::none || track.hint == Hint::rest_learned) continue;
+    if (track.diagnostic == Diagnostic::none || track.diagnostic == Diagnostic::rest_learned)
+      continue;
     const auto recent = visible.end() - std::min<std::ptrdiff_t>(25, std::ssize(visible));
     said.push_back({track, std::chrono::duration<double>(truth.time).count(),
                     *std::max_element(recent, visible.end())});
     std::printf("%.2f s: hint %d, best visible %.2f\n", said.back().seconds,
-                static_cast<int>(track.hint), said.back().most_visible);
+                static_cast<int>(track.diagnostic), said.back().most_visible);
   }
   std::printf("%d frames, %d ok, %d doubtful, %zu hints\n", frames, ok, doubtful, said.size());
   if (doubted != nullptr) *doubted = doubtful;
@@ -64,18 +65,22 @@ TEST(DiagnosisScenario, NothingIsSaidOfASensorThatIsWell) {
 
 TEST(DiagnosisScenario, InTroubleOnlyWhatIsTrueIsSaid) {
   for (const Said& said : listen("hard", 1500)) {
-    const Hint hint = said.track.hint;
-    const bool of_the_picture = hint == Hint::no_tag || hint == Hint::image_empty ||
-                                hint == Hint::image_unsharp || hint == Hint::image_saturated ||
-                                hint == Hint::image_black;
-    const bool true_of_it = of_the_picture ? said.most_visible < 0.9 : hint == Hint::tag_missing;
-    EXPECT_TRUE(true_of_it) << "hint " << static_cast<int>(hint) << " at " << said.seconds << " s";
+    const Diagnostic diagnostic = said.track.diagnostic;
+    const bool of_the_picture =
+        diagnostic == Diagnostic::no_tag || diagnostic == Diagnostic::image_empty ||
+        diagnostic == Diagnostic::image_unsharp || diagnostic == Diagnostic::image_saturated ||
+        diagnostic == Diagnostic::image_black;
+    const bool true_of_it =
+        of_the_picture ? said.most_visible < 0.9 : diagnostic == Diagnostic::tag_missing;
+    EXPECT_TRUE(true_of_it) << "hint " << static_cast<int>(diagnostic) << " at " << said.seconds
+                            << " s";
   }
 }
 
-int shutter_hints(const std::vector<Said>& said) {
-  return static_cast<int>(std::count_if(
-      said.begin(), said.end(), [](const Said& s) { return s.track.hint == Hint::shutter_rolls; }));
+int shutter_diagnostics(const std::vector<Said>& said) {
+  return static_cast<int>(std::count_if(said.begin(), said.end(), [](const Said& s) {
+    return s.track.diagnostic == Diagnostic::shutter_rolls;
+  }));
 }
 
 TEST(DiagnosisScenario, ARollingShutterThatIsNotDescribedIsNoticedOnce) {
@@ -85,14 +90,14 @@ TEST(DiagnosisScenario, ARollingShutterThatIsNotDescribedIsNoticedOnce) {
     scenario.exposure.rolling_readout = readout;
     CameraModel camera = parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor").camera;
     camera.readout = 0;
-    EXPECT_EQ(shutter_hints(listen(scenario, 250, &camera)), 1) << readout;
+    EXPECT_EQ(shutter_diagnostics(listen(scenario, 250, &camera)), 1) << readout;
   }
 }
 
 TEST(DiagnosisScenario, ARollingShutterIsNoticedOnBadPaperInBadLightToo) {
   const std::vector<Said> said = listen("harsh", 250);
   EXPECT_EQ(said.size(), 1U);
-  EXPECT_EQ(shutter_hints(said), 1);
+  EXPECT_EQ(shutter_diagnostics(said), 1);
 }
 
 TEST(DiagnosisScenario, BlurOfMotionIsNotTakenForARollingShutter) {

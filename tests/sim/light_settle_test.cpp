@@ -104,8 +104,8 @@ TEST(LightSettle, AmbientLightIsMeasuredAndSaid) {
   scenario.light.room = 0.6;
   Room sunny(scenario);
   const LightReport much = sunny.settle();
-  EXPECT_LT(little.ambient_part, 0.15);
-  EXPECT_GT(much.ambient_part, 0.4);
+  EXPECT_LT(little.ambient_fraction, 0.15);
+  EXPECT_GT(much.ambient_fraction, 0.4);
   EXPECT_NE(light_text(much).find("keep other light off"), std::string::npos) << light_text(much);
   EXPECT_EQ(light_text(little).find("keep other light off"), std::string::npos);
 }
@@ -116,7 +116,7 @@ TEST(LightSettle, AnLedThatIsNotWiredIsSaid) {
   Room room(scenario);
   room.lamp.wired = false;
   const LightReport report = room.settle();
-  EXPECT_GT(report.ambient_part, 0.9);
+  EXPECT_GT(report.ambient_fraction, 0.9);
   EXPECT_NE(light_text(report).find("is it wired?"), std::string::npos) << light_text(report);
 }
 

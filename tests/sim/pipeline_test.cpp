@@ -16,7 +16,7 @@ TEST_F(PipelineLoop, EveryFrameBecomesOneSampleInOrder) {
   EXPECT_EQ(recorder().samples.back().status, Status::ok);
   // Pushed along camera z, which is up: the HID puck moves up, toward negative Z.
   EXPECT_GT(recorder().samples.back().wrench[2], 0.5);
-  EXPECT_LT(recorder().samples.back().motion[2], -0.2);
+  EXPECT_LT(recorder().samples.back().deflection[2], -0.2);
 }
 
 TEST_F(PipelineLoop, AMissingFrameIsOneLostSampleWithZeros) {
@@ -31,7 +31,7 @@ TEST_F(PipelineLoop, AMissingFrameIsOneLostSampleWithZeros) {
   EXPECT_EQ(report.end, RunReport::End::interrupted) << "no neutral sample came";
   EXPECT_EQ(report.frames, static_cast<std::uint64_t>(kFrames)) << "a missing frame is not a frame";
   ASSERT_EQ(recorder().samples.size(), static_cast<std::size_t>(kFrames) + 1);
-  EXPECT_EQ(recorder().samples.back().motion, Vector6::Zero().eval());
+  EXPECT_EQ(recorder().samples.back().deflection, Vector6::Zero().eval());
   EXPECT_EQ(recorder().samples.back().wrench, Vector6::Zero().eval());
 }
 
@@ -98,15 +98,16 @@ TEST_F(PipelineLoop, DevicesMoveBetweenFramesAndAreNeutralAtOnceWhenTheyStop) {
   EXPECT_GE(recorder().samples.size(), static_cast<std::size_t>(kFrames));
   const Sample& end = recorder().moves.back();
   EXPECT_EQ(end.status, Status::lost);
-  EXPECT_TRUE(end.motion.isZero());
+  EXPECT_TRUE(end.deflection.isZero());
   EXPECT_EQ(end.buttons, 0U);
   bool carried_on = false;
   for (std::size_t i = 1; i < recorder().moves.size(); ++i) {
     const Sample& before = recorder().moves[i - 1];
     const Sample& after = recorder().moves[i];
-    ASSERT_LE(after.motion.cwiseAbs().maxCoeff(), 1);
-    carried_on = carried_on || (after.sequence == before.sequence &&
-                                carries_numbers(after.status) && after.motion != before.motion);
+    ASSERT_LE(after.deflection.cwiseAbs().maxCoeff(), 1);
+    carried_on =
+        carried_on || (after.sequence == before.sequence && carries_numbers(after.status) &&
+                       after.deflection != before.deflection);
   }
   EXPECT_TRUE(carried_on) << "motion stands still between frames";
 }

@@ -122,9 +122,9 @@ class PipelineLoop : public testing::Test {
     outputs_.push_back(std::move(recorder));
     Tracker tracker(sensor_.camera, sensor_.target, sensor_.rest);
     WrenchEstimator wrench(sensor_.wrench);
-    Desk desk(default_profile(sensor_));
-    DeadMan dead_man({});
-    return Pipeline(source, tracker, wrench, desk, outputs_, dead_man, stop_.get()).run(limits);
+    ProfileManager desk(default_profile(sensor_));
+    Watchdog watchdog({});
+    return Pipeline(source, tracker, wrench, desk, outputs_, watchdog, stop_.get()).run(limits);
   }
   const Recorder& recorder() const { return static_cast<const Recorder&>(*outputs_.back()); }
 

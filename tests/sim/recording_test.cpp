@@ -64,9 +64,9 @@ class RecordedLoop : public PipelineLoop {
     }));
     Tracker tracker(sensor_.camera, sensor_.target, sensor_.rest);
     WrenchEstimator wrench(sensor_.wrench);
-    Desk desk(default_profile(sensor_));
-    DeadMan dead_man({});
-    Pipeline(source, tracker, wrench, desk, outputs_, dead_man, stop_.get(), log).run({});
+    ProfileManager desk(default_profile(sensor_));
+    Watchdog watchdog({});
+    Pipeline(source, tracker, wrench, desk, outputs_, watchdog, stop_.get(), log).run({});
     std::uint64_t stopped = 0;
     ::eventfd_read(stop_.get(), &stopped);
     return recorder().samples;

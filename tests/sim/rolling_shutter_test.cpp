@@ -17,8 +17,8 @@ namespace {
 constexpr int kJudged = 200;
 
 TEST(RollingShutter, MeasuredReadoutTakesAwayMostOfTheErrorOfMotion) {
-  constexpr double kLeft = 0.5;   // of the error
-  constexpr int kLeastBoth = 15;  // frames: most are doubtful without the readout time
+  constexpr double kLeft = 0.5;  // of the error
+  constexpr int kMinBoth = 15;   // frames: most are doubtful without the readout time
   const sim::Scenario scenario =
       load_scenario(std::string(TAGWRENCH_SCENARIOS) + "/rolling_shutter.yaml");
   SensorConfig sensor = parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor");
@@ -43,7 +43,7 @@ TEST(RollingShutter, MeasuredReadoutTakesAwayMostOfTheErrorOfMotion) {
   }
   std::printf("%d frames ok with the readout time, %d also without\n", ok, both);
   EXPECT_GT(ok, 4 * both) << "without the readout time a moving target is not to be believed";
-  ASSERT_GE(both, kLeastBoth);
+  ASSERT_GE(both, kMinBoth);
   for (int axis = 0; axis < 6; ++axis) {
     const double unit = axis < 3 ? 1e6 : 1e3;
     std::printf("axis %d: rms %.3f without, %.3f with the readout time, um or mrad\n", axis,

@@ -6,8 +6,8 @@
 namespace tagwrench::test {
 
 Vector6 error_after_fit(const std::vector<Vector6>& readings, const std::vector<Vector6>& truths) {
-  constexpr std::size_t kFewest = 60;
-  if (readings.size() < kFewest || readings.size() != truths.size())
+  constexpr std::size_t kMin = 60;
+  if (readings.size() < kMin || readings.size() != truths.size())
     return Vector6::Constant(std::numeric_limits<double>::quiet_NaN());
   // In millimetres and ten milliradians the columns are alike.
   Vector6 scale;

@@ -18,7 +18,7 @@ constexpr uint8_t kSupplyHz = 10;        ///< with no channel on
 constexpr uint32_t kTicksPerSecond = F_CPU / 8;
 /// A longer interval is made of several, whose conversions do not count: the timer wraps after
 /// 65536.
-constexpr uint16_t kMostTicks = 0x8000;
+constexpr uint16_t kMaxTicks = 0x8000;
 
 uint32_t interval_ticks;
 uint32_t ticks_left;    ///< from the next trigger to the one that counts
@@ -46,9 +46,9 @@ void select() {
   ADMUX = static_cast<uint8_t>((1 << REFS0) | input);
 }
 
-/// Moves the trigger on by at most kMostTicks. Only a rising flag triggers.
+/// Moves the trigger on by at most kMaxTicks. Only a rising flag triggers.
 void approach() {
-  const uint16_t step = ticks_left > kMostTicks ? kMostTicks : static_cast<uint16_t>(ticks_left);
+  const uint16_t step = ticks_left > kMaxTicks ? kMaxTicks : static_cast<uint16_t>(ticks_left);
   ticks_left -= step;
   OCR1B += step;
   TIFR1 = 1 << OCF1B;

@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
       "The board's firmware as a process, on a pseudo-terminal");
   std::string port;
   std::vector<std::string> cells;
-  for (unsigned i = 0; i < tagwrench::link::kMostCells; ++i)
+  for (unsigned i = 0; i < tagwrench::link::kMaxCells; ++i)
     tagwrench::board::wire_cell(i, tagwrench::board::slow_sine(i));
   options.add_option("--port", port, "symbolic link to make to the pseudo-terminal").required();
   options.add_option("--cell", cells, std::string(kCellForms) + "; cells that are not named: sine");

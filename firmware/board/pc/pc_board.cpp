@@ -64,7 +64,7 @@ struct Channel {
   uint32_t due_us = 0;
   uint32_t ready_us = 0;
 };
-Channel channels[link::kMostCells];
+Channel channels[link::kMaxCells];
 
 uint8_t adc_mask = 0;
 uint32_t adc_period_us = 0;
@@ -163,7 +163,7 @@ bool read_commands() {
 
 const Traits kTraits = {
     .name = "pc",
-    .cells = link::kMostCells,
+    .cells = link::kMaxCells,
     .adc_channels = 2,
     .adc_bits = 10,
     .buttons = 2,
@@ -278,7 +278,7 @@ void cell_input(uint8_t channel, link::CellInput input) {
 }
 
 bool cell_take(Conversion& conversion) {
-  for (uint8_t i = 0; i < link::kMostCells; ++i) {
+  for (uint8_t i = 0; i < link::kMaxCells; ++i) {
     Channel& channel = channels[i];
     if (!channel.ready) continue;
     channel.ready = false;

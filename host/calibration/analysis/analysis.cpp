@@ -91,7 +91,7 @@ void keep_held_out(HeldOut&& held_out, Analysis& analysis) {
   analysis.predicted = std::move(held_out.predicted);
   analysis.predicted_sigma = std::move(held_out.sigma);
   analysis.felt = std::move(held_out.felt);
-  analysis.stretch = std::move(held_out.stretch);
+  analysis.segment = std::move(held_out.segment);
 }
 
 }  // namespace
@@ -143,7 +143,7 @@ Analysis analyze(const std::vector<Trial>& trials, const AnalysisOptions& option
   if (analysis.time.size() == 0)
     throw ConfigError(fmt::format("{}: nothing could be held out; record more", trials[0].name));
   measure_held_out(analysis);
-  measure_rest({rows.time, model.predict(rows.features), rows.felt, rows.stretch},
+  measure_rest({rows.time, model.predict(rows.features), rows.felt, rows.segment},
                1 / analysis.reading_rate, trials.size() == 1, analysis);
   add_warnings(clean, all, options, analysis);
   return analysis;

@@ -91,7 +91,7 @@ struct Analysis {
   Eigen::MatrixXd predicted;        ///< k x 6
   Eigen::MatrixXd predicted_sigma;  ///< k x 6
   Eigen::MatrixXd felt;             ///< k x 6, the reference there
-  Eigen::VectorXi stretch;          ///< k: rows of one number follow each other without a gap
+  Eigen::VectorXi segment;          ///< k: rows of one number follow each other without a gap
 };
 
 /// Throws ConfigError: fewer readings than unknowns, times that do not grow, no overlap in time,

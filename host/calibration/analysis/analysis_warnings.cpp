@@ -15,12 +15,12 @@
 namespace tagwrench::study {
 namespace {
 
-constexpr double kLittleIndependent = 5;    // of the reference's noise
-constexpr double kWeakShare = 0.1;          // of what independent axes would have
-constexpr double kGoodAxis = 0.98;          // R^2 of an axis that can tell a lag
-constexpr double kBothWays = 0.1;           // of full scale
-constexpr double kApart = 3;                // sigmas
-constexpr Eigen::Index kLeastToSplit = 90;  // readings
+constexpr double kLittleIndependent = 5;  // of the reference's noise
+constexpr double kWeakShare = 0.1;        // of what independent axes would have
+constexpr double kGoodAxis = 0.98;        // R^2 of an axis that can tell a lag
+constexpr double kBothWays = 0.1;         // of full scale
+constexpr double kApart = 3;              // sigmas
+constexpr Eigen::Index kMinToSplit = 90;  // readings
 
 constexpr double kFewInside = 0.85;  // within intervals that are to hold 95 %
 
@@ -85,19 +85,19 @@ void warn_of_steps(Analysis& analysis) {
 }
 
 /// The readings of a trial and one axis of its reference, or all of them.
-Stretch stretch_of(const CleanTrial& trial, Eigen::Index first, Eigen::Index count, int axis,
+Segment segment_of(const CleanTrial& trial, Eigen::Index first, Eigen::Index count, int axis,
                    bool smooth) {
-  Stretch stretch;
-  stretch.time = trial.time.segment(first, count);
-  stretch.features = trial.features.middleRows(first, count);
-  if (smooth) stretch.features = smooth_rows(stretch.features);
-  stretch.reference_time = trial.reference_time;
+  Segment segment;
+  segment.time = trial.time.segment(first, count);
+  segment.features = trial.features.middleRows(first, count);
+  if (smooth) segment.features = smooth_rows(segment.features);
+  segment.reference_time = trial.reference_time;
   if (axis < 0) {
-    stretch.reference = trial.reference;
+    segment.reference = trial.reference;
   } else {
-    stretch.reference = trial.reference.col(axis);
+    segment.reference = trial.reference.col(axis);
   }
-  return stretch;
+  return segment;
 }
 
 void warn_of_channels(const std::vector<CleanTrial>& trials, const AnalysisOptions& options,
@@ -109,8 +109,8 @@ void warn_of_channels(const std::vector<CleanTrial>& trials, const AnalysisOptio
   for (std::size_t k = 0; k < 6; ++k) {
     const AxisReport& axis = analysis.axis[k];
     if (!axis.calibrated) continue;
-    const Stretch one =
-        stretch_of(trial, 0, trial.time.size(), static_cast<int>(k), options.smooth);
+    const Segment one =
+        segment_of(trial, 0, trial.time.size(), static_cast<int>(k), options.smooth);
     const Lag lag = estimate_lag({&one, 1}, {options.lag_from, options.lag_to,
                                              std::max(1e-6, options.ridge), !options.smooth});
     const double difference = lag.value - analysis.lag.value;
@@ -131,11 +131,11 @@ void warn_of_clocks(const std::vector<CleanTrial>& trials, const AnalysisOptions
   for (std::size_t t = 0; t < trials.size(); ++t) {
     const CleanTrial& trial = trials[t];
     const Eigen::Index third = trial.time.size() / 3;
-    if (trial.held || trial.step.size() > 0 || trial.time.size() < kLeastToSplit) continue;
+    if (trial.held || trial.step.size() > 0 || trial.time.size() < kMinToSplit) continue;
     const LagSearch search{options.lag_from, options.lag_to, std::max(1e-6, options.ridge),
                            !options.smooth};
-    const Stretch begin = stretch_of(trial, 0, third, -1, options.smooth);
-    const Stretch end = stretch_of(trial, trial.time.size() - third, third, -1, options.smooth);
+    const Segment begin = segment_of(trial, 0, third, -1, options.smooth);
+    const Segment end = segment_of(trial, trial.time.size() - third, third, -1, options.smooth);
     const Lag first = estimate_lag({&begin, 1}, search);
     const Lag last = estimate_lag({&end, 1}, search);
     const double change = last.value - first.value;

@@ -16,8 +16,8 @@
 namespace tagwrench::study {
 namespace {
 
-constexpr double kGapsOfMedian = 5;   // between readings, that end a stretch
-constexpr double kLeastSpread = 1.5;  // of the reference's noise: it alone has 1
+constexpr double kGapsOfMedian = 5;  // between readings, that end a segment
+constexpr double kMinSpread = 1.5;   // of the reference's noise: it alone has 1
 
 bool usable(const CleanTrial& trial, Eigen::Index i) {
   return trial.step.size() == 0 || trial.step[i] >= 0;
@@ -145,7 +145,7 @@ std::array<double, 6> r2_of_fold(const Eigen::VectorXd& r2, const Eigen::MatrixX
   for (Eigen::Index k = 0; k < 6; ++k) {
     const double spread = std::sqrt((felt.col(k).array() - felt.col(k).mean()).square().mean());
     result[static_cast<std::size_t>(k)] =
-        spread > kLeastSpread * noise[k] ? r2[k] : std::numeric_limits<double>::quiet_NaN();
+        spread > kMinSpread * noise[k] ? r2[k] : std::numeric_limits<double>::quiet_NaN();
   }
   return result;
 }
@@ -187,7 +187,7 @@ Rows rows_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ra
   rows.time.resize(most);
   rows.features.resize(most, trials[0].features.cols());
   rows.felt.resize(most, 6);
-  rows.stretch.resize(most);
+  rows.segment.resize(most);
   const bool predictions = brings_predictions(trials);
   rows.predicted.resize(predictions ? most : 0, 6);
   rows.sigma.resize(predictions ? most : 0, 6);
@@ -204,7 +204,7 @@ Rows rows_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ra
       rows.time[used] = time[i];
       rows.features.row(used) = features.row(i);
       rows.felt.row(used) = felt.row(i);
-      rows.stretch[used] = static_cast<int>(r);
+      rows.segment[used] = static_cast<int>(r);
       if (predictions) {
         rows.predicted.row(used) = trial.predicted.row(range.first + i);
         rows.sigma.row(used) = trial.predicted_sigma.row(range.first + i);
@@ -215,7 +215,7 @@ Rows rows_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ra
   rows.time.conservativeResize(used);
   rows.features.conservativeResize(used, Eigen::NoChange);
   rows.felt.conservativeResize(used, Eigen::NoChange);
-  rows.stretch.conservativeResize(used);
+  rows.segment.conservativeResize(used);
   if (predictions) {
     rows.predicted.conservativeResize(used, Eigen::NoChange);
     rows.sigma.conservativeResize(used, Eigen::NoChange);
@@ -225,29 +225,29 @@ Rows rows_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ra
 
 Lag lag_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ranges,
            const AnalysisOptions& options) {
-  std::vector<Stretch> stretches;
+  std::vector<Segment> segments;
   for (const Range& range : ranges) {
     const CleanTrial& trial = trials[range.trial];
     if (trial.held) continue;
-    Stretch stretch;
-    stretch.time = trial.time.segment(range.first, range.count);
-    stretch.features = trial.features.middleRows(range.first, range.count);
-    if (options.smooth) stretch.features = smooth_rows(stretch.features);
-    const auto [begin, end] = reference_rows(trial, stretch.time[0] - options.lag_to,
-                                             stretch.time[range.count - 1] - options.lag_from);
-    stretch.reference_time = trial.reference_time.segment(begin, end - begin);
-    stretch.reference = trial.reference.middleRows(begin, end - begin);
-    stretches.push_back(std::move(stretch));
+    Segment segment;
+    segment.time = trial.time.segment(range.first, range.count);
+    segment.features = trial.features.middleRows(range.first, range.count);
+    if (options.smooth) segment.features = smooth_rows(segment.features);
+    const auto [begin, end] = reference_rows(trial, segment.time[0] - options.lag_to,
+                                             segment.time[range.count - 1] - options.lag_from);
+    segment.reference_time = trial.reference_time.segment(begin, end - begin);
+    segment.reference = trial.reference.middleRows(begin, end - begin);
+    segments.push_back(std::move(segment));
   }
   Lag lag;
   lag.known = true;
-  if (stretches.empty() || !options.fit_lag) return lag;
+  if (segments.empty() || !options.fit_lag) return lag;
   LagSearch search;
   search.from = options.lag_from;
   search.to = options.lag_to;
   search.ridge = std::max(search.ridge, options.ridge);
   search.smooth = !options.smooth;
-  return estimate_lag(stretches, search);
+  return estimate_lag(segments, search);
 }
 
 bool brings_predictions(const std::vector<CleanTrial>& trials) {
@@ -265,7 +265,7 @@ HeldOut brought_predictions(const Rows& rows) {
   result.predicted = rows.predicted(there, Eigen::all);
   result.sigma = rows.sigma(there, Eigen::all);
   result.felt = rows.felt(there, Eigen::all);
-  result.stretch = rows.stretch(there);
+  result.segment = rows.segment(there);
   return result;
 }
 
@@ -313,17 +313,17 @@ HeldOut cross_validate(const std::vector<CleanTrial>& trials, const FoldPlans& p
   result.predicted.resize(total, 6);
   result.sigma.resize(total, 6);
   result.felt.resize(total, 6);
-  result.stretch.resize(total);
+  result.segment.resize(total);
   Eigen::Index at = 0;
-  int stretches = 0;
+  int segments = 0;
   for (std::size_t f = 0; f < tested.size(); ++f) {
     const Eigen::Index n = tested[f].time.size();
     result.time.segment(at, n) = tested[f].time;
     result.predicted.middleRows(at, n) = predicted[f];
     result.sigma.middleRows(at, n) = sigma[f];
     result.felt.middleRows(at, n) = tested[f].felt;
-    result.stretch.segment(at, n) = tested[f].stretch.array() + stretches;
-    stretches += tested[f].stretch.maxCoeff() + 1;
+    result.segment.segment(at, n) = tested[f].segment.array() + segments;
+    segments += tested[f].segment.maxCoeff() + 1;
     at += n;
   }
   return result;

@@ -57,7 +57,7 @@ struct Rows {
   Eigen::VectorXd time;              ///< k
   Eigen::MatrixXd features;          ///< k x p
   Eigen::MatrixXd felt;              ///< k x 6
-  Eigen::VectorXi stretch;           ///< k: index of the range
+  Eigen::VectorXi segment;           ///< k: index of the range
   Eigen::MatrixXd predicted, sigma;  ///< k x 6, that the trials brought; NaN where none
 };
 
@@ -80,7 +80,7 @@ struct HeldOut {
   std::vector<Fold> folds;  ///< empty where the trials brought their predictions
   Eigen::VectorXd time;
   Eigen::MatrixXd predicted, sigma, felt;
-  Eigen::VectorXi stretch;
+  Eigen::VectorXi segment;
 };
 
 /// What the trials brought; only where all of them did.

@@ -28,9 +28,9 @@ constexpr std::array kLoadUnits{Unit{"N", 1},      Unit{"mN", 1e-3},  Unit{"Nm",
 constexpr std::array kTimeUnits{Unit{"s", 1}, Unit{"ms", 1e-3}, Unit{"us", 1e-6}, Unit{"ns", 1e-9}};
 
 // A platform on springs goes no further; numbers that do were written in another unit.
-constexpr double kMostWay = 0.1;       // m
-constexpr double kMostTurn = 2.0;      // rad
-constexpr double kLeastWeight = 1e-6;  // of a smoothing that can be undone
+constexpr double kMaxWay = 0.1;      // m
+constexpr double kMaxTurn = 2.0;     // rad
+constexpr double kMinWeight = 1e-6;  // of a smoothing that can be undone
 
 template <std::size_t N>
 const Unit* find_unit(const std::array<Unit, N>& units, std::string_view name) {
@@ -72,7 +72,7 @@ Rows rows_in_order(const DelimitedText& text, const std::string& column, double 
   std::size_t repeated = 0;
   double before = 0;
   for (std::size_t row = 0; row < text.rows(); ++row) {
-    const double time = text.number(row, found[0], DelimitedText::kLargest / unit) * unit;
+    const double time = text.number(row, found[0], DelimitedText::kMax / unit) * unit;
     if (row > 0 && time < before) {
       throw ConfigError(
           fmt::format("{}: time runs backwards, {} s after {} s; put the rows in "
@@ -175,7 +175,7 @@ void add_features(const CsvMapping& mapping, const FeatureColumns& group, const 
     const auto column = values.col(static_cast<Eigen::Index>(i));
     const double way = column.maxCoeff() - column.minCoeff();
     const bool turns = group.quantity == 'r';
-    if (group.quantity == 0 || way <= (turns ? kMostTurn : kMostWay)) continue;
+    if (group.quantity == 0 || way <= (turns ? kMaxTurn : kMaxWay)) continue;
     mapped.notes.push_back(fmt::format(
         "{}: column {} ({}) goes over {:.3g} {}, further than a platform on springs: give its unit "
         "({}), or leave out the row that is wrong",
@@ -248,10 +248,10 @@ FeatureColumns parse_feature_columns(const std::string& text, const std::string&
                part.find_first_not_of("xyz", 6) == std::string::npos) {
       columns.euler = part.substr(6);
     } else if (part.starts_with("unsmooth=")) {
-      if (!parse_number(part.substr(9), columns.unsmooth) || columns.unsmooth < kLeastWeight ||
+      if (!parse_number(part.substr(9), columns.unsmooth) || columns.unsmooth < kMinWeight ||
           columns.unsmooth > 1)
         throw ConfigError(fmt::format("{} {}: the weight of a smoothing is from {:g} to 1", option,
-                                      text, kLeastWeight));
+                                      text, kMinWeight));
     } else {
       throw unknown(option, text, part,
                     names(kFeatureUnits) + " euler euler=ORDER unsmooth=WEIGHT");
@@ -273,11 +273,11 @@ LoadColumns parse_load_columns(const std::string& text, const std::string& optio
     } else if (part.starts_with("counts=")) {
       for (const std::string& one : split(std::string_view(part).substr(7), ',')) {
         double value = 0;
-        if (!parse_number(one, value) || std::abs(value) < 1 / DelimitedText::kLargest ||
-            std::abs(value) > DelimitedText::kLargest) {
+        if (!parse_number(one, value) || std::abs(value) < 1 / DelimitedText::kMax ||
+            std::abs(value) > DelimitedText::kMax) {
           throw ConfigError(fmt::format("{} {}: counts per unit are numbers from {:g} to {:g}",
-                                        option, text, 1 / DelimitedText::kLargest,
-                                        DelimitedText::kLargest));
+                                        option, text, 1 / DelimitedText::kMax,
+                                        DelimitedText::kMax));
         }
         columns.counts_per_unit.push_back(value);
       }

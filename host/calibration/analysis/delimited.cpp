@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kSeparators = ";\t,";
 constexpr std::size_t kRowsToTell = 20;  // the separator by
-constexpr std::size_t kMostBytes = std::size_t{1} << 30;
+constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
 
 std::string_view trimmed(std::string_view text) noexcept {
   const std::size_t first = text.find_first_not_of(" \t\r");
@@ -30,7 +30,7 @@ std::string load(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw ConfigError(fmt::format("{}: cannot be read; check the name", file.string()));
   const auto size = std::filesystem::file_size(file, error);
-  if (!error && size > kMostBytes)
+  if (!error && size > kMaxBytes)
     throw ConfigError(fmt::format("{}: larger than 1 GB; cut it into pieces", file.string()));
   return {std::istreambuf_iterator<char>(in), {}};
 }
@@ -60,12 +60,12 @@ char separator_of(const std::vector<Line>& lines) {
 }
 
 std::string shown(std::string_view field) {
-  constexpr std::size_t kMost = 40;
-  std::string text(field.substr(0, kMost));
+  constexpr std::size_t kMax = 40;
+  std::string text(field.substr(0, kMax));
   for (char& c : text) {
     if (static_cast<unsigned char>(c) < ' ') c = '?';
   }
-  return field.size() > kMost ? text + "..." : text;
+  return field.size() > kMax ? text + "..." : text;
 }
 
 }  // namespace

@@ -28,14 +28,14 @@ class DelimitedText {
   std::string_view field(std::size_t row, std::size_t column) const noexcept {
     return fields_[row * columns_ + column];
   }
-  static constexpr double kLargest = 1e12;  ///< squares and sums of it stay finite
+  static constexpr double kMax = 1e12;  ///< squares and sums of it stay finite
 
   /// FILE:LINE, for messages.
   std::string place(std::size_t row) const;
   const std::string& name() const noexcept { return name_; }
 
   /// Throws ConfigError unless it is a number of at most `largest`, either way.
-  double number(std::size_t row, std::size_t column, double largest = kLargest) const;
+  double number(std::size_t row, std::size_t column, double largest = kMax) const;
 
   /// Columns, counted from 0, of `3`, `3-8`, `time` or `Fx,Fy,Fz`: numbers count from 1, names are
   /// the header's. Throws ConfigError.

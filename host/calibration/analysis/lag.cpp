@@ -14,38 +14,38 @@
 namespace tagwrench::study {
 namespace {
 
-constexpr double kCoarse = 0.010;              // s
-constexpr double kFine = 0.002;                // s
-constexpr int kFineReach = 12;                 // steps to each side
-constexpr int kParabola = 2;                   // points to each side of the least
-constexpr Eigen::Index kBlocks = 12;           // of the jackknife, at least
-constexpr Eigen::Index kMostReadings = 10000;  // of more, every so many: it costs time, and clocks
-                                               // are not as good as that
-constexpr double kFloor = 1e-12;               // of the share that no model explains
-constexpr double kLeastExplained = 0.3;        // R^2 of the best axis, or nothing is known
+constexpr double kCoarse = 0.010;             // s
+constexpr double kFine = 0.002;               // s
+constexpr int kFineReach = 12;                // steps to each side
+constexpr int kParabola = 2;                  // points to each side of the least
+constexpr Eigen::Index kBlocks = 12;          // of the jackknife, at least
+constexpr Eigen::Index kMaxReadings = 10000;  // of more, every so many: it costs time, and clocks
+                                              // are not as good as that
+constexpr double kFloor = 1e-12;              // of the share that no model explains
+constexpr double kMinExplained = 0.3;         // R^2 of the best axis, or nothing is known
 constexpr double kGapsOfMedian = 5;
 
-/// A stretch with the readings that lie within the reference at every lag that is asked for.
+/// A segment with the readings that lie within the reference at every lag that is asked for.
 struct Prepared {
   Eigen::VectorXd time;
   Eigen::MatrixXd features;  ///< centred
-  const Stretch* source = nullptr;
+  const Segment* source = nullptr;
   double longest_gap = 0;
 };
 
-Prepared prepare(const Stretch& stretch, double from, double to, Eigen::Index every) {
+Prepared prepare(const Segment& segment, double from, double to, Eigen::Index every) {
   Prepared prepared;
-  prepared.source = &stretch;
-  prepared.longest_gap = kGapsOfMedian * median_interval(stretch.reference_time);
+  prepared.source = &segment;
+  prepared.longest_gap = kGapsOfMedian * median_interval(segment.reference_time);
   std::vector<Eigen::Index> kept;
-  const Eigen::Index last = stretch.reference_time.size() - 1;
-  for (Eigen::Index i = 0; i < stretch.time.size() && last > 0; i += every) {
-    if (stretch.time[i] - to >= stretch.reference_time[0] &&
-        stretch.time[i] - from <= stretch.reference_time[last])
+  const Eigen::Index last = segment.reference_time.size() - 1;
+  for (Eigen::Index i = 0; i < segment.time.size() && last > 0; i += every) {
+    if (segment.time[i] - to >= segment.reference_time[0] &&
+        segment.time[i] - from <= segment.reference_time[last])
       kept.push_back(i);
   }
-  prepared.time = stretch.time(kept);
-  prepared.features = stretch.features(kept, Eigen::all);
+  prepared.time = segment.time(kept);
+  prepared.features = segment.features(kept, Eigen::all);
   if (!kept.empty()) {
     const Eigen::RowVectorXd mean = prepared.features.colwise().mean();
     prepared.features.rowwise() -= mean;
@@ -75,14 +75,14 @@ struct Block {
 
 class LagScan {
  public:
-  LagScan(std::span<const Stretch> stretches, const LagSearch& search, double from, double to)
+  LagScan(std::span<const Segment> segments, const LagSearch& search, double from, double to)
       : ridge_(search.ridge) {
     Eigen::Index all = 0;
-    for (const Stretch& stretch : stretches) all += stretch.time.size();
-    const Eigen::Index every = std::max<Eigen::Index>(1, all / kMostReadings);
+    for (const Segment& segment : segments) all += segment.time.size();
+    const Eigen::Index every = std::max<Eigen::Index>(1, all / kMaxReadings);
     Eigen::Index rows = 0;
-    for (const Stretch& stretch : stretches) {
-      prepared_.push_back(prepare(stretch, from, to, every));
+    for (const Segment& segment : segments) {
+      prepared_.push_back(prepare(segment, from, to, every));
       rows += prepared_.back().time.size();
     }
     rows_ = rows;
@@ -172,14 +172,14 @@ class LagScan {
 /// Readings and reference by one triangle, wide enough that what is left of the reference's noise
 /// is nearly the same between its samples as at them: linear interpolation halves white noise
 /// midway, which would draw the lag of clocks in step towards there.
-Stretch smooth_alike(const Stretch& stretch) {
+Segment smooth_alike(const Segment& segment) {
   constexpr double kSamples = 4;  // of the reference: its noise then varies by 5 %
-  Stretch smooth = stretch;
+  Segment smooth = segment;
   const double width =
-      std::max(kSamples * median_interval(stretch.reference_time), median_interval(stretch.time));
+      std::max(kSamples * median_interval(segment.reference_time), median_interval(segment.time));
   if (!(width > 0)) return smooth;
-  smooth.features = smooth_reference(stretch.time, stretch.features, width);
-  smooth.reference = smooth_reference(stretch.reference_time, stretch.reference, width);
+  smooth.features = smooth_reference(segment.time, segment.features, width);
+  smooth.reference = smooth_reference(segment.reference_time, segment.reference, width);
   return smooth;
 }
 
@@ -246,16 +246,16 @@ Eigen::MatrixXd reference_at(const Eigen::VectorXd& time, double lag,
   return at;
 }
 
-Lag estimate_lag(std::span<const Stretch> given, const LagSearch& search) {
+Lag estimate_lag(std::span<const Segment> given, const LagSearch& search) {
   Lag lag;
   if (given.empty()) return lag;
-  std::vector<Stretch> smoothed;
+  std::vector<Segment> smoothed;
   if (search.smooth) {
-    for (const Stretch& stretch : given) smoothed.push_back(smooth_alike(stretch));
+    for (const Segment& segment : given) smoothed.push_back(smooth_alike(segment));
   }
-  const std::span<const Stretch> stretches = search.smooth ? smoothed : given;
-  const LagScan coarse(stretches, search, search.from, search.to);
-  if (coarse.rows() < 3 * stretches.front().features.cols()) return lag;
+  const std::span<const Segment> segments = search.smooth ? smoothed : given;
+  const LagScan coarse(segments, search, search.from, search.to);
+  if (coarse.rows() < 3 * segments.front().features.cols()) return lag;
   double best = std::numeric_limits<double>::infinity();
   for (const double candidate : grid(search.from, search.to, kCoarse)) {
     const double value = coarse.criterion(coarse.blocks_at(candidate), kAllBlocks);
@@ -268,7 +268,7 @@ Lag estimate_lag(std::span<const Stretch> given, const LagSearch& search) {
   lag.at_limit = lag.value < search.from + 0.5 * kCoarse || lag.value > search.to - 0.5 * kCoarse;
 
   const double reach = kFineReach * kFine;
-  const LagScan fine(stretches, search, lag.value - reach, lag.value + reach);
+  const LagScan fine(segments, search, lag.value - reach, lag.value + reach);
   const std::vector<double> lags = grid(lag.value - reach, lag.value + reach, kFine);
   std::vector<std::vector<Block>> at;
   std::size_t count = std::numeric_limits<std::size_t>::max();
@@ -296,7 +296,7 @@ Lag estimate_lag(std::span<const Stretch> given, const LagSearch& search) {
   Eigen::Vector2d explained = Eigen::Vector2d::Zero();
   fine.criterion(fine.blocks_at(lag.value), kAllBlocks, &explained);
   lag.explained = explained[0];
-  lag.known = explained[1] >= kLeastExplained && lag.sigma < reach;
+  lag.known = explained[1] >= kMinExplained && lag.sigma < reach;
   if (!lag.known) {
     lag.value = 0;
     lag.at_limit = false;

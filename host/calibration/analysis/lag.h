@@ -25,14 +25,14 @@ struct Lag {
   bool at_limit = false;  ///< the best one lies at the end of what was searched
 };
 
-/// Readings and reference of one stretch of time without a gap: a push, a whole recording.
-struct Stretch {
+/// Readings and reference of one segment of time without a gap: a push, a whole recording.
+struct Segment {
   Eigen::VectorXd time;            ///< n, s, growing
   Eigen::MatrixXd features;        ///< n x p
   Eigen::VectorXd reference_time;  ///< m, s, growing, same clock
   Eigen::MatrixXd reference;       ///< m x q. A load cell: q = 1 with a model per direction, or its
                                    ///< force times the line's wrench, q = 6
-  int model = 0;  ///< stretches of one number share the coefficients; offsets are always their own
+  int model = 0;  ///< segments of one number share the coefficients; offsets are always their own
 };
 
 struct LagSearch {
@@ -42,10 +42,10 @@ struct LagSearch {
   bool smooth = true;   ///< both, alike, for the search; false: they are already
 };
 
-/// Constant axes and features do not count. All stretches have the same p and q. `known` is false
+/// Constant axes and features do not count. All segments have the same p and q. `known` is false
 /// where fewer than about 3 p readings lie within the reference at every lag of the search, or
 /// nothing changes.
-Lag estimate_lag(std::span<const Stretch> stretches, const LagSearch& search = {});
+Lag estimate_lag(std::span<const Segment> segments, const LagSearch& search = {});
 
 /// "the readings come 41.2 +- 0.7 ms after the reference", or the other way round: whichever comes
 /// first, the number is positive.

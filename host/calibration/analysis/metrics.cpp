@@ -16,15 +16,15 @@ namespace tagwrench::study {
 namespace {
 
 // Below this the part of an axis' load that others do not tell is the reference's noise.
-constexpr double kLeastIndependent = 3;
-constexpr std::size_t kLeastRests = 3;  // windows that tell the noise
+constexpr double kMinIndependent = 3;
+constexpr std::size_t kMinRests = 3;    // windows that tell the noise
 constexpr double kUnknownNoise = 1e-9;  // of the range, where the reference has none
-constexpr double kMostExcitation = 1e6;
+constexpr double kMaxExcitation = 1e6;
 constexpr int kBins = 10;
-constexpr int kLeastInBin = 5;
+constexpr int kMinInBin = 5;
 constexpr Eigen::Index kFewRows = 100;  // means of holds: each is a point of its own
 constexpr double kQuietSeconds = 1;
-constexpr Eigen::Index kLeastQuietRows = 10;
+constexpr Eigen::Index kMinQuietRows = 10;
 constexpr double kQuietShare = 0.005;  // of full scale
 constexpr double kRestShare = 0.02;    // of full scale: nobody touches
 constexpr double kCreepShare = 0.2;    // of full scale: a load
@@ -69,7 +69,7 @@ Eigen::VectorXd binned(const Series& s, const std::vector<Eigen::Index>& rows, d
     sum[bin] += s.error[i];
     ++count[bin];
   }
-  const int least = s.felt.size() < kFewRows ? 1 : kLeastInBin;
+  const int least = s.felt.size() < kFewRows ? 1 : kMinInBin;
   for (Eigen::Index b = 0; b < kBins; ++b)
     sum[b] = count[b] >= least ? sum[b] / count[b] : std::numeric_limits<double>::quiet_NaN();
   return sum;
@@ -85,13 +85,13 @@ double nonlinearity(const Series& s, double low, double high, double full_scale)
   return 100 * largest(binned(about_line, all, low, high)) / full_scale;
 }
 
-double hysteresis(const Series& s, const Eigen::VectorXi& stretch, double low, double high,
+double hysteresis(const Series& s, const Eigen::VectorXi& segment, double low, double high,
                   double noise, double full_scale) {
   if (!(high > low)) return 0;
   std::vector<Eigen::Index> rising;
   std::vector<Eigen::Index> falling;
   for (Eigen::Index i = 1; i + 1 < s.felt.size(); ++i) {
-    if (stretch[i - 1] != stretch[i + 1]) continue;
+    if (segment[i - 1] != segment[i + 1]) continue;
     const double change = s.felt[i + 1] - s.felt[i - 1];
     if (std::abs(change) <= 3 * noise) continue;
     (change > 0 ? rising : falling).push_back(i);
@@ -108,10 +108,10 @@ struct Window {
 
 std::vector<Window> quiet_windows(const Course& course, const Analysis& analysis, double period) {
   const auto rows =
-      std::max(kLeastQuietRows, static_cast<Eigen::Index>(std::lround(kQuietSeconds / period)));
+      std::max(kMinQuietRows, static_cast<Eigen::Index>(std::lround(kQuietSeconds / period)));
   std::vector<Window> windows;
   for (Eigen::Index first = 0; first + rows <= course.time.size();) {
-    bool quiet = course.stretch[first] == course.stretch[first + rows - 1];
+    bool quiet = course.segment[first] == course.segment[first + rows - 1];
     for (std::size_t k = 0; k < 6 && quiet; ++k) {
       const AxisReport& axis = analysis.axis[k];
       const Eigen::VectorXd load =
@@ -141,7 +141,7 @@ std::vector<Window> noise_windows(const Course& course, const Analysis& analysis
   for (const Window& w : windows) {
     if (at_rest(course, analysis, w)) rests.push_back(w);
   }
-  return rests.size() >= kLeastRests ? rests : windows;
+  return rests.size() >= kMinRests ? rests : windows;
 }
 
 /// White noise from neighbours' differences, which drift does not reach: density per root Hz is
@@ -189,7 +189,7 @@ void measure_creep(const Course& course, const std::vector<Window>& windows, Eig
   for (std::size_t i = 0; i < windows.size();) {
     Window hold = windows[i++];
     while (i < windows.size() && windows[i].first == hold.first + hold.count &&
-           course.stretch[windows[i].first] == course.stretch[hold.first])
+           course.segment[windows[i].first] == course.segment[hold.first])
       hold.count += windows[i++].count;
     const Eigen::VectorXd t = course.time.segment(hold.first, hold.count);
     const double seconds = t[hold.count - 1] - t[0];
@@ -239,7 +239,7 @@ void measure_cross_talk(Analysis& analysis, const Eigen::MatrixXd& error) {
       const double loads = analysis.axis[static_cast<std::size_t>(j)].full_scale;
       const double percent = 100 * loads / (errs > 0 ? errs : 1);
       const double sigma = model.scale[j] * std::sqrt(model.inverse(j, j) * model.variance[k]);
-      const bool told = analysis.axis[static_cast<std::size_t>(j)].independent >= kLeastIndependent;
+      const bool told = analysis.axis[static_cast<std::size_t>(j)].independent >= kMinIndependent;
       const bool known = errs > 0 && told && percent * sigma < kCrossTalkSigma;
       analysis.cross_talk(k, j) =
           known ? percent * slopes(k, j) : std::numeric_limits<double>::quiet_NaN();
@@ -267,7 +267,7 @@ void judge_excitation(const Eigen::MatrixXd& felt, const Eigen::VectorXd& noise,
       continue;
     }
     changing.push_back(k);
-    const double wavers = std::max(noise[at], deviation / kMostExcitation);
+    const double wavers = std::max(noise[at], deviation / kMaxExcitation);
     axis.excitation = deviation / wavers;
     std::vector<Eigen::Index> others;
     for (Eigen::Index j = 0; j < 6; ++j) {
@@ -276,13 +276,13 @@ void judge_excitation(const Eigen::MatrixXd& felt, const Eigen::VectorXd& noise,
     const LinearModel told = fit_linear(felt(Eigen::all, others), load, 0);
     axis.independent =
         standard_deviation(load - told.predict(felt(Eigen::all, others)).col(0)) / wavers;
-    if (axis.excitation < kLeastExcitation) {
+    if (axis.excitation < kMinExcitation) {
       axis.calibrated = false;
       axis.reason = fmt::format(
           "hardly loaded: {:.2g} {} (standard deviation), {:.1f} times the reference's own noise; "
           "{:.0f} are needed",
-          deviation, kAxisUnits[k], axis.excitation, kLeastExcitation);
-    } else if (axis.independent < kLeastIndependent) {
+          deviation, kAxisUnits[k], axis.excitation, kMinExcitation);
+    } else if (axis.independent < kMinIndependent) {
       axis.calibrated = false;
       axis.reason = fmt::format(
           "never loaded by itself: what the other axes do not tell of its load is {:.1f} times the "
@@ -308,7 +308,7 @@ void measure_held_out(Analysis& analysis) {
     const Series series{analysis.felt.col(at), error.col(at)};
     axis.nonlinearity_percent =
         nonlinearity(series, axis.range_low, axis.range_high, axis.full_scale);
-    axis.hysteresis_percent = hysteresis(series, analysis.stretch, axis.range_low, axis.range_high,
+    axis.hysteresis_percent = hysteresis(series, analysis.segment, axis.range_low, axis.range_high,
                                          axis.reference_noise, axis.full_scale);
     const auto within =
         (error.col(at).array().abs() <= kTwoSided95 * analysis.predicted_sigma.col(at).array())

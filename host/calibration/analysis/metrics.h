@@ -11,7 +11,7 @@ namespace tagwrench::study {
 /// With a load whose standard deviation is less than ten times what the reference itself wavers,
 /// more than a tenth of what is compared is the reference's own error: nothing better could be
 /// shown.
-inline constexpr double kLeastExcitation = 10;
+inline constexpr double kMinExcitation = 10;
 
 /// Range, excitation and independence of each axis: fills AxisReport's range_*, full_scale,
 /// reference_noise, excitation, independent, calibrated and reason, and Analysis' weakest*.
@@ -28,10 +28,10 @@ struct Course {
   Eigen::VectorXd time;       ///< k
   Eigen::MatrixXd predicted;  ///< k x 6
   Eigen::MatrixXd felt;       ///< k x 6
-  Eigen::VectorXi stretch;    ///< k: rows of one number follow each other without a gap
+  Eigen::VectorXi segment;    ///< k: rows of one number follow each other without a gap
 };
 
-/// Noise, drift and creep where the load stands still; `one_clock`: times of all stretches go on.
+/// Noise, drift and creep where the load stands still; `one_clock`: times of all segments go on.
 void measure_rest(const Course& course, double period, bool one_clock, Analysis& analysis);
 
 }  // namespace tagwrench::study

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kGapsOfMedian = 5;  // an interval this long is a gap
 constexpr double kBacklogRate = 3;   // times the median rate
-constexpr Eigen::Index kLeastBacklog = 5;
+constexpr Eigen::Index kMinBacklog = 5;
 constexpr double kRepeatedShare = 0.02;  // of readings, that is worth a word
 constexpr double kStuckSeconds = 0.2;    // at its extreme
 constexpr double kFineSteps = 200;       // in the range: coarser ones stand still by themselves
@@ -166,7 +166,7 @@ Eigen::Index backlog_rows(const Eigen::VectorXd& time) {
     if (time[i] - time[0] >= fast * static_cast<double>(i)) break;
     if (time[i] - time[i - 1] < fast) rows = i;
   }
-  return rows >= kLeastBacklog ? rows : 0;
+  return rows >= kMinBacklog ? rows : 0;
 }
 
 double quantisation_step(const Eigen::VectorXd& values) {
@@ -182,8 +182,8 @@ double quantisation_step(const Eigen::VectorXd& values) {
     ++levels;
   }
   // A few levels are loads that were applied, not counts.
-  constexpr int kFewestLevels = 12;
-  if (levels < kFewestLevels) return 0;
+  constexpr int kMinLevels = 12;
+  if (levels < kMinLevels) return 0;
   constexpr double kTolerance = 0.02;
   for (std::size_t i = 1; i < sorted.size(); ++i) {
     const double steps = (sorted[i] - sorted[i - 1]) / step;

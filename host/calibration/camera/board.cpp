@@ -13,8 +13,8 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::size_t kFewestCorners = 8;
-constexpr std::size_t kFewestMarkers = 4;
+constexpr std::size_t kMinCorners = 8;
+constexpr std::size_t kMinMarkers = 4;
 constexpr double kMarkersInPlace = 0.7;   // part of them that must lie where the board has them
 constexpr double kStrangers = 0.1;        // part of the markers that may not be of this board
 constexpr double kPlaceTolerance = 0.35;  // of a marker: a lens bends a board by that
@@ -23,8 +23,8 @@ constexpr double kDarkMean = 25;          // grey levels
 constexpr double kClippedCorners = 0.5;   // part of them
 constexpr double kClippedImage = 0.5;     // part of its pixels
 constexpr double kTopLevel = 252;
-constexpr double kBlurPart = 0.15;  // of a square
-constexpr double kMostBlur_px = 5;
+constexpr double kBlurFraction = 0.15;  // of a square
+constexpr double kMaxBlur_px = 5;
 constexpr double kLowSlope = 0.1;  // part of the contrast per pixel: an edge blurred by 4 px
 
 /// OpenCV wants a mutable pointer but does not write to its input.
@@ -45,10 +45,10 @@ double percentile(const cv::Mat& values, double part) {
 }
 
 /// Why there may be no board to be found.
-Look judge(const cv::Mat& image) {
-  if (cv::mean(image)[0] < kDarkMean) return Look::dark;
+BoardView judge(const cv::Mat& image) {
+  if (cv::mean(image)[0] < kDarkMean) return BoardView::dark;
   if (cv::countNonZero(image >= kTopLevel) > kClippedImage * static_cast<double>(image.total()))
-    return Look::saturated;
+    return BoardView::saturated;
   cv::Mat smooth;
   cv::GaussianBlur(image, smooth, {}, 1.0);
   smooth.convertTo(smooth, CV_32F);
@@ -60,17 +60,18 @@ Look judge(const cv::Mat& image) {
   cv::magnitude(dx, dy, slope);
   const double contrast = percentile(smooth, 0.98) - percentile(smooth, 0.02);
   if (contrast > kLowContrast && percentile(slope, 0.999) < kLowSlope * contrast)
-    return Look::blurred;
-  return Look::no_board;
+    return BoardView::blurred;
+  return BoardView::no_board;
 }
 
-Look judge(const RefinedCorners& refined, std::size_t fewest) {
-  const CornerLook& look = refined.look;
-  if (refined.corners.size() < fewest) return Look::part;
-  if (look.contrast < kLowContrast) return Look::dark;
-  if (look.clipped_part > kClippedCorners) return Look::saturated;
-  if (look.blur_px > std::min(kMostBlur_px, kBlurPart * look.spacing_px)) return Look::blurred;
-  return Look::board;
+BoardView judge(const RefinedCorners& refined, std::size_t fewest) {
+  const CornerView& look = refined.look;
+  if (refined.corners.size() < fewest) return BoardView::part;
+  if (look.contrast < kLowContrast) return BoardView::dark;
+  if (look.clipped_fraction > kClippedCorners) return BoardView::saturated;
+  if (look.blur_px > std::min(kMaxBlur_px, kBlurFraction * look.spacing_px))
+    return BoardView::blurred;
+  return BoardView::board;
 }
 
 cv::Ptr<cv::aruco::DetectorParameters> marker_parameters() {
@@ -81,21 +82,21 @@ cv::Ptr<cv::aruco::DetectorParameters> marker_parameters() {
 
 }  // namespace
 
-const char* words(Look look) {
+const char* words(BoardView look) {
   switch (look) {
-    case Look::board:
+    case BoardView::board:
       return "good";
-    case Look::no_board:
+    case BoardView::no_board:
       return "without the board";
-    case Look::other_board:
+    case BoardView::other_board:
       return "with markers that are not where this board has them";
-    case Look::part:
+    case BoardView::part:
       return "with too little of the board";
-    case Look::dark:
+    case BoardView::dark:
       return "too dark";
-    case Look::saturated:
+    case BoardView::saturated:
       return "overexposed";
-    case Look::blurred:
+    case BoardView::blurred:
       return "blurred";
   }
   return "?";
@@ -119,14 +120,14 @@ struct BoardFinder::Detector {
   std::size_t corners_on_board() const {
     return static_cast<std::size_t>(spec.columns - 1) * static_cast<std::size_t>(spec.rows - 1);
   }
-  std::size_t fewest() const { return std::min(kFewestCorners, corners_on_board()); }
+  std::size_t fewest() const { return std::min(kMinCorners, corners_on_board()); }
 
   BoardSighting sighting(const cv::Mat& image, const std::vector<BoardCorner>& rough) const {
     const RefinedCorners refined = refine_corners(as_view(image), rough, fill);
     BoardSighting out;
     out.look = judge(refined, fewest());
     out.corners = refined.corners;
-    out.corner_look = refined.look;
+    out.corner_view = refined.look;
     return out;
   }
 
@@ -160,7 +161,7 @@ struct BoardFinder::Detector {
       }
     }
     const std::size_t strangers = ids.size() - on_board.size() / 4;
-    if (on_board.size() < 4 * kFewestMarkers ||
+    if (on_board.size() < 4 * kMinMarkers ||
         static_cast<double>(strangers) > kStrangers * static_cast<double>(ids.size()))
       return false;
     std::nth_element(sides_px.begin(),
@@ -177,8 +178,8 @@ struct BoardFinder::Detector {
     std::vector<std::vector<cv::Point2f>> markers;
     std::vector<int> ids;
     cv::aruco::detectMarkers(image, charuco->dictionary, markers, ids, parameters);
-    if (ids.size() < kFewestMarkers) return std::nullopt;
-    if (!in_place(markers, ids)) return BoardSighting{Look::other_board, {}, {}};
+    if (ids.size() < kMinMarkers) return std::nullopt;
+    if (!in_place(markers, ids)) return BoardSighting{BoardView::other_board, {}, {}};
     std::vector<cv::Point2f> found;
     std::vector<int> corner_ids;
     cv::aruco::interpolateCornersCharuco(markers, ids, image, charuco, found, corner_ids);
@@ -207,7 +208,7 @@ BoardSighting BoardFinder::find(const ImageView& image) {
   cv::Mat flipped;
   cv::flip(delivered, flipped, 1);
   const auto good = [](const std::optional<BoardSighting>& s) {
-    return s && s->look != Look::other_board;
+    return s && s->look != BoardView::other_board;
   };
   std::optional<BoardSighting> seen = detector_->detect(mirrored_ ? flipped : delivered);
   if (!good(seen) && !settled_) {

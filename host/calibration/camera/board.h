@@ -13,7 +13,7 @@
 namespace tagwrench {
 
 /// What became of one image.
-enum class Look : std::uint8_t {
+enum class BoardView : std::uint8_t {
   board,        ///< found, sharp and well lit
   no_board,     ///< nothing like it
   other_board,  ///< markers, but not where this board has them
@@ -24,13 +24,13 @@ enum class Look : std::uint8_t {
 };
 
 /// "too dark", as one says it of an image.
-const char* words(Look look);
+const char* words(BoardView look);
 
 struct BoardSighting {
-  Look look = Look::no_board;
+  BoardView look = BoardView::no_board;
   /// Of the image after flipping it back, if mirrored; filled when look is `board`.
   std::vector<BoardCorner> corners;
-  CornerLook corner_look;
+  CornerView corner_view;
 };
 
 class BoardFinder {

@@ -15,9 +15,9 @@ namespace {
 constexpr double kAlike = 0.015;  // of the image's width: mean motion of the corners
 constexpr double kStill = 0.001;  // of the image's width, between two frames
 constexpr int kStillFrames = 2;   // in a row
-constexpr std::size_t kMostPuzzles = 5;
-constexpr std::size_t kMostViews = 500;  // held; memory must end
-constexpr std::size_t kFewestShared = 6;
+constexpr std::size_t kMaxUndetected = 5;
+constexpr std::size_t kMaxViews = 500;  // held; memory must end
+constexpr std::size_t kMinShared = 6;
 
 }  // namespace
 
@@ -31,7 +31,7 @@ double difference_px(const std::vector<BoardCorner>& a, const std::vector<BoardC
       ++shared;
     }
   }
-  if (shared < std::min({kFewestShared, a.size(), b.size()}) || shared == 0)
+  if (shared < std::min({kMinShared, a.size(), b.size()}) || shared == 0)
     return std::numeric_limits<double>::max();
   return sum / static_cast<double>(shared);
 }
@@ -47,34 +47,34 @@ bool ViewCollector::still(const std::vector<BoardCorner>& corners) {
 }
 
 void ViewCollector::keep(const ImageView& image) {
-  if (puzzles_.size() >= kMostPuzzles) return;
-  std::vector<std::uint8_t>& copy = puzzles_.emplace_back();
+  if (undetected_.size() >= kMaxUndetected) return;
+  std::vector<std::uint8_t>& copy = undetected_.emplace_back();
   for (int y = 0; y < image.height; ++y) {
     const std::uint8_t* row = image.pixels + static_cast<std::ptrdiff_t>(y) * image.stride;
     copy.insert(copy.end(), row, row + image.width);
   }
 }
 
-Taken ViewCollector::look(const ImageView& image, const std::string& name) {
+ViewResult ViewCollector::look(const ImageView& image, const std::string& name) {
   const bool mirrored_before = finder_.mirrored();
   BoardSighting sighting = finder_.find(image);
   if (finder_.mirrored() != mirrored_before) previous_.clear();
   last_look_ = sighting.look;
   ++looks_[sighting.look];
   ++looked_;
-  if (sighting.look == Look::no_board || sighting.look == Look::other_board) keep(image);
-  if (sighting.look != Look::board) return Taken::no;
-  if (live_ && !still(sighting.corners)) return Taken::moving;
+  if (sighting.look == BoardView::no_board || sighting.look == BoardView::other_board) keep(image);
+  if (sighting.look != BoardView::board) return ViewResult::no;
+  if (live_ && !still(sighting.corners)) return ViewResult::moving;
   const auto alike = [&](const CameraView& view) {
     return difference_px(view.corners, sighting.corners) < kAlike * camera_.width_px;
   };
   if (std::any_of(views_.begin(), views_.end(), alike)) {
     ++alike_;
-    return Taken::alike;
+    return ViewResult::alike;
   }
-  if (views_.size() < kMostViews)
-    views_.push_back({name, std::move(sighting.corners), sighting.corner_look.blur_px});
-  return Taken::yes;
+  if (views_.size() < kMaxViews)
+    views_.push_back({name, std::move(sighting.corners), sighting.corner_view.blur_px});
+  return ViewResult::yes;
 }
 
 Coverage ViewCollector::coverage() const {
@@ -111,24 +111,24 @@ void ViewCollector::thin_out(int most) {
 std::string ViewCollector::what_was_seen() const {
   std::vector<std::string> parts;
   for (const auto& [look, count] : looks_) {
-    if (look != Look::board) parts.push_back(fmt::format("{} {}", count, words(look)));
+    if (look != BoardView::board) parts.push_back(fmt::format("{} {}", count, words(look)));
   }
   return listed(parts);
 }
 
 std::string ViewCollector::other_board() const {
   std::vector<ImageView> images;
-  for (const auto& pixels : puzzles_)
+  for (const auto& pixels : undetected_)
     images.push_back({pixels.data(), camera_.width_px, camera_.height_px, camera_.width_px});
   return guess_board(images, board_);
 }
 
 void ViewCollector::check() const {
   const std::string asked = describe(board_);
-  const auto found = looks_.find(Look::board);
+  const auto found = looks_.find(BoardView::board);
   const int count = found == looks_.end() ? 0 : found->second;
   // Part of a checkerboard may pass for a smaller one here and there.
-  if (static_cast<int>(views_.size()) < kFewestCameraViews) {
+  if (static_cast<int>(views_.size()) < kMinCameraViews) {
     if (const std::string guess = other_board(); !guess.empty()) {
       throw ConfigError(fmt::format(
           "--board {}: found in {} of {} images; the board in the others looks like {}: correct "

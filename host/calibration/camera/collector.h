@@ -11,7 +11,7 @@
 
 namespace tagwrench {
 
-enum class Taken : std::uint8_t {
+enum class ViewResult : std::uint8_t {
   yes,
   moving,  ///< live only
   alike,   ///< as an earlier view
@@ -25,11 +25,11 @@ class ViewCollector {
   ViewCollector(const BoardSpec& board, const CameraModel& camera, bool live);
 
   /// `name` of the image, for people.
-  Taken look(const ImageView& image, const std::string& name);
+  ViewResult look(const ImageView& image, const std::string& name);
 
   const std::vector<CameraView>& views() const { return views_; }
   /// Of the image shown last.
-  Look last_look() const { return last_look_; }
+  BoardView last_look() const { return last_look_; }
   bool mirrored() const { return finder_.mirrored(); }
   /// Of the last live image in which the board was found, flipped back if mirrored.
   const std::vector<BoardCorner>& last_corners() const { return previous_; }
@@ -57,11 +57,11 @@ class ViewCollector {
   std::vector<CameraView> views_;
   std::vector<BoardCorner> previous_;
   int still_frames_ = 0;
-  Look last_look_ = Look::no_board;
-  std::map<Look, int> looks_;
+  BoardView last_look_ = BoardView::no_board;
+  std::map<BoardView, int> looks_;
   int looked_ = 0;
   int alike_ = 0;
-  std::vector<std::vector<std::uint8_t>> puzzles_;  ///< images in which the board was not found
+  std::vector<std::vector<std::uint8_t>> undetected_;  ///< images in which the board was not found
 };
 
 /// Mean distance of the corners that both show (px); a large number if they share too few.

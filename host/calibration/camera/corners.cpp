@@ -18,12 +18,12 @@ constexpr Eigen::Index kSpare = 4;      // neighbours beyond those that a fit ne
 // marker is twice as far.
 constexpr double kOffPlaneGrid = 0.12;
 constexpr double kOffCurvedGrid = 0.07;
-constexpr double kWidestWindow_px = 14;  // a lens bends lines too little to see over this
-constexpr double kWindowPart = 0.45;     // of the spacing, so that no other edge is in it
-constexpr double kWorstFit = 0.25;       // RMS over contrast
-constexpr double kWhiteTop = 252;        // grey levels
+constexpr double kWidestWindow_px = 14;   // a lens bends lines too little to see over this
+constexpr double kWindowFraction = 0.45;  // of the spacing, so that no other edge is in it
+constexpr double kWorstFit = 0.25;        // RMS over contrast
+constexpr double kWhiteTop = 252;         // grey levels
 constexpr int kIterations = 15;
-constexpr int kFewestPixels = 25;
+constexpr int kMinPixels = 25;
 
 /// The board near one corner, linearised: pixel = centre + axes * (board - corner), px per square.
 struct LocalGrid {
@@ -135,7 +135,7 @@ std::vector<Pixel> window(const ImageView& image, const Eigen::Vector2d& centre,
                           const LocalGrid& grid, const SquareFill& fill) {
   const Eigen::Matrix2d to_board = grid.axes.inverse();
   const Eigen::Vector2d across = grid.across_px();
-  const double half_px = std::min(kWidestWindow_px, kWindowPart * across.minCoeff());
+  const double half_px = std::min(kWidestWindow_px, kWindowFraction * across.minCoeff());
   // A marker's border is part of the model, its cells are not.
   const double clear = fill.markers ? fill.gap + 0.5 * fill.ring : 1;
   std::vector<Pixel> pixels;
@@ -171,7 +171,7 @@ double sum_of_squares(const std::vector<Pixel>& pixels, const Parameters& p, con
 /// Levenberg-Marquardt from the neighbours' grid.
 std::optional<Fit> fit_corner(const std::vector<Pixel>& pixels, const Eigen::Vector2d& centre,
                               const LocalGrid& grid, const Print& print) {
-  if (pixels.size() < kFewestPixels) return std::nullopt;
+  if (pixels.size() < kMinPixels) return std::nullopt;
   const Eigen::Matrix2d to_board = grid.axes.inverse();
   Parameters p = Parameters::Zero();
   p.head<2>() = centre;

@@ -16,16 +16,16 @@ struct BoardCorner {
 };
 
 /// How the corners of one image look.
-struct CornerLook {
-  double blur_px = 0;       ///< median standard deviation of the edges' spread
-  double spacing_px = 0;    ///< median distance between neighbours
-  double contrast = 0;      ///< median of white minus black, grey levels
-  double clipped_part = 0;  ///< part of the corners whose white is at the top of the grey scale
+struct CornerView {
+  double blur_px = 0;           ///< median standard deviation of the edges' spread
+  double spacing_px = 0;        ///< median distance between neighbours
+  double contrast = 0;          ///< median of white minus black, grey levels
+  double clipped_fraction = 0;  ///< part of the corners whose white is at the top of the grey scale
 };
 
 struct RefinedCorners {
   std::vector<BoardCorner> corners;
-  CornerLook look;
+  CornerView look;
 };
 
 /// What is printed in the white squares, in squares.

@@ -7,7 +7,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr int kFewestCorners = 6;                      // in a region
+constexpr int kMinCorners = 6;                         // in a region
 constexpr double kTilt = 20 * std::numbers::pi / 180;  // asked for, each way
 constexpr double kDistanceRatio = 1.2;                 // farthest to nearest
 constexpr std::array<const char*, 9> kRegions = {"top left",    "top",    "top right",
@@ -40,13 +40,13 @@ void Coverage::add(const std::vector<BoardCorner>& corners, const BoardPose& pos
 
 int Coverage::regions() const {
   return static_cast<int>(
-      std::count_if(corners_.begin(), corners_.end(), [](int n) { return n >= kFewestCorners; }));
+      std::count_if(corners_.begin(), corners_.end(), [](int n) { return n >= kMinCorners; }));
 }
 
 std::vector<std::string> Coverage::missing_regions() const {
   std::vector<std::string> out;
   for (std::size_t i = 0; i < corners_.size(); ++i) {
-    if (corners_[i] < kFewestCorners) out.emplace_back(kRegions[i]);
+    if (corners_[i] < kMinCorners) out.emplace_back(kRegions[i]);
   }
   return out;
 }

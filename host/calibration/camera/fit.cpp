@@ -15,16 +15,16 @@ namespace tagwrench {
 namespace {
 
 constexpr int kFixed = cv::CALIB_USE_QR;
-constexpr int kFewestForOwnFocal = 5;
-constexpr std::size_t kFewestForK3 = 10;
+constexpr int kMinForOwnFocal = 5;
+constexpr std::size_t kMinForK3 = 10;
 constexpr int kFolds = 5;
 constexpr double kK3Gain = 0.98;       // of the held-out squared error
 constexpr double kOutlierSpreads = 4;  // median absolute deviations, as standard deviations
 constexpr double kOutlierRatio = 1.5;  // to the median
 constexpr double kOutlierFloor_px = 0.03;
-constexpr double kMostDropped = 1.0 / 3;
-constexpr double kCornerRatio = 8;            // to the median error of all corners
-constexpr double kMostCornersDropped = 0.15;  // of a view; beyond, the view is bad
+constexpr double kMaxDropped = 1.0 / 3;
+constexpr double kCornerRatio = 8;           // to the median error of all corners
+constexpr double kMaxCornersDropped = 0.15;  // of a view; beyond, the view is bad
 
 /// One view's corners as OpenCV wants them; lengths in squares.
 struct Points {
@@ -158,7 +158,7 @@ bool drop_corners(std::vector<Points>& all, const std::vector<std::size_t>& whic
     Points& view = all[which[i]];
     const auto off = static_cast<std::size_t>(
         std::count_if(errors[i].begin(), errors[i].end(), [&](double e) { return e > limit_px; }));
-    if (off == 0 || off > kMostCornersDropped * static_cast<double>(errors[i].size())) continue;
+    if (off == 0 || off > kMaxCornersDropped * static_cast<double>(errors[i].size())) continue;
     Points kept;
     for (std::size_t c = 0; c < errors[i].size(); ++c) {
       if (errors[i][c] > limit_px) continue;
@@ -174,7 +174,7 @@ bool drop_corners(std::vector<Points>& all, const std::vector<std::size_t>& whic
 /// The fit without the corners and the views that stand out; `which` is left with those used.
 Solution solve_robustly(std::vector<Points>& all, std::vector<std::size_t>& which, cv::Size size,
                         int flags) {
-  const double fewest = (1 - kMostDropped) * static_cast<double>(all.size());
+  const double fewest = (1 - kMaxDropped) * static_cast<double>(all.size());
   for (;;) {
     Solution solution = solve(all, which, size, flags);
     if (drop_corners(all, which, solution)) continue;
@@ -229,7 +229,7 @@ CameraFit fit_camera(const std::vector<CameraView>& views, int width_px, int hei
   std::iota(used.begin(), used.end(), 0);
   try {
     Solution solution = solve_robustly(all, used, size, cv::CALIB_FIX_K3);
-    if (used.size() >= kFewestForK3 &&
+    if (used.size() >= kMinForK3 &&
         held_out(all, used, size, 0) < kK3Gain * held_out(all, used, size, cv::CALIB_FIX_K3))
       solution = solve(all, used, size, 0);
     return result(solution, all, used, size);
@@ -249,7 +249,7 @@ std::vector<BoardPose> rough_poses(const std::vector<CameraView>& views, int wid
   cv::Mat distortion = cv::Mat::zeros(1, 5, CV_64F);
   std::vector<BoardPose> out;
   try {
-    if (static_cast<int>(all.size()) >= kFewestForOwnFocal) {
+    if (static_cast<int>(all.size()) >= kMinForOwnFocal) {
       std::vector<std::size_t> which(all.size());
       std::iota(which.begin(), which.end(), 0);
       const Solution s = solve(all, which, {width_px, height_px},

@@ -14,8 +14,8 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::size_t kFewestMarkers = 6;
-constexpr int kMostColumns = 40;
+constexpr std::size_t kMinMarkers = 6;
+constexpr int kMaxColumns = 40;
 constexpr double kInPlace = 0.9;     // part of the markers
 constexpr double kTolerance = 0.25;  // of a marker's side
 
@@ -63,7 +63,7 @@ int columns_of(const Markers& markers) {
   }
   int best = 0;
   int most = static_cast<int>(kInPlace * static_cast<double>(centres.size()));
-  for (int columns = 3; columns <= kMostColumns; ++columns) {
+  for (int columns = 3; columns <= kMaxColumns; ++columns) {
     std::vector<cv::Point2f> places;
     for (const int id : markers.ids) places.push_back(place(id, columns));
     std::vector<std::uint8_t> fits;
@@ -84,7 +84,7 @@ std::string charuco_words(int columns, int rows, std::string_view dictionary) {
 
 std::string guess_charuco(const cv::Mat& image) {
   const Markers markers = read_markers(image);
-  if (markers.ids.size() < kFewestMarkers) return {};
+  if (markers.ids.size() < kMinMarkers) return {};
   const int columns = columns_of(markers);
   const std::string_view dictionary = name(markers.family);
   if (columns == 0) return fmt::format("a charuco board with {} markers", dictionary);

@@ -3,7 +3,7 @@
 
 namespace tagwrench {
 
-constexpr int kFewestCameraViews = 8;
-constexpr int kMostCameraViews = 80;
+constexpr int kMinCameraViews = 8;
+constexpr int kMaxCameraViews = 80;
 
 }  // namespace tagwrench

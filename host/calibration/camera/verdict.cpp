@@ -12,12 +12,12 @@
 namespace tagwrench {
 namespace {
 
-constexpr int kFewestRegions = 6;      // of nine
-constexpr double kFewestSpan = 0.6;    // of width and height
-constexpr double kLeastTilt = 12;      // degrees
+constexpr int kMinRegions = 6;         // of nine
+constexpr double kMinSpan = 0.6;       // of width and height
+constexpr double kMinTilt = 12;        // degrees
 constexpr double kFocalSigma = 0.003;  // of the focal length
 constexpr double kCentreSigma_px = 5;
-constexpr double kMostRms_px = 1.0;
+constexpr double kMaxRms_px = 1.0;
 constexpr double kAspect = 0.1;      // of 1
 constexpr double kCentreOff = 0.25;  // of width and height, from the middle
 constexpr double kDegrees = 180 / std::numbers::pi;
@@ -43,14 +43,14 @@ bool monotonic(const CameraModel& camera) {
 }  // namespace
 
 void check_views(const std::vector<CameraView>& views, const Coverage& coverage) {
-  if (static_cast<int>(views.size()) < kFewestCameraViews) {
+  if (static_cast<int>(views.size()) < kMinCameraViews) {
     throw ConfigError(
         fmt::format("only {} different usable views, {} are needed and 20 are good: show the board "
                     "at more places, "
                     "distances and tilts",
-                    views.size(), kFewestCameraViews));
+                    views.size(), kMinCameraViews));
   }
-  if (coverage.regions() < kFewestRegions || coverage.span() < kFewestSpan) {
+  if (coverage.regions() < kMinRegions || coverage.span() < kMinSpan) {
     throw ConfigError(
         fmt::format("the views leave too much of the image empty (corners span {:.0f} % of it, and "
                     "miss {}): show "
@@ -62,13 +62,13 @@ void check_views(const std::vector<CameraView>& views, const Coverage& coverage)
 void check_fit(const CameraFit& fit, const Coverage& coverage) {
   const CameraModel& camera = fit.camera;
   const double tilt = coverage.largest_tilt() * kDegrees;
-  if (tilt < kLeastTilt) {
+  if (tilt < kMinTilt) {
     throw ConfigError(fmt::format(
         "the board is nearly frontal in every view (at most {:.0f} degrees), so the focal "
         "length cannot be told from the distance: tilt it by 20 degrees and more, each way",
         tilt));
   }
-  if (fit.rms_px > kMostRms_px) {
+  if (fit.rms_px > kMaxRms_px) {
     throw ConfigError(
         fmt::format("no camera explains the views better than {:.2f} px: check that --board "
                     "describes the board "

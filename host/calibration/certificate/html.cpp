@@ -18,9 +18,9 @@ using study::AxisReport;
 
 constexpr double kCrossTalkOfNote = 1;  // % of full scale: printed bold
 constexpr std::size_t kHashShown = 16;  // hexadecimal digits; the JSON has them all
-constexpr std::size_t kMostData = 4;
-constexpr double kMostExcitation = 1000;
-constexpr std::size_t kLongestName = 28;
+constexpr std::size_t kMaxData = 4;
+constexpr double kMaxExcitation = 1000;
+constexpr std::size_t kMaxName = 28;
 
 /// Bytes of the UTF-8 sequence that begins at `i`, 0 if there is none (RFC 3629).
 std::size_t sequence_length(std::string_view text, std::size_t i) {
@@ -81,7 +81,7 @@ std::string fact_list(const char* title, const std::vector<Fact>& facts, const P
 /// Masses have next to no noise.
 std::string excitation_text(double value) {
   if (!(value > 0)) return "–";
-  return value < kMostExcitation ? number_text(value) : ">1000";
+  return value < kMaxExcitation ? number_text(value) : ">1000";
 }
 
 std::string axis_row(const AxisReport& r, int axis, const PageRoom& room) {
@@ -200,14 +200,14 @@ std::vector<Fact> conditions(const Analysis& a) {
 
 std::string data(const Certificate& c) {
   std::string text = "<section><h2>Data</h2><table class=\"facts\">";
-  for (std::size_t i = 0; i < std::min(c.data.size(), kMostData); ++i) {
+  for (std::size_t i = 0; i < std::min(c.data.size(), kMaxData); ++i) {
     text += fmt::format("<tr><th>{}</th><td>{} bytes, SHA-256 <code>{}…</code></td></tr>",
-                        escaped(shortened(c.data[i].name, kLongestName)), c.data[i].bytes,
+                        escaped(shortened(c.data[i].name, kMaxName)), c.data[i].bytes,
                         escaped(c.data[i].sha256.substr(0, kHashShown)));
   }
-  if (c.data.size() > kMostData) {
+  if (c.data.size() > kMaxData) {
     text += fmt::format("<tr><th></th><td>and {} more, in the JSON</td></tr>",
-                        c.data.size() - kMostData);
+                        c.data.size() - kMaxData);
   }
   return text + "</table></section>";
 }

@@ -14,10 +14,10 @@ namespace {
 using study::Analysis;
 
 constexpr std::chrono::seconds kPatience{60};
-constexpr Eigen::Index kMostDots = 500;     // of a panel
-constexpr Eigen::Index kMostColumns = 420;  // of a trace: about one a pixel of paper
-constexpr double kPause = 16;               // typical steps of time, drawn between trials ...
-constexpr double kMostPauses = 0.5;  // ... but all together no more of the time that is shown
+constexpr Eigen::Index kMaxDots = 500;     // of a panel
+constexpr Eigen::Index kMaxColumns = 420;  // of a trace: about one a pixel of paper
+constexpr double kPause = 16;              // typical steps of time, drawn between trials ...
+constexpr double kMaxPauses = 0.5;         // ... but all together no more of the time that is shown
 
 /// Forces in N, torques in mN m.
 double shown(double value, int axis) { return axis < 3 ? value : 1e3 * value; }
@@ -89,7 +89,7 @@ std::string scatter_panel(const Analysis& a, int axis) {
   // which weasyprint 57 does not draw.
   const double short_line = 2e-3 * (s.high - s.low);
   std::string script = "$dots << END\n";
-  const Eigen::Index stride = std::max<Eigen::Index>(1, a.time.size() / kMostDots);
+  const Eigen::Index stride = std::max<Eigen::Index>(1, a.time.size() / kMaxDots);
   for (Eigen::Index i = 0; i < a.time.size(); i += stride) {
     const double x = shown(a.felt(i, axis), axis);
     const double y = shown(a.predicted(i, axis), axis);
@@ -118,10 +118,10 @@ double typical_step(const Eigen::VectorXd& time) {
 
 /// Whether a line goes on from row i - 1 to row i.
 bool goes_on(const Analysis& a, Eigen::Index i) {
-  return a.stretch.size() != a.time.size() || a.stretch[i] == a.stretch[i - 1];
+  return a.segment.size() != a.time.size() || a.segment[i] == a.segment[i - 1];
 }
 
-/// From 0 on, with short pauses between stretches, however long they were: a trial may begin
+/// From 0 on, with short pauses between segments, however long they were: a trial may begin
 /// earlier than the one before has ended, and loads hang for seconds, minutes apart.
 Eigen::VectorXd running_time(const Analysis& a) {
   Eigen::VectorXd passed = Eigen::VectorXd::Zero(a.time.size());  // 0: a pause
@@ -129,7 +129,7 @@ Eigen::VectorXd running_time(const Analysis& a) {
     if (goes_on(a, i)) passed[i] = std::max(0.0, a.time[i] - a.time[i - 1]);
   }
   const auto pauses = static_cast<double>(std::max<Eigen::Index>(1, (passed.array() == 0).count()));
-  const double most = kMostPauses * passed.sum() / pauses;
+  const double most = kMaxPauses * passed.sum() / pauses;
   const double step = kPause * typical_step(a.time);
   const double pause = most > 0 ? std::min(step, most) : step;
   Eigen::VectorXd running = Eigen::VectorXd::Zero(a.time.size());
@@ -142,7 +142,7 @@ Eigen::VectorXd running_time(const Analysis& a) {
 /// greatest of each pixel, so that no peak is lost. Empty lines break the line.
 std::string trace_data(const Analysis& a, const Eigen::VectorXd& time,
                        const Eigen::MatrixXd& values, int axis) {
-  const Eigen::Index most = std::max<Eigen::Index>(1, 2 * time.size() / kMostColumns);
+  const Eigen::Index most = std::max<Eigen::Index>(1, 2 * time.size() / kMaxColumns);
   std::string text;
   const auto add = [&](Eigen::Index i) {
     if (std::isfinite(values(i, axis)))

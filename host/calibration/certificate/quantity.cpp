@@ -9,7 +9,7 @@ namespace tagwrench {
 namespace {
 
 constexpr double kAlike = 0.05;
-constexpr double kLeastPercent = 0.01;
+constexpr double kMinPercent = 0.01;
 constexpr const char* kSpace = "\u00a0";  // does not break
 
 struct Prefix {
@@ -62,7 +62,7 @@ std::string number_text(double value) {
 }
 
 std::string percent_text(double value) {
-  if (std::abs(value) < kLeastPercent) return "<0.01\u00a0%";
+  if (std::abs(value) < kMinPercent) return "<0.01\u00a0%";
   return std::isfinite(value) ? with_minus(rounded(value, 2)) + kSpace + "%" : "–";
 }
 

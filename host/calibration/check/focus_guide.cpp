@@ -7,7 +7,7 @@ namespace tagwrench {
 namespace {
 
 constexpr Duration kLookBack = std::chrono::seconds(1);
-constexpr Duration kLeastLook = std::chrono::milliseconds(300);
+constexpr Duration kMinLook = std::chrono::milliseconds(300);
 constexpr double kTurned = 1.06;  // ratio of widths that says that somebody turns
 constexpr double kAway = 1.10;    // from the best
 constexpr double kWorse = 1.20;   // than the best: there is nothing to be found on that side
@@ -31,7 +31,7 @@ void FocusGuide::add(TimePoint time, double width_px, unsigned tags) {
   seen_.push_back({time, width_px});
   std::erase_if(seen_, [&](const Seen& s) { return time - s.time > kLookBack; });
   const Seen& before = seen_.front();
-  if (time - before.time < kLeastLook) {
+  if (time - before.time < kMinLook) {
     turn_ = FocusTurn::begin;
   } else if (width_px * kTurned < before.width_px) {
     turn_ = FocusTurn::sharper;

@@ -8,7 +8,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kLargestRange = 1e8;  // beyond, nobody has told it
+constexpr double kMaxRange = 1e8;  // beyond, nobody has told it
 
 Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -63,10 +63,10 @@ InSituFinding judge_light(const AtRest& rest, const InSituLimits& limits) {
                         .expected = rest.then.white_counts};
   if (rest.now.white_counts < std::max(limits.darkest, limits.dimmed * rest.then.white_counts)) {
     finding.fault = Fault::too_dark;
-  } else if (rest.now.clipped_part > rest.then.clipped_part + limits.clipped) {
+  } else if (rest.now.clipped_fraction > rest.then.clipped_fraction + limits.clipped) {
     finding.fault = Fault::too_bright;
-    finding.amount = rest.now.clipped_part;
-    finding.expected = rest.then.clipped_part;
+    finding.amount = rest.now.clipped_fraction;
+    finding.expected = rest.then.clipped_fraction;
   }
   return finding;
 }
@@ -145,17 +145,17 @@ InSituFinding judge_tags(const AtRest& rest, const InSituLimits& limits) {
 }
 
 InSituFinding judge_residual(const AtRest& rest, const InSituLimits& limits) {
-  InSituFinding finding{.subject = Subject::residual, .expected = limits.residual_part};
+  InSituFinding finding{.subject = Subject::residual, .expected = limits.residual_fraction};
   bool known = false;
   for (const TagAtRest& tag : rest.tags) {
     if (!tag.held) continue;
     known = true;
-    if (tag.residual_part < finding.amount) continue;
-    finding.amount = tag.residual_part;
+    if (tag.residual_fraction < finding.amount) continue;
+    finding.amount = tag.residual_fraction;
     finding.tag = tag.id;
   }
   if (!known) finding.fault = Fault::not_known;
-  if (finding.amount > limits.residual_part) finding.fault = Fault::residual_grown;
+  if (finding.amount > limits.residual_fraction) finding.fault = Fault::residual_grown;
   return finding;
 }
 
@@ -163,7 +163,7 @@ InSituFinding judge_zero(const AtRest& rest, const InSituLimits& limits) {
   InSituFinding finding{.subject = Subject::zero};
   bool known = false;
   for (int i = 0; i < 6; ++i) {
-    if (!(rest.range[i] > 0 && rest.range[i] < kLargestRange)) continue;
+    if (!(rest.range[i] > 0 && rest.range[i] < kMaxRange)) continue;
     known = true;
     const double share = rest.wrench[i] / rest.range[i];
     if (std::abs(share) < std::abs(finding.amount)) continue;
@@ -210,7 +210,7 @@ InSituFinding judge(const ProofLoad& load, const InSituLimits& limits) {
       (load.known_covariance + load.measured_covariance).diagonal().cwiseMax(0).cwiseSqrt();
   double worst = limits.off_line;
   for (int i = 0; i < 6; ++i) {
-    if (!(load.range[i] > 0 && load.range[i] < kLargestRange)) continue;
+    if (!(load.range[i] > 0 && load.range[i] < kMaxRange)) continue;
     const double share = std::abs(rest[i]) / load.range[i];
     if (share <= worst || std::abs(rest[i]) <= limits.sigmas * sigma[i]) continue;
     worst = share;

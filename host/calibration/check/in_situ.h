@@ -18,14 +18,14 @@ struct TagAtRest {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< calibrated, platform frame, m
   Vector6 displacement = Vector6::Zero();            ///< mean, of the platform as this tag has it
   Matrix6 covariance = Matrix6::Zero();              ///< of one frame's
-  double residual_part = 0;                          ///< mean; see Track
+  double residual_fraction = 0;                      ///< mean; see Track
   double blur_px2 = 0;                               ///< mean
 };
 
 /// How bright the tags are, and how wide their edges.
 struct TagPicture {
   double white_counts = 0;        ///< grey level of their white, 0..255
-  double clipped_part = 0;        ///< of their pixels, 0..1
+  double clipped_fraction = 0;    ///< of their pixels, 0..1
   std::optional<double> blur_px;  ///< standard deviation of the edges' blur, good to a third
 };
 
@@ -36,7 +36,7 @@ struct AtRest {
   std::vector<TagAtRest> tags;
   TagPicture now, then;
   bool held = false;                 ///< all tags together, in the frames that stood still
-  double residual_part = 0;          ///< of that, mean
+  double residual_fraction = 0;      ///< of that, mean
   Vector6 wrench = Vector6::Zero();  ///< mean, less the zero that was set
   Vector6 range = Vector6::Zero();   ///< N, N m; an axis without one is not judged
 };
@@ -87,7 +87,7 @@ struct InSituLimits {
   double slip = 5e-6;        ///< m; what light and print do to a tag that has not moved
   double slip_angle = 2e-3;  ///< rad
   double blur_px2 = 0.15;    ///< either way
-  double residual_part = 0.05;
+  double residual_fraction = 0.05;
   double darkest = 50;      ///< white, counts
   double dimmed = 0.5;      ///< white over that at rest
   double clipped = 0.05;    ///< more of the tags than at rest

@@ -6,10 +6,10 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kLargestRange = 1e8;  // beyond, nobody has told it
-constexpr double kLongestGap = 1;      // s that one pair may stand for
-constexpr double kFewest = 20;         // independent pairs before a line is drawn
-constexpr double kHuber = 2.5;         // standard deviations
+constexpr double kMaxRange = 1e8;  // beyond, nobody has told it
+constexpr double kMaxGap = 1;      // s that one pair may stand for
+constexpr double kMin = 20;        // independent pairs before a line is drawn
+constexpr double kHuber = 2.5;     // standard deviations
 constexpr double kNever = 1e300;
 
 }  // namespace
@@ -29,7 +29,7 @@ void ReferenceMonitor::take(double weight, double force, double measured) noexce
 
 void ReferenceMonitor::fit() noexcept {
   slope_sigma_ = zero_sigma_ = kNever;
-  if (independent_ < kFewest || !(force_force_ > 0)) return;
+  if (independent_ < kMin || !(force_force_ > 0)) return;
   slope_ = force_measured_ / force_force_;
   zero_ = mean_measured_ - slope_ * mean_force_;
   const double squares = std::max(0.0, measured_measured_ - slope_ * force_measured_);
@@ -51,7 +51,7 @@ ReferenceFault ReferenceMonitor::add(TimePoint time, const Vector6& wrench, cons
                                      const Vector6& range, double force) noexcept {
   Vector6 u = Vector6::Zero(), m = Vector6::Zero();
   for (int i = 0; i < 6; ++i) {
-    if (!(range[i] > 0 && range[i] < kLargestRange)) continue;
+    if (!(range[i] > 0 && range[i] < kMaxRange)) continue;
     u[i] = line[i] / range[i];
     m[i] = wrench[i] / range[i];
   }
@@ -60,7 +60,7 @@ ReferenceFault ReferenceMonitor::add(TimePoint time, const Vector6& wrench, cons
   range_ = 1 / u.cwiseAbs().maxCoeff();
   const double measured = u.dot(m) / along;
   const double since = started_ ? std::chrono::duration<double>(time - last_).count() : 0.0;
-  const double dt = std::clamp(since, 0.0, kLongestGap);
+  const double dt = std::clamp(since, 0.0, kMaxGap);
   if (started_ && since <= 0) return ReferenceFault::none;
   started_ = true;
   last_ = time;

@@ -6,7 +6,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kLargestStep = 4;  // one picture is not trusted further
+constexpr double kMaxStep = 4;  // one picture is not trusted further
 
 /// Moves `value` by up to `factor` within `range`; what of the factor is left.
 double take_up(double& value, double factor, const LightRange& range) noexcept {
@@ -37,12 +37,12 @@ LightControl::LightControl(const LightLimits& limits) noexcept : limits_(limits)
 
 LightControl::State LightControl::take(const LightReading& reading) noexcept {
   const bool clipped =
-      reading.white_counts >= kClipped_counts || reading.clipped_part > kMostClippedPart;
+      reading.white_counts >= kClipped_counts || reading.clipped_fraction > kMaxClippedFraction;
   if (!clipped && std::abs(reading.white_counts - kTarget_counts) <= kTolerance_counts)
     return state_ = State::settled;
   const double wanted = kTarget_counts / std::max(reading.white_counts, 1.0);
   const LightSetting before = setting_;
-  scale(clipped ? std::min(0.5, wanted) : std::clamp(wanted, 1 / kLargestStep, kLargestStep));
+  scale(clipped ? std::min(0.5, wanted) : std::clamp(wanted, 1 / kMaxStep, kMaxStep));
   const bool stuck = setting_.exposure_us == before.exposure_us &&
                      setting_.led_permille == before.led_permille && setting_.gain == before.gain;
   if (!stuck) return state_ = State::settling;

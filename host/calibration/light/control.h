@@ -28,8 +28,8 @@ struct LightSetting {
 };
 
 struct LightReading {
-  double white_counts = 0;  ///< grey level of the tags' white, 0..255
-  double clipped_part = 0;  ///< of the tags' pixels, at the sensor's upper end, 0..1
+  double white_counts = 0;      ///< grey level of the tags' white, 0..255
+  double clipped_fraction = 0;  ///< of the tags' pixels, at the sensor's upper end, 0..1
 };
 
 /// Exposure first kept short (a moving target smears), then LED, then gain (it adds noise), and a
@@ -43,10 +43,10 @@ class LightControl {
     too_dark,    ///< everything is at its upper end
     too_bright,  ///< everything is at its lower end: ambient light
   };
-  static constexpr double kTarget_counts = 190;     ///< of 255: noise and glare stay below the end
-  static constexpr double kTolerance_counts = 12;   ///< that is settled
-  static constexpr double kClipped_counts = 250;    ///< from here on the level is not known
-  static constexpr double kMostClippedPart = 2e-3;  ///< of a picture that is not too bright
+  static constexpr double kTarget_counts = 190;    ///< of 255: noise and glare stay below the end
+  static constexpr double kTolerance_counts = 12;  ///< that is settled
+  static constexpr double kClipped_counts = 250;   ///< from here on the level is not known
+  static constexpr double kMaxClippedFraction = 2e-3;  ///< of a picture that is not too bright
 
   /// Starts from a short exposure, the least gain and half of the LED.
   explicit LightControl(const LightLimits& limits) noexcept;

@@ -84,7 +84,7 @@ LightReading read_light(const ImageView& image, bool mirrored, const std::vector
     total += histogram.total;
   }
   if (total > 0) {
-    reading.clipped_part = static_cast<double>(clipped) / total;
+    reading.clipped_fraction = static_cast<double>(clipped) / total;
     return reading;
   }
   Histogram whole;

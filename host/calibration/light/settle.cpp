@@ -11,14 +11,14 @@ namespace {
 // A setting shows in the picture after next: one is being exposed, one may wait in the driver. One
 // more for the LED's command.
 constexpr int kFramesUntilSeen = 4;
-constexpr int kMostPictures = 24;
+constexpr int kMaxPictures = 24;
 constexpr Duration kPatience = std::chrono::seconds(3);  // for one frame
-constexpr double kMostGain = 16;  // of a camera whose gain has no unit: as if its range were 1..16
+constexpr double kMaxGain = 16;  // of a camera whose gain has no unit: as if its range were 1..16
 constexpr double kMuchAmbient = 0.3;
 
-/// The camera's own gain for one of 1..kMostGain.
+/// The camera's own gain for one of 1..kMaxGain.
 double raw_gain(const CameraLight::Range& range, double gain) {
-  return range.least + (gain - 1) / (kMostGain - 1) * (range.most - range.least);
+  return range.least + (gain - 1) / (kMaxGain - 1) * (range.most - range.least);
 }
 
 class Settling {
@@ -28,7 +28,7 @@ class Settling {
 
   LightReport run() {
     LightControl control(limits());
-    for (int pictures = 0; pictures < kMostPictures; ++pictures) {
+    for (int pictures = 0; pictures < kMaxPictures; ++pictures) {
       apply(control.setting());
       if (!look()) break;
       tags_ = finder_.find(frame_.image).tags;
@@ -55,7 +55,7 @@ class Settling {
       if (exposure.most <= exposure.least)
         limits.exposure_us = {camera->exposure_us(), camera->exposure_us()};
       const CameraLight::Range gain = camera->gain_range();
-      if (gain.most > gain.least) limits.gain = {1, kMostGain};
+      if (gain.most > gain.least) limits.gain = {1, kMaxGain};
     }
     return limits;
   }
@@ -76,7 +76,7 @@ class Settling {
     const bool seen = look();
     if (seen && report_.white_counts > 0) {
       const LightReading dark = read_light(frame_.image, mirrored_, tags_);
-      report_.ambient_part = std::min(1.0, dark.white_counts / report_.white_counts);
+      report_.ambient_fraction = std::min(1.0, dark.white_counts / report_.white_counts);
     }
     lamp_.set_level(report_.setting.led_permille);
     if (seen) look();  // nobody shall learn from a picture without light
@@ -133,7 +133,7 @@ std::string light_text(const LightReport& report) {
   if (report.setting.exposure_us > 1)
     line += fmt::format(", exposure {:.1f} ms", report.setting.exposure_us * 1e-3);
   if (report.setting.gain > 1) line += fmt::format(", gain {:.1f}", report.setting.gain);
-  line += fmt::format(", {:.0f} % of it ambient", 100 * report.ambient_part);
+  line += fmt::format(", {:.0f} % of it ambient", 100 * report.ambient_fraction);
   switch (report.state) {
     case LightControl::State::settling:
       return line + "; it did not become steady: does the light flicker?";
@@ -144,8 +144,8 @@ std::string light_text(const LightReport& report) {
     case LightControl::State::settled:
       break;
   }
-  if (report.ambient_part > 0.9) return line + "; the LED hardly shows: is it wired?";
-  if (report.ambient_part > kMuchAmbient) line += "; keep other light off the tags";
+  if (report.ambient_fraction > 0.9) return line + "; the LED hardly shows: is it wired?";
+  if (report.ambient_fraction > kMuchAmbient) line += "; keep other light off the tags";
   return line;
 }
 

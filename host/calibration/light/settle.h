@@ -31,8 +31,8 @@ class Lamp {
 struct LightReport {
   LightControl::State state = LightControl::State::settling;  ///< settling: it never became steady
   LightSetting setting;
-  double white_counts = 0;  ///< of the tags, with this setting
-  double ambient_part = 0;  ///< of that light, that is there when the LED is off, 0..1
+  double white_counts = 0;      ///< of the tags, with this setting
+  double ambient_fraction = 0;  ///< of that light, that is there when the LED is off, 0..1
   int tags_found = 0;
   bool stopped = false;  ///< by a signal, or the source ended
 };

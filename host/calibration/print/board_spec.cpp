@@ -12,10 +12,10 @@
 namespace tagwrench {
 namespace {
 
-constexpr int kFewestSquares = 3;  // two inner corners each way
-constexpr int kMostSquares = 100;
-constexpr double kSmallestSquare = 0.1e-3;
-constexpr double kLargestSquare = 0.5;
+constexpr int kMinSquares = 3;  // two inner corners each way
+constexpr int kMaxSquares = 100;
+constexpr double kMinSquare = 0.1e-3;
+constexpr double kMaxSquare = 0.5;
 constexpr const char* kForm =
     "write charuco:COLUMNSxROWS:SQUAREmm:MARKERmm:DICTIONARY, for example "
     "charuco:9x6:1.2mm:0.9mm:aruco_4x4_50, or checkerboard:COLUMNSxROWS:SQUAREmm";
@@ -63,14 +63,14 @@ int markers(const BoardSpec& board) {
 void check(const BoardSpec& board) {
   const std::string text = describe(board);
   for (const int squares : {board.columns, board.rows}) {
-    if (squares < kFewestSquares || squares > kMostSquares) {
-      refuse(text, fmt::format("{} squares on one side; use {} to {}", squares, kFewestSquares,
-                               kMostSquares));
+    if (squares < kMinSquares || squares > kMaxSquares) {
+      refuse(text, fmt::format("{} squares on one side; use {} to {}", squares, kMinSquares,
+                               kMaxSquares));
     }
   }
-  if (!(board.square >= kSmallestSquare && board.square <= kLargestSquare)) {
+  if (!(board.square >= kMinSquare && board.square <= kMaxSquare)) {
     refuse(text, fmt::format("squares of {} mm; use {} to {} mm", 1e3 * board.square,
-                             1e3 * kSmallestSquare, 1e3 * kLargestSquare));
+                             1e3 * kMinSquare, 1e3 * kMaxSquare));
   }
   if (board.kind == BoardKind::checkerboard) return;
   if (!(board.marker > 0 && board.marker < board.square)) {

@@ -14,8 +14,8 @@ namespace tagwrench {
 namespace {
 
 const char* const kTrueSize = "Print at 100 %, never fitted to the page, never mirrored.";
-constexpr double kSmallest_mm = 0.1;
-constexpr double kLargest_mm = 1000;
+constexpr double kMin_mm = 0.1;
+constexpr double kMax_mm = 1000;
 
 CellGrid tag_cells(TagFamily family, int id) {
   const TagPattern pattern = tag_pattern(family, id, 0, 0);
@@ -118,12 +118,12 @@ Drawing tag_sheet(const Paper& paper, const TagSheet& sheet) {
           fmt::format("--ids: id {} is not in {}; use 0 to {}", id, name(sheet.family), ids - 1));
     }
   }
-  if (!(sheet.size_mm >= kSmallest_mm && sheet.size_mm <= kLargest_mm)) {
+  if (!(sheet.size_mm >= kMin_mm && sheet.size_mm <= kMax_mm)) {
     throw ConfigError(
         fmt::format("--size-mm: {} is no size; use the edge of the black square in mm, {} to {}",
-                    sheet.size_mm, kSmallest_mm, kLargest_mm));
+                    sheet.size_mm, kMin_mm, kMax_mm));
   }
-  if (!(sheet.border_mm >= 0 && sheet.border_mm <= kLargest_mm)) {
+  if (!(sheet.border_mm >= 0 && sheet.border_mm <= kMax_mm)) {
     throw ConfigError(
         fmt::format("--border-mm: {} is no border; use 0 mm or more", sheet.border_mm));
   }
@@ -184,7 +184,7 @@ Drawing board_sheet(const Paper& paper, const BoardSpec& board, int copies) {
 
 Drawing published_sheet(const Paper& paper) {
   constexpr int kIds = 10;
-  constexpr int kLargestTenths = 50, kSmallestTenths = 30, kSensorTenths = 38;
+  constexpr int kMaxTenths = 50, kMinTenths = 30, kSensorTenths = 38;
   constexpr double kBorder_mm = 0.35;
   constexpr double kRowLabel_mm = 16;
   constexpr double kRowType_mm = 2.5;
@@ -194,7 +194,7 @@ Drawing published_sheet(const Paper& paper) {
        "R. Ouyang and R. Howe, Low-Cost Fiducial-based 6-Axis Force-Torque Sensor, ICRA 2020"});
   const Rectangle free = content(paper);
   double y = free.top_mm;
-  for (int tenths = kLargestTenths; tenths >= kSmallestTenths; --tenths) {
+  for (int tenths = kMaxTenths; tenths >= kMinTenths; --tenths) {
     const double size_mm = 0.1 * tenths;
     PagePoint room;
     for (int id = 0; id < kIds; ++id) {

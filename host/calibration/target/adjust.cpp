@@ -17,27 +17,27 @@ namespace {
 /// Half length of the profiles: short, for the paper's edge beyond the white margin comes near when
 /// a tag leans away, and its blur would pull at the outer edges.
 constexpr double kHalf_px = 3.5;
-constexpr int kMostIterations = 12;
+constexpr int kMaxIterations = 12;
 constexpr double kStillPosition = 3e-8;  // m; a step of the tags below these is the end
 constexpr double kStillRotation = 1e-5;  // rad
 constexpr double kStillFocal = 1e-5;     // of the ratio
-constexpr double kLargestFocalStep = 0.03;
+constexpr double kMaxFocalStep = 0.03;
 
 constexpr double kTukey = 4.685;  // Holland and Welsch 1977
-constexpr double kLeastNoise_px = 0.01;
-constexpr double kLeastNoisePart = 0.5;  // of a point, to the median of all
-constexpr int kFewSeen = 8;              // frames that show too little of a point's noise
-constexpr double kRestFloor_px = 0.01;   // the averaged rest image has errors that do not average
+constexpr double kMinNoise_px = 0.01;
+constexpr double kMinNoiseFraction = 0.5;  // of a point, to the median of all
+constexpr int kFewSeen = 8;                // frames that show too little of a point's noise
+constexpr double kRestFloor_px = 0.01;     // the averaged rest image has errors that do not average
 /// What keeps the offsets of all frames together from being better than this, however many there
 /// are: shading, change of blur.
 constexpr double kModel_px = 0.004;
 /// And the same for the focal length, as a part of it.
 constexpr double kFocalModel = 0.002;
 /// And the read-out time: a picture's velocity is the mean over two steps.
-constexpr double kReadoutModel = 0.3e-3;    // s
-constexpr double kReadoutPrior = 30e-3;     // s, a rolling shutter's
-constexpr double kSpreadPrior = 50e-6;      // m
-constexpr double kLeastContrastPart = 0.3;  // of the tag's median, for a point to be used
+constexpr double kReadoutModel = 0.3e-3;      // s
+constexpr double kReadoutPrior = 30e-3;       // s, a rolling shutter's
+constexpr double kSpreadPrior = 50e-6;        // m
+constexpr double kMinContrastFraction = 0.3;  // of the tag's median, for a point to be used
 
 double tukey(double offset, double sigma) {
   const double q = offset / (kTukey * sigma);
@@ -121,7 +121,7 @@ void TargetAdjuster::Problem::keep_visible() {
     for (const EdgeMeasurement& m : seen) {
       if (m.valid) contrasts.push_back(m.contrast);
     }
-    const double least = kLeastContrastPart * median(contrasts);
+    const double least = kMinContrastFraction * median(contrasts);
     std::vector<EdgePoint> kept;
     for (std::size_t i = 0; i < seen.size(); ++i) {
       if (!seen[i].valid || seen[i].contrast < least) continue;
@@ -221,9 +221,9 @@ void TargetAdjuster::Problem::learn_noise() {
     noise_px[p] = kMadToSigma * median(offsets);
     all.push_back(noise_px[p]);
   }
-  const double typical = std::max(kLeastNoise_px, median(all));
+  const double typical = std::max(kMinNoise_px, median(all));
   for (double& noise : noise_px) {
-    noise = noise > 0 ? std::max(noise, kLeastNoisePart * typical) : typical;
+    noise = noise > 0 ? std::max(noise, kMinNoiseFraction * typical) : typical;
   }
 }
 
@@ -298,8 +298,7 @@ bool TargetAdjuster::Problem::iterate(const std::vector<Keyframe>& frames, State
         still && step.head<3>().norm() < kStillPosition && step.tail<3>().norm() < kStillRotation;
   }
   state.readout += shared[normal.readout_index()];
-  const double zoom =
-      std::clamp(shared[normal.focal_index()], -kLargestFocalStep, kLargestFocalStep);
+  const double zoom = std::clamp(shared[normal.focal_index()], -kMaxFocalStep, kMaxFocalStep);
   state.focal_ratio *= std::exp(zoom);
   return still && std::abs(zoom) < kStillFocal;
 }
@@ -321,9 +320,9 @@ TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
 
   int steps = 0;
   const auto settle = [&](Problem::State& from, bool free_focal) {
-    for (int i = 0; i < kMostIterations; ++i) {
+    for (int i = 0; i < kMaxIterations; ++i) {
       const bool still = problem.iterate(frames, from, free_focal);
-      if (progress && !progress(++steps / (2.0 * kMostIterations))) return false;
+      if (progress && !progress(++steps / (2.0 * kMaxIterations))) return false;
       if (still) break;
     }
     return std::isfinite(from.focal_ratio);

@@ -49,7 +49,7 @@ struct TargetEstimate {
 /// The rest image and where the tags are in it, nearly right.
 struct TargetAtRest {
   CameraModel camera;
-  RestImage image;
+  ReferenceImage image;
   std::vector<TagPattern> patterns;
   std::vector<Eigen::Isometry3d> camera_T_tag;
 };

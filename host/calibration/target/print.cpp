@@ -9,10 +9,10 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kLeastScatter = 0.5e-6;  // m
-constexpr double kFirstScatter = 5e-6;    // m, before anything is known
-constexpr double kCut = 4.0;              // sigmas, for an outlier
-constexpr int kLags = 5;                  // points along an edge over which errors may be alike
+constexpr double kMinScatter = 0.5e-6;  // m
+constexpr double kFirstScatter = 5e-6;  // m, before anything is known
+constexpr double kCut = 4.0;            // sigmas, for an outlier
+constexpr int kLags = 5;                // points along an edge over which errors may be alike
 
 bool same_edge(const EdgePoint& a, const EdgePoint& b) {
   const bool vertical = a.normal == EdgeNormal::plus_x || a.normal == EdgeNormal::minus_x;
@@ -33,7 +33,7 @@ PrintScatter print_scatter(const std::vector<EdgeTag>& printed,
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
   PrintScatter out;
-  out.robust = std::max(kLeastScatter, kMadToSigma * *middle);
+  out.robust = std::max(kMinScatter, kMadToSigma * *middle);
   error = error.cwiseMax(-kCut * out.robust).cwiseMin(kCut * out.robust);
 
   // The mean of n errors with autocorrelation r_l has the variance of n / (1 + 2 sum r_l)

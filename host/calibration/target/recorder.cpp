@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "host/tracker/acquire.h"
-#include "host/tracker/rest.h"
+#include "host/tracker/reference.h"
 #include "host/tracker/rotation.h"
 #include "host/tracker/tracker.h"
 
@@ -13,7 +13,7 @@ namespace tagwrench {
 namespace {
 
 /// From the frame before a picture to the one after it: longer says too little of the velocity, s.
-constexpr double kLongestStep = 0.15;
+constexpr double kMaxStep = 0.15;
 
 TargetDescription without_placement(TargetDescription target) {
   for (Tag& tag : target.tags) {
@@ -23,8 +23,8 @@ TargetDescription without_placement(TargetDescription target) {
   return target;
 }
 
-RestOptions only_frames(const RestOptions& rest) {
-  RestOptions out;
+ReferenceOptions only_frames(const ReferenceOptions& rest) {
+  ReferenceOptions out;
   out.frames = rest.frames;
   return out;
 }
@@ -32,8 +32,8 @@ RestOptions only_frames(const RestOptions& rest) {
 }  // namespace
 
 struct TargetRecorder::State {
-  State(const CameraModel& model, const TargetDescription& description, const RestOptions& rest,
-        std::size_t most_keyframes)
+  State(const CameraModel& model, const TargetDescription& description,
+        const ReferenceOptions& rest, std::size_t most_keyframes)
       : camera(model),
         target(without_placement(description)),
         acquirer(model, target),
@@ -48,7 +48,7 @@ struct TargetRecorder::State {
   CameraModel camera;
   TargetDescription target;
   Acquirer acquirer;
-  RestLearner learner;
+  ReferenceEstimator learner;
   Tracker tracker;
   KeyframeSet keyframes;
   bool rest_known = false;
@@ -69,10 +69,10 @@ struct TargetRecorder::State {
 
 void TargetRecorder::State::learn(const ImageView& image) {
   const Finding finding = learner.wants_finding() ? acquirer.find(image) : Finding{};
-  const RestLearner::Progress progress = learner.add(image, finding);
+  const ReferenceEstimator::Progress progress = learner.add(image, finding);
   counts.most_tags_seen = std::max(counts.most_tags_seen, learner.tags_seen());
-  if (progress == RestLearner::Progress::moved) ++counts.moved;
-  if (progress == RestLearner::Progress::done) finish();
+  if (progress == ReferenceEstimator::Progress::moved) ++counts.moved;
+  if (progress == ReferenceEstimator::Progress::done) finish();
 }
 
 void TargetRecorder::State::finish() {
@@ -109,7 +109,7 @@ void TargetRecorder::State::follow(const Frame& frame, const Track& track) {
     const double seconds =
         std::chrono::duration<double>(frame.capture_time - earlier->time).count();
     waiting->velocity = motion_between(earlier->pose, pose) / seconds;
-    if (seconds > 0 && seconds < kLongestStep) keyframes.add(std::move(*waiting));
+    if (seconds > 0 && seconds < kMaxStep) keyframes.add(std::move(*waiting));
   }
   waiting.reset();
   earlier = latest;
@@ -123,7 +123,7 @@ void TargetRecorder::State::follow(const Frame& frame, const Track& track) {
 }
 
 TargetRecorder::TargetRecorder(const CameraModel& camera, const TargetDescription& target,
-                               const RestOptions& rest, std::size_t most_keyframes)
+                               const ReferenceOptions& rest, std::size_t most_keyframes)
     : state_(std::make_unique<State>(camera, target, rest, most_keyframes)) {}
 
 TargetRecorder::~TargetRecorder() = default;
@@ -131,7 +131,8 @@ TargetRecorder::~TargetRecorder() = default;
 Track TargetRecorder::add(const Frame& frame) {
   ++state_->counts.frames;
   const Track track = state_->tracker.track(frame);
-  if (track.hint == Hint::image_looks_mirrored || track.hint == Hint::image_looks_unmirrored)
+  if (track.diagnostic == Diagnostic::image_looks_mirrored ||
+      track.diagnostic == Diagnostic::image_looks_unmirrored)
     state_->counts.flipped = true;
   const ImageView& image = frame.image;
   const CameraModel& camera = state_->camera;

@@ -16,7 +16,7 @@ class TargetRecorder {
   /// Placement and rest pose that `target` and `rest` may give are set aside: they are what is to
   /// be found. Throws ConfigError for a target that cannot be tracked.
   TargetRecorder(const CameraModel& camera, const TargetDescription& target,
-                 const RestOptions& rest, std::size_t most_keyframes);
+                 const ReferenceOptions& rest, std::size_t most_keyframes);
   ~TargetRecorder();
   TargetRecorder(const TargetRecorder&) = delete;
   TargetRecorder& operator=(const TargetRecorder&) = delete;

@@ -14,17 +14,17 @@ namespace tagwrench {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kLeastView = 1.5 * kDegree;
-constexpr double kLeastFollowed = 0.5;    // of the frames in motion
-constexpr double kLargestNoise_px = 0.3;  // of one edge
-constexpr double kLargestFocalError = 0.01;
+constexpr double kMinView = 1.5 * kDegree;
+constexpr double kMinFollowed = 0.5;  // of the frames in motion
+constexpr double kMaxNoise_px = 0.3;  // of one edge
+constexpr double kMaxFocalError = 0.01;
 constexpr double kFocalSigmas = 3.0;
 constexpr double kReadoutSigmas = 8;
-constexpr double kLeastReadoutGain = 0.05;       // of an edge's variance
-constexpr double kLargestPositionSigma = 10e-6;  // m
-constexpr double kLargestRotationSigma = 2e-3;   // rad
-constexpr double kBetterPart = 0.9;              // of a sigma, to be called better known
-constexpr double kLearnedPart = 0.98;            // and for the motion to have told anything
+constexpr double kMinReadoutGain = 0.05;     // of an edge's variance
+constexpr double kMaxPositionSigma = 10e-6;  // m
+constexpr double kMaxRotationSigma = 2e-3;   // rad
+constexpr double kBetterFraction = 0.9;      // of a sigma, to be called better known
+constexpr double kLearnedFraction = 0.98;    // and for the motion to have told anything
 
 [[noreturn]] void refuse(const std::string& line) {
   throw ConfigError("calibrate target: " + line);
@@ -93,7 +93,7 @@ Eigen::Isometry3d rest_platform(const std::vector<Eigen::Isometry3d>& camera_T_t
 }
 
 void check_record(const TargetRecorder& record, const TargetDescription& target,
-                  const RestOptions& rest) {
+                  const ReferenceOptions& rest) {
   const TargetRecorder::Counts& counts = record.counts();
   if (target.tags.size() < 2) {
     refuse(
@@ -105,24 +105,24 @@ void check_record(const TargetRecorder& record, const TargetDescription& target,
     refuse(
         "all frames were needed for the rest; record more, and move the platform about after it");
   }
-  if (counts.followed < kLeastFollowed * counts.moving) {
+  if (counts.followed < kMinFollowed * counts.moving) {
     refuse(fmt::format(
         "all tags were held in only {} of {} frames; keep them in view, lit and in focus, and move "
         "more slowly",
         counts.followed, counts.moving));
   }
   const ViewSpan span = view_span(record.keyframes(), rest_platform(record.at_rest().camera_T_tag));
-  if (span.narrowest < kLeastView) {
-    const bool still = span.widest < kLeastView;
+  if (span.narrowest < kMinView) {
+    const bool still = span.widest < kMinView;
     refuse(fmt::format(
         "the platform {}: the view of the tags turned by {:.1f} degrees one way and {:.1f} the "
         "other, {:.1f} are needed both ways; tilt it, or push it sideways, along x and along y",
         still ? "hardly moved" : "moved in one plane only", span.widest / kDegree,
-        span.narrowest / kDegree, kLeastView / kDegree));
+        span.narrowest / kDegree, kMinView / kDegree));
   }
-  if (record.keyframes().size() < kLeastKeyframes) {
+  if (record.keyframes().size() < kMinKeyframes) {
     refuse(fmt::format("{} different pictures are too few, {} are needed; move for longer",
-                       record.keyframes().size(), kLeastKeyframes));
+                       record.keyframes().size(), kMinKeyframes));
   }
 }
 
@@ -133,19 +133,19 @@ void check_estimate(const TargetEstimate& estimate, const CameraModel& camera) {
         "along every axis");
   }
   const double off = std::abs(estimate.focal_ratio - 1);
-  if (off > kLargestFocalError && off > kFocalSigmas * estimate.focal_sigma) {
+  if (off > kMaxFocalError && off > kFocalSigmas * estimate.focal_sigma) {
     refuse(fmt::format(
         "the focal length that fits best is {:.1f} +- {:.1f} px, sensor.yaml says {:.1f}; run "
         "`tagwrench calibrate camera`, or check tag_size_mm",
         camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px));
   }
-  if (!(estimate.noise_px < kLargestNoise_px)) {
+  if (!(estimate.noise_px < kMaxNoise_px)) {
     refuse(fmt::format(
         "edges lie {:.2f} px off where a rigid target would show them, {:.1f} is the limit; check "
         "that the tags sit firmly on the platform, then run `tagwrench calibrate camera`",
-        estimate.noise_px, kLargestNoise_px));
+        estimate.noise_px, kMaxNoise_px));
   }
-  if (better_known(estimate, kLearnedPart) == 0) {
+  if (better_known(estimate, kLearnedFraction) == 0) {
     refuse(
         "the motion tells nothing that the rest image does not; tilt and push further, with better "
         "light");
@@ -156,11 +156,11 @@ void check_estimate(const TargetEstimate& estimate, const CameraModel& camera) {
     position = std::max(position, sigma.head<3>().maxCoeff());
     rotation = std::max(rotation, sigma.tail<3>().maxCoeff());
   }
-  if (position > kLargestPositionSigma || rotation > kLargestRotationSigma) {
+  if (position > kMaxPositionSigma || rotation > kMaxRotationSigma) {
     refuse(fmt::format(
         "the tags' places stay uncertain by {:.1f} um and {:.2f} mrad, {:.0f} and {:.0f} are the "
         "limit; move further and longer, and check focus, light and print",
-        position * 1e6, rotation * 1e3, kLargestPositionSigma * 1e6, kLargestRotationSigma * 1e3));
+        position * 1e6, rotation * 1e3, kMaxPositionSigma * 1e6, kMaxRotationSigma * 1e3));
   }
 }
 
@@ -186,7 +186,7 @@ int better_known(const TargetEstimate& estimate, double part) {
 
 bool readout_is_clear(const TargetEstimate& estimate) {
   return estimate.readout > kReadoutSigmas * estimate.readout_sigma &&
-         estimate.readout_gain > kLeastReadoutGain;
+         estimate.readout_gain > kMinReadoutGain;
 }
 
 std::vector<std::string> describe(const TargetRecorder& record, const TargetEstimate& estimate,
@@ -204,7 +204,7 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
       "excited: x {:.2f}, y {:.2f}, z {:.2f} mm; about x {:.1f}, y {:.1f}, z {:.1f} degrees; the "
       "view turned by {:.1f} and {:.1f} degrees ({:.1f} needed both ways)",
       range[0] * 1e3, range[1] * 1e3, range[2] * 1e3, range[3] / kDegree, range[4] / kDegree,
-      range[5] / kDegree, span.widest / kDegree, span.narrowest / kDegree, kLeastView / kDegree));
+      range[5] / kDegree, span.widest / kDegree, span.narrowest / kDegree, kMinView / kDegree));
   const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
   const std::vector<Vector6> after = platform_sigmas(estimate.covariance);
   const std::vector<Vector6> before = platform_sigmas(estimate.covariance_at_rest);
@@ -223,7 +223,7 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
         three(before[t], 3, 1e3, 2)));
   }
   const int all = static_cast<int>(estimate.covariance.rows());
-  const int better = better_known(estimate, kBetterPart);
+  const int better = better_known(estimate, kBetterFraction);
   lines.push_back(fmt::format(
       "{} of {} combinations of these are known better than from the rest; the other {} "
       "hang on the print, whose edges scatter by {:.1f} um",

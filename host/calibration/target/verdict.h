@@ -24,13 +24,13 @@ ViewSpan view_span(const std::vector<Keyframe>& frames,
 Eigen::Isometry3d rest_platform(const std::vector<Eigen::Isometry3d>& camera_T_tag);
 
 /// So many different pictures at least a recording must have.
-inline constexpr std::size_t kLeastKeyframes = 20;
+inline constexpr std::size_t kMinKeyframes = 20;
 
 /// Throws ConfigError, one line with what is missing and what to do, for a recording that cannot
 /// show where the tags sit: one tag only, no rest, tags lost, too few different pictures, seen from
 /// one side.
 void check_record(const TargetRecorder& record, const TargetDescription& target,
-                  const RestOptions& rest);
+                  const ReferenceOptions& rest);
 
 /// Throws ConfigError for an adjustment that must not be believed: no solution, edges off the
 /// model, another focal length, nothing learned from the motion, too uncertain.

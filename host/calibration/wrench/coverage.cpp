@@ -10,7 +10,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kLeastSigma = 0.003;  // of range: more than a good weight promises
+constexpr double kMinSigma = 0.003;  // of range: more than a good weight promises
 constexpr std::array<const char*, 6> kActs{"pushes along x", "pushes along y", "pushes along z",
                                            "tilts about x",  "tilts about y",  "twists about z"};
 
@@ -47,7 +47,7 @@ Vector6 WrenchCoverage::scaled(const KnownLoad& load) const {
 
 double WrenchCoverage::relative_variance(const KnownLoad& load) const {
   const Vector6 variances = load.covariance.diagonal().cwiseQuotient(range_.cwiseAbs2());
-  return variances.mean() + kLeastSigma * kLeastSigma;
+  return variances.mean() + kMinSigma * kMinSigma;
 }
 
 void WrenchCoverage::add(const KnownLoad& load) {

@@ -20,7 +20,7 @@ constexpr double kTouch = 0.1;    // of a push's force: it has begun
 constexpr double kFree = 0.05;    // of it: nobody pushes
 constexpr double kBegun = 0.05;   // of the range: a movement has begun
 constexpr double kExcited = 0.1;  // of the range, standard deviation over a movement
-constexpr double kLongest = 1.5;  // times its seconds: a movement ends, whatever it has shown
+constexpr double kMax = 1.5;      // times its seconds: a movement ends, whatever it has shown
 
 }  // namespace
 
@@ -163,7 +163,7 @@ const StepRecord* WrenchGuide::rest_of_reference(double time) {
     leave_out("there is no rest to count it from");
     return nullptr;
   }
-  if (last_reading_ && time - last_reading_->time <= kLongestSilence) return rest;
+  if (last_reading_ && time - last_reading_->time <= kMaxSilence) return rest;
   phase_ = Phase::waiting;
   complain_of_silence();
   return nullptr;
@@ -199,7 +199,7 @@ void WrenchGuide::watch_movement(double time) {
     squares += hold_.scaled(f.displacement - zero).cwiseAbs2();
   const Vector6 deviation = (squares / static_cast<double>(taking_.frames.size())).cwiseSqrt();
   int weakest = 0;
-  if (deviation.minCoeff(&weakest) > kExcited || length > kLongest * step().seconds) {
+  if (deviation.minCoeff(&weakest) > kExcited || length > kMax * step().seconds) {
     finish_taking();
     return;
   }

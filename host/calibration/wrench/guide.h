@@ -20,7 +20,7 @@ namespace tagwrench {
 inline constexpr double kReadingsBeforeTaking = 0.5;
 
 /// After so long without a reading there is no reference, s.
-inline constexpr double kLongestSilence = 1.0;
+inline constexpr double kMaxSilence = 1.0;
 
 struct GuideOptions {
   Matrix6 stiffness = Matrix6::Identity();  ///< of the spring model

@@ -13,7 +13,7 @@ using Line = GuideLine::Kind;
 
 constexpr double kMoved = 0.02;  // of the range: more than this is somebody's doing
 constexpr double kBump = 0.01;   // of the range: a rest may differ by so much from the one before
-constexpr int kMostBumps = 6;    // unattended
+constexpr int kMaxBumps = 6;     // unattended
 constexpr double kOwnWeight = 0.03;  // of the range: less does not tell how the sensor lies
 constexpr double kTimeToAct = 8.0;   // s that a person has before it is said, or taken as done
 // All loads count from the rests: what is steady must have become so before the second that is
@@ -60,8 +60,8 @@ bool WrenchGuide::has_moved(const Hold& hold) {
 void WrenchGuide::watch_hold() {
   const Hold hold = hold_.look();
   const bool of_cell = plan_.reference != ReferenceKind::masses;
-  if (of_cell && !(last_reading_ && now_ - last_reading_->time < kLongestSilence)) {
-    if (now_ - *asked_time_ > 2 * kLongestSilence) complain_of_silence();
+  if (of_cell && !(last_reading_ && now_ - last_reading_->time < kMaxSilence)) {
+    if (now_ - *asked_time_ > 2 * kMaxSilence) complain_of_silence();
     return;
   }
   const bool had_moved = moved_;
@@ -181,7 +181,7 @@ void WrenchGuide::bumped(const Vector6& by) {
   std::string text =
       fmt::format("the rest is {} from where it was: the sensor was bumped, or a tag has slipped",
                   worst_text(by));
-  if (options_.attempts > 0 && bumps_ > kMostBumps) {
+  if (options_.attempts > 0 && bumps_ > kMaxBumps) {
     failure_ = text + " again and again; fix it better";
     return;
   }

@@ -6,8 +6,8 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kNoises = 4;     // standard deviations of the tracker's noise that are no motion
-constexpr int kFewestFrames = 5;  // a mean and a slope of fewer tell nothing
+constexpr double kNoises = 4;  // standard deviations of the tracker's noise that are no motion
+constexpr int kMinFrames = 5;  // a mean and a slope of fewer tell nothing
 // This share of the tracker's noise variance does not average away over a second: errors of
 // geometry and grey levels stay while the platform stands.
 constexpr double kSlowShare = 0.05;
@@ -40,7 +40,7 @@ Hold HoldDetector::look() const {
   hold.from = frames_.front().time;
   hold.to = frames_.back().time;
   hold.frames = static_cast<int>(frames_.size());
-  hold.full = hold.frames >= kFewestFrames && hold.to - hold.from >= 0.999 * options_.seconds;
+  hold.full = hold.frames >= kMinFrames && hold.to - hold.from >= 0.999 * options_.seconds;
   Matrix6 noise = Matrix6::Zero();
   double mean_time = 0;
   for (const TrackedFrame& f : frames_) {

@@ -132,7 +132,7 @@ KnownLoad expected_load(const WrenchPlan& plan, int step) {
   else
     return {};
   KnownLoad load{observation.wrench, observation.wrench_covariance};
-  for (const CommonError& error : observation.common)
+  for (const CorrelatedError& error : observation.common)
     load.covariance += error.effect * error.effect.transpose();
   return load;
 }

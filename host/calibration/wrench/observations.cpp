@@ -15,7 +15,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::size_t kMostFrames = 1500;  // of pushes and movements in a fit
+constexpr std::size_t kMaxFrames = 1500;  // of pushes and movements in a fit
 // A hand leans and sways at half a hertz or so: what is closer together than this is off alike, and
 // would be taken for more than it is.
 constexpr double kPushEvery = 1.0;  // s
@@ -59,7 +59,7 @@ class Collector {
 
   WrenchData collect() {
     find_lag();
-    const std::size_t stride = 1 + frames_of_movement() / kMostFrames;
+    const std::size_t stride = 1 + frames_of_movement() / kMaxFrames;
     for (const StepRecord& record : records_) {
       const Baseline& baseline = baselines_.at(record.zero);
       if (record.frames.empty() || baseline.empty()) continue;
@@ -148,7 +148,7 @@ class Collector {
       const ReferenceSample& r = record.readings[static_cast<std::size_t>(i)];
       values.row(i) = (r.value - baseline.reading(r.time)).transpose();
     }
-    return study::reference_at(times, lag, read, values, kLongestGap);
+    return study::reference_at(times, lag, read, values, kMaxGap);
   }
 
   std::vector<Said> said_during(const StepRecord& record, const Baseline& baseline,
@@ -284,11 +284,11 @@ class Collector {
   }
 
   void find_lag() {
-    std::vector<study::Stretch> stretches;
+    std::vector<study::Segment> segments;
     for (const StepRecord& record : records_) {
       const Baseline& baseline = baselines_.at(record.zero);
       if (is_hold(record) || record.frames.empty() || baseline.empty()) continue;
-      study::Stretch s;
+      study::Segment s;
       s.time = frame_times(record);
       s.features.resize(s.time.size(), 6);
       for (Eigen::Index i = 0; i < s.time.size(); ++i)
@@ -298,10 +298,10 @@ class Collector {
       for (Eigen::Index i = 0; i < s.reference_time.size(); ++i)
         s.reference.row(i) =
             wrench_of(record, baseline, record.readings[static_cast<std::size_t>(i)]).transpose();
-      stretches.push_back(std::move(s));
+      segments.push_back(std::move(s));
     }
-    if (stretches.empty()) return;
-    data_.lag = study::estimate_lag(stretches);
+    if (segments.empty()) return;
+    data_.lag = study::estimate_lag(segments);
     if (data_.lag.known && data_.lag.explained >= kNoRelation) return;
     throw ConfigError(
         "what the reference said has nothing to do with how the platform moved, at no lag; is it "

@@ -13,7 +13,7 @@
 
 namespace tagwrench {
 
-inline constexpr double kLongestGap = 0.15;  ///< s between readings that are interpolated
+inline constexpr double kMaxGap = 0.15;  ///< s between readings that are interpolated
 /// A hand trembles at 8 to 12 Hz, which the springs and a cell's readings each follow in their own
 /// way: of a push both are averaged alike, by a raised cosine that is nothing so far from its
 /// middle (and passes less than 3 % of 8 Hz and above).

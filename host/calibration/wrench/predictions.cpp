@@ -39,7 +39,7 @@ void add_predictions(const WrenchPlan& plan, const WrenchFit& fit, WrenchData& d
   Eigen::MatrixXd felt;
   if (plan.reference == ReferenceKind::load_cell) {
     felt = study::reference_at(trial.time, data.lag.value, trial.reference_time, trial.reference,
-                               kLongestGap);
+                               kMaxGap);
   }
   for (const HeldOut& held : fit.held_out) {
     const Observation& o = data.observations[held.observation];

@@ -15,11 +15,11 @@ namespace {
 
 using Verdict = ReferenceFinding::Verdict;
 
-constexpr double kFewestShare = 0.8;  // of the time that readings must cover
-constexpr double kWeakPush = 0.25;    // of what the plan asks for
-constexpr double kStill = 0.03;       // of the range: an axis that moves less says nothing
-constexpr double kNoRelation = 0.3;   // mean R^2 below which there is none
-constexpr double kOpposite = -0.5;    // correlation
+constexpr double kMinShare = 0.8;    // of the time that readings must cover
+constexpr double kWeakPush = 0.25;   // of what the plan asks for
+constexpr double kStill = 0.03;      // of the range: an axis that moves less says nothing
+constexpr double kNoRelation = 0.3;  // mean R^2 below which there is none
+constexpr double kOpposite = -0.5;   // correlation
 
 const PlanStep& step_of(const WrenchPlan& plan, const StepRecord& record) {
   return plan.steps[static_cast<std::size_t>(record.step)];
@@ -65,7 +65,7 @@ double agreement(const Eigen::MatrixXd& said, const Eigen::MatrixXd& expected,
 ReferenceFinding check_presence(const WrenchPlan& plan, const StepRecord& record) {
   const double span = record.frames.back().time - record.frames.front().time;
   if (record.readings.size() < 10 ||
-      record.readings.back().time - record.readings.front().time < kFewestShare * span)
+      record.readings.back().time - record.readings.front().time < kMinShare * span)
     return {Verdict::again, "the reference was silent for a part of it; look at its plug"};
   if (std::any_of(record.readings.begin(), record.readings.end(),
                   [](const ReferenceSample& s) { return s.saturated; }))
@@ -109,25 +109,25 @@ ReferenceFinding check_reference(const WrenchPlan& plan, const StepRecord& recor
     return found;
   const auto n = static_cast<Eigen::Index>(record.frames.size());
   const Vector6 zero = mean_of(rest).displacement;
-  study::Stretch stretch;
-  stretch.time.resize(n);
-  stretch.features.resize(n, 6);
+  study::Segment segment;
+  segment.time.resize(n);
+  segment.features.resize(n, 6);
   for (Eigen::Index i = 0; i < n; ++i) {
     const TrackedFrame& frame = record.frames[static_cast<std::size_t>(i)];
-    stretch.time[i] = frame.time;
-    stretch.features.row(i) = (stiffness * (frame.displacement - zero)).transpose();
+    segment.time[i] = frame.time;
+    segment.features.row(i) = (stiffness * (frame.displacement - zero)).transpose();
   }
-  stretch.reference_time = times(record.readings);
-  stretch.reference = reference_wrenches(plan, record, rest);
-  const study::Lag lag = study::estimate_lag({&stretch, 1});
+  segment.reference_time = times(record.readings);
+  segment.reference = reference_wrenches(plan, record, rest);
+  const study::Lag lag = study::estimate_lag({&segment, 1});
   if (!lag.known || lag.explained < kNoRelation)
     return {
         Verdict::again,
         "what the reference says has nothing to do with how the platform moves, at no lag: is it "
         "the instrument that this sensor is pushed with, and on this clock?"};
   const Eigen::MatrixXd said =
-      study::reference_at(stretch.time, lag.value, stretch.reference_time, stretch.reference, 0.1);
-  if (agreement(said, stretch.features, range) < kOpposite)
+      study::reference_at(segment.time, lag.value, segment.reference_time, segment.reference, 0.1);
+  if (agreement(said, segment.features, range) < kOpposite)
     return {Verdict::hopeless,
             plan.reference == ReferenceKind::load_cell
                 ? "the load cell reads less the harder it is pushed: swap its wires A+ and A- and "

@@ -13,12 +13,12 @@ namespace {
 constexpr Duration kPatience = std::chrono::milliseconds(500);
 constexpr std::uint16_t kTareConversions = 80;
 /// Of a resting cell's noise, from end to end of its conversions.
-constexpr double kMostTareSpread = 15;
-constexpr double kLeastTareNoise_counts = 0.5;
+constexpr double kMaxTareSpread = 15;
+constexpr double kMinTareNoise_counts = 0.5;
 
 std::string header() {
   std::string line(kCsvHeader.substr(0, kCsvHeader.size() - 1));
-  for (std::size_t i = 0; i < link::kMostChannels; ++i)
+  for (std::size_t i = 0; i < link::kMaxChannels; ++i)
     line += fmt::format(",cell{0}_counts,cell{0}_n,cell{0}_sigma_n", i);
   return line + "\n";
 }
@@ -52,7 +52,7 @@ BoardOutput::~BoardOutput() { write_ripe(/*all=*/true); }
 SendStatus BoardOutput::send(const Sample& sample) noexcept {
   if (!sink_ && !comparison_) return SendStatus::ok;
   const TimePoint now = std::chrono::steady_clock::now();
-  const bool room = rows_.size() < kMostRows;
+  const bool room = rows_.size() < kMaxRows;
   if (room) rows_.push({sample, now});
   write_ripe(/*all=*/false);
   const SendStatus status = std::exchange(status_, SendStatus::ok);
@@ -70,7 +70,7 @@ std::string_view BoardOutput::service() noexcept {
   said_.clear();
   try {
     said_.swap(found_);
-    for (link::News news; link_.next(news);) {
+    for (link::BoardEvent news; link_.next(news);) {
       if (record_) record_->news(news);
       if (!said_.empty()) said_ += "; ";
       said_ += link::text(news);
@@ -105,8 +105,8 @@ void BoardOutput::take_tares() noexcept {
     if (result.channel >= cells_.size()) continue;
     link::CellCalibration& cell = cells_[result.channel];
     if (!cell.calibrated) continue;
-    const double noise = std::max(cell.noise_counts, kLeastTareNoise_counts);
-    if (result.spread_counts > kMostTareSpread * noise) {
+    const double noise = std::max(cell.noise_counts, kMinTareNoise_counts);
+    if (result.spread_counts > kMaxTareSpread * noise) {
       try {
         found_ = fmt::format("load cell {} moved while it was tared; let it rest, then try again",
                              result.channel);

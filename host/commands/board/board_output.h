@@ -63,7 +63,7 @@ class BoardOutput final : public Output {
     TimePoint sent{};
   };
   using Line = std::array<char, 2048>;
-  static constexpr std::size_t kMostRows = 64;
+  static constexpr std::size_t kMaxRows = 64;
 
   void take_readings() noexcept;
   void take_tares() noexcept;
@@ -75,14 +75,14 @@ class BoardOutput final : public Output {
   link::BoardLink& link_;
   link::CellCalibrations cells_;
   Duration latency_;
-  std::array<link::SampleHistory, link::kMostChannels> counts_;
-  std::array<std::optional<std::int32_t>, link::kMostChannels> last_counts_;
+  std::array<link::SampleHistory, link::kMaxChannels> counts_;
+  std::array<std::optional<std::int32_t>, link::kMaxChannels> last_counts_;
   std::uint32_t buttons_down_ = 0;  ///< bit 0 is the board's button 0
   std::optional<ReferenceComparison> comparison_;
   ReferenceMonitor monitor_{{}};
   std::string found_;  ///< by it, and not said yet
   std::optional<TextSink> sink_;
-  link::Ring<Row, kMostRows> rows_;
+  link::Ring<Row, kMaxRows> rows_;
   LineBuffer sample_line_{};
   Line line_{};
   bool header_written_ = false;

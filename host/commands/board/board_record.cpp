@@ -29,7 +29,7 @@ void BoardRecord::button(const link::ButtonReading& reading) noexcept {
   writer_.event(EventKind::button, reading.time.time, {}, reading.pressed ? 1 : 0, reading.button);
 }
 
-void BoardRecord::news(const link::News& news) {
+void BoardRecord::news(const link::BoardEvent& news) {
   writer_.event(EventKind::board, std::chrono::steady_clock::now(), link::text(news));
 }
 

@@ -15,7 +15,7 @@ class BoardRecord {
 
   void cell(const link::CellReading& reading) noexcept;
   void button(const link::ButtonReading& reading) noexcept;
-  void news(const link::News& news);
+  void news(const link::BoardEvent& news);
   /// LED when it changes, clock once a second.
   void state(const link::BoardSession& session) noexcept;
 

@@ -12,7 +12,7 @@
 #include "host/board/cell_file.h"
 #include "host/commands/board/loop.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/output/text_sink.h"
 
 namespace tagwrench {
@@ -21,8 +21,8 @@ namespace {
 constexpr Duration kFirstConversion = std::chrono::milliseconds(1500);
 /// Of a resting cell's noise, from end to end of a thousand conversions; the faster rate is noisier
 /// than the one that the noise may be of.
-constexpr double kMostSpread = 15;
-constexpr double kLeastNoise_counts = 0.5;
+constexpr double kMaxSpread = 15;
+constexpr double kMinNoise_counts = 0.5;
 
 /// Mean and scatter of a cell's next conversions.
 struct Mean {
@@ -47,7 +47,7 @@ Duration patience_for(int conversions, int rate) {
 [[noreturn]] void no_conversions(const BoardLoop& loop, int channel) {
   const bool stuck =
       loop.cell_fault(static_cast<std::size_t>(channel)) == link::FaultCode::cell_stuck;
-  throw ConfigError(link::text({link::News::Kind::fault,
+  throw ConfigError(link::text({link::BoardEvent::Kind::fault,
                                 static_cast<std::uint32_t>(stuck ? link::FaultCode::cell_stuck
                                                                  : link::FaultCode::cell_silent),
                                 static_cast<std::uint32_t>(channel)}));
@@ -69,7 +69,7 @@ bool wait_for_cells(BoardLoop& loop, unsigned mask) {
     }
     if (mask == 0) return true;
     const bool late = clock_now() >= end;
-    for (int i = 0; i < static_cast<int>(link::kMostChannels); ++i) {
+    for (int i = 0; i < static_cast<int>(link::kMaxChannels); ++i) {
       const bool faulty = loop.cell_fault(static_cast<std::size_t>(i)) != link::FaultCode::none;
       if ((mask >> i & 1) != 0 && (late || faulty)) no_conversions(loop, i);
     }
@@ -105,7 +105,7 @@ std::optional<std::vector<link::TareResult>> tare(BoardLoop& loop, const BoardOp
     if (clock_now() >= end) no_conversions(loop, std::countr_zero(mask));
     if (!loop.turn(end)) return {};
     for (link::TareResult result{}; loop.session().next(result);) {
-      if (result.channel >= link::kMostChannels || (mask >> result.channel & 1) == 0) continue;
+      if (result.channel >= link::kMaxChannels || (mask >> result.channel & 1) == 0) continue;
       mask &= static_cast<std::uint8_t>(~(1u << result.channel));
       out.push_back(result);
     }
@@ -146,7 +146,7 @@ std::string file_to_write(const BoardOptions& options, const link::BoardSession&
 int say(const std::string& text) {
   TextSink out("-", /*lossless=*/true);
   if (out.write(text) != SendStatus::failed) return 0;
-  tell(out.failure());
+  log_info(out.failure());
   return 1;
 }
 
@@ -164,14 +164,14 @@ int board_calibrate_cell(const BoardOptions& options) {
   std::vector<link::CellPoint> points;
   double variance = 0;
   for (const double mass : options.masses_kg) {
-    tell(mass == 0
-             ? fmt::format("take everything off load cell {}, let it come to rest, press Enter",
-                           options.channel)
-             : fmt::format("put {:g} kg on load cell {}, let it come to rest, press Enter", mass,
-                           options.channel));
+    log_info(mass == 0
+                 ? fmt::format("take everything off load cell {}, let it come to rest, press Enter",
+                               options.channel)
+                 : fmt::format("put {:g} kg on load cell {}, let it come to rest, press Enter",
+                               mass, options.channel));
     const Key key = wait_for_key(loop);
     if (key == Key::stopped) {
-      tell("stopped; nothing was changed");
+      log_info("stopped; nothing was changed");
       return 0;
     }
     if (key == Key::ended)
@@ -180,7 +180,7 @@ int board_calibrate_cell(const BoardOptions& options) {
           mass));
     const auto mean = measure(loop, options);
     if (!mean) {
-      tell("stopped; nothing was changed");
+      log_info("stopped; nothing was changed");
       return 0;
     }
     if (mean->saturated) {
@@ -189,7 +189,7 @@ int board_calibrate_cell(const BoardOptions& options) {
           "a smaller mass, a smaller gain (--input a64), or check its wires",
           options.channel, mass));
     }
-    tell(
+    log_info(
         fmt::format("{:g} kg: {:.1f} counts, each +- {:.1f}", mass, mean->mean, mean->deviation()));
     points.push_back({mass, mean->mean, mean->deviation() / std::sqrt(mean->count)});
     variance += mean->deviation() * mean->deviation();
@@ -231,15 +231,15 @@ int board_tare(const BoardOptions& options) {
   if (!wait_for_cells(loop, mask)) return 0;
   const auto tared = tare(loop, options, mask);
   if (!tared) {
-    tell("stopped; nothing was changed");
+    log_info("stopped; nothing was changed");
     return 0;
   }
   std::string report;
   for (const link::TareResult& result : *tared) {
     link::CellCalibration& cell = cells[result.channel];
     const double scale = std::abs(cell.newtons_per_count);
-    if (result.spread_counts > kMostSpread * std::max(cell.noise_counts, kLeastNoise_counts)) {
-      tell(
+    if (result.spread_counts > kMaxSpread * std::max(cell.noise_counts, kMinNoise_counts)) {
+      log_info(
           fmt::format("load cell {} moved while it was tared ({:.2g} N from end to end); let it "
                       "rest, then try again",
                       result.channel, result.spread_counts * scale));
@@ -253,7 +253,7 @@ int board_tare(const BoardOptions& options) {
     cell.zero_scale_covariance_n = 0;  // measured apart from the scale
   }
   link::save_cells(path, link::id_text(loop.session().hello().unique_id), cells);
-  if (!left_out.empty()) tell(fmt::format("left out, not calibrated: load cell {}", left_out));
+  if (!left_out.empty()) log_info(fmt::format("left out, not calibrated: load cell {}", left_out));
   return say(fmt::format("{}kept in {}\n", report, path));
 }
 

@@ -48,7 +48,7 @@ BoardCommand::BoardCommand(command_line::Command program)
   add_cells_file(calibrate_cell_);
   calibrate_cell_.add_option("--channel", options_.channel, "of the load cell")
       .required()
-      .check(command_line::range(0, static_cast<int>(link::kMostChannels) - 1));
+      .check(command_line::range(0, static_cast<int>(link::kMaxChannels) - 1));
   calibrate_cell_
       .add_option("--mass", options_.masses_kg,
                   "known masses in kg, two or more, in the order in which they will be put on; for "

@@ -17,7 +17,7 @@
 #include "host/board/usb_identity.h"
 #include "host/commands/board/loop.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/output/text_sink.h"
 
 extern char** environ;
@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kImageName = "tagwrench-atmega328p.hex";
-constexpr std::uintmax_t kMostImageBytes = 128 * 1024;  ///< 32 KB of flash as Intel HEX
+constexpr std::uintmax_t kMaxImageBytes = 128 * 1024;  ///< 32 KB of flash as Intel HEX
 
 /// Beside this program as it was built, or as it was installed; or in the clone where we are.
 std::string find_image() {
@@ -75,7 +75,7 @@ void check_image(const std::string& path) {
     throw ConfigError(fmt::format("{}: there is no such file; give --image FILE.hex", path));
   std::ifstream in(path);
   HexRecord last = HexRecord::wrong;
-  if (fs::file_size(path, error) <= kMostImageBytes) {
+  if (fs::file_size(path, error) <= kMaxImageBytes) {
     for (std::string line; std::getline(in, line);) {
       last = hex_record(line);
       if (last != HexRecord::data) break;
@@ -147,9 +147,9 @@ int board_flash(const BoardOptions& options) {
     return out.write(fmt::format("{}\n", fmt::join(arguments, " "))) == SendStatus::failed ? 1 : 0;
   }
   { const link::SerialPort free(port, link::kBaud); }  // or it says what is the matter
-  tell(fmt::format("running {}", fmt::join(arguments, " ")));
+  log_info(fmt::format("running {}", fmt::join(arguments, " ")));
   if (const int status = run_program(arguments); status != 0) {
-    tell(fmt::format(
+    log_info(fmt::format(
         "board flash: avrdude failed ({}); is it a {} with an ATmega328P? A Nano with the old boot "
         "loader is --board nano-old",
         status, options.model));
@@ -159,14 +159,14 @@ int board_flash(const BoardOptions& options) {
   if (!loop.connect()) return 0;
   const link::Hello& hello = loop.session().hello();
   if (options.image.empty() && std::string(hello.firmware) != TAGWRENCH_VERSION) {
-    tell(fmt::format(
+    log_info(fmt::format(
         "board flash: the board says firmware {} after {} was written; check the image and try "
         "again",
         hello.firmware, TAGWRENCH_VERSION));
     return 1;
   }
-  tell(fmt::format("the board answers: {}, firmware {}, protocol {}.{}", hello.board,
-                   hello.firmware, hello.protocol_major, hello.protocol_minor));
+  log_info(fmt::format("the board answers: {}, firmware {}, protocol {}.{}", hello.board,
+                       hello.firmware, hello.protocol_major, hello.protocol_minor));
   return 0;
 }
 

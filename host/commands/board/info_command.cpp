@@ -6,7 +6,7 @@
 #include "host/board/cell_file.h"
 #include "host/commands/board/loop.h"
 #include "host/core/json/json_text.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/output/text_sink.h"
 
 namespace tagwrench {
@@ -109,7 +109,7 @@ int board_info(const BoardOptions& options) {
   const std::string text = options.json ? as_json(loop.session(), loop.link().port())
                                         : for_people(loop.session(), loop.link().port());
   if (out.write(text) != SendStatus::failed) return 0;
-  tell(out.failure());
+  log_info(out.failure());
   return 1;
 }
 

@@ -8,7 +8,7 @@
 
 #include "host/commands/board/loop.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 
 namespace tagwrench {
 namespace {
@@ -115,7 +115,7 @@ int board_led(const BoardOptions& options) {
     if (!stays && std::chrono::steady_clock::now() - begin > milliseconds(300)) return 0;
     if (stays && !told && loop.session().led_accepted()) {
       told = true;
-      tell("the light stays until Ctrl-C");
+      log_info("the light stays until Ctrl-C");
     }
   }
   loop.session().set_led(link::Led{});

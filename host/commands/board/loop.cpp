@@ -9,8 +9,8 @@
 #include "host/app/input.h"
 #include "host/board/cell_file.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 
 namespace tagwrench {
 namespace {
@@ -57,8 +57,8 @@ bool BoardLoop::turn(TimePoint until, int other_fd) {
 }
 
 void BoardLoop::tell_news() {
-  using Kind = link::News::Kind;
-  for (link::News news; link_.next(news);) {
+  using Kind = link::BoardEvent::Kind;
+  for (link::BoardEvent news; link_.next(news);) {
     const std::string line = text(news);
     if (news.kind == Kind::board_too_old || news.kind == Kind::host_too_old) refusal_ = line;
     if (news.kind == Kind::led_refused) led_refused_ = true;
@@ -66,7 +66,7 @@ void BoardLoop::tell_news() {
     const bool of_cell = news.kind == Kind::fault && (fault == link::FaultCode::cell_silent ||
                                                       fault == link::FaultCode::cell_stuck);
     if (of_cell && news.other < cell_faults_.size()) cell_faults_[news.other] = fault;
-    if (news.kind != Kind::connected && !(of_cell && cell_faults_quiet_)) tell(line);
+    if (news.kind != Kind::connected && !(of_cell && cell_faults_quiet_)) log_info(line);
   }
 }
 
@@ -82,7 +82,7 @@ bool BoardLoop::connect() {
     if (waited >= kBoardPatience) throw ConfigError(link_.why_no_board());
     if (!said && waited > kBoardPatience / 2) {
       said = true;
-      tell(fmt::format("{}: waiting for the board's answer", link_.port()));
+      log_info(fmt::format("{}: waiting for the board's answer", link_.port()));
     }
   }
   return true;

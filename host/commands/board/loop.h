@@ -43,7 +43,7 @@ class BoardLoop {
 
   link::BoardLink link_;
   UniqueFd stop_;
-  std::array<link::FaultCode, link::kMostChannels> cell_faults_{};
+  std::array<link::FaultCode, link::kMaxChannels> cell_faults_{};
   bool cell_faults_quiet_ = false;
   bool led_refused_ = false;
   std::string refusal_;  ///< why a board of another version cannot be spoken to

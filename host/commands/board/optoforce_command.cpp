@@ -7,8 +7,8 @@
 
 #include "host/board/optoforce_sensor.h"
 #include "host/commands/board/options.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
 #include "host/output/text_sink.h"
 
 namespace tagwrench {
@@ -17,7 +17,7 @@ namespace {
 using link::OptoforceReading;
 using std::chrono::milliseconds;
 
-constexpr Duration kLongestSilence = std::chrono::seconds(3);
+constexpr Duration kMaxSilence = std::chrono::seconds(3);
 constexpr const char* kAxes[] = {"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
 
 std::string optoforce_json(const OptoforceReading& reading) {
@@ -68,14 +68,14 @@ class ForceWatch {
       sensor_.service();
       for (OptoforceReading reading; good && sensor_.next(reading);) good = show(reading);
       watch_port();
-      if (nothing() && clock_now() - begin > kLongestSilence) break;
+      if (nothing() && clock_now() - begin > kMaxSilence) break;
     }
     if (nothing() && !stopped_) return say_nothing();
     const auto& counters = sensor_.counters();
     if (counters.lost_frames > 0 || counters.interruptions > 0)
-      tell(fmt::format("{} samples were lost, {} times bytes came that belong to none",
-                       counters.lost_frames, counters.interruptions));
-    if (!good) tell(out_.failure());
+      log_info(fmt::format("{} samples were lost, {} times bytes came that belong to none",
+                           counters.lost_frames, counters.interruptions));
+    if (!good) log_info(out_.failure());
     return good ? 0 : 1;
   }
 
@@ -101,19 +101,20 @@ class ForceWatch {
   void watch_port() {
     if (sensor_.plugged() != plugged_) {
       plugged_ = sensor_.plugged();
-      tell(options_.port + (plugged_ ? ": the port is back"
-                                     : ": the port is gone; plug it in "
-                                       "again, this program waits"));
+      log_info(options_.port + (plugged_ ? ": the port is back"
+                                         : ": the port is gone; plug it in "
+                                           "again, this program waits"));
     }
   }
 
   int say_nothing() const {
     const std::uint64_t bytes = sensor_.counters().skipped_bytes;
-    tell(bytes == 0
-             ? fmt::format("{}: nothing comes; is this the sensor's port?", options_.port)
-             : fmt::format("{}: {} bytes came, but no frame of an OptoForce sensor; is this its "
-                           "port?",
-                           options_.port, bytes));
+    log_info(
+        bytes == 0
+            ? fmt::format("{}: nothing comes; is this the sensor's port?", options_.port)
+            : fmt::format("{}: {} bytes came, but no frame of an OptoForce sensor; is this its "
+                          "port?",
+                          options_.port, bytes));
     return 1;
   }
 

@@ -8,7 +8,7 @@
 #include "host/board/cell_file.h"
 #include "host/calibration/light/settle.h"
 #include "host/commands/board/board_output.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -60,8 +60,8 @@ bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
   if (!input.camera) {
     lamp.set_level(kUnseenLevel_permille);
     settled_permille_ = led_permille_ = kUnseenLevel_permille;
-    tell(fmt::format("the board's LED is on at {:.0f} %, but does not light this source",
-                     kUnseenLevel_permille / 10));
+    log_info(fmt::format("the board's LED is on at {:.0f} %, but does not light this source",
+                         kUnseenLevel_permille / 10));
     return true;
   }
   Acquirer finder(input.sensor.camera, input.sensor.target);
@@ -69,7 +69,7 @@ bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
       tagwrench::settle_light(*input.source, finder, input.sensor.camera.mirrored, lamp, stop);
   settled_permille_ = led_permille_ = report.setting.led_permille;
   exposure_us_ = report.setting.exposure_us;
-  if (!report.stopped) tell(light_text(report));
+  if (!report.stopped) log_info(light_text(report));
   return !report.stopped;
 }
 
@@ -77,7 +77,7 @@ std::unique_ptr<Output> RunBoard::output(const SensorConfig& sensor, const std::
   const bool newtons = std::any_of(cells_.begin(), cells_.end(),
                                    [](const link::CellCalibration& c) { return c.calibrated; });
   if (!path.empty() && !newtons) {
-    tell(
+    log_info(
         "the load cells are not calibrated: the reference has counts alone; `tagwrench board "
         "calibrate-cell` makes newtons of them");
   }
@@ -91,7 +91,7 @@ std::unique_ptr<Output> RunBoard::output(const SensorConfig& sensor, const std::
 void RunBoard::compare(BoardOutput& output, const SensorConfig& sensor) const {
   const ReferenceLine& line = *sensor.reference;
   if (!cells_[static_cast<std::size_t>(line.channel)].calibrated) {
-    tell(fmt::format(
+    log_info(fmt::format(
         "wrench.reference: load cell {} is not calibrated, so nothing is compared with it; run "
         "`tagwrench board calibrate-cell`",
         line.channel));
@@ -99,7 +99,7 @@ void RunBoard::compare(BoardOutput& output, const SensorConfig& sensor) const {
   }
   const WrenchEstimator wrench(sensor.wrench);
   output.compare({line, wrench.tool(), range_through(wrench.tool(), sensor.wrench.range)});
-  tell(fmt::format("every sample is compared with load cell {}", line.channel));
+  log_info(fmt::format("every sample is compared with load cell {}", line.channel));
 }
 
 BoardReading RunBoard::reading() const noexcept {

@@ -39,7 +39,7 @@ class BoardView {
     link::CellReading reading;
     std::uint64_t lost = 0;
   };
-  std::array<Cell, link::kMostChannels> cells_;
+  std::array<Cell, link::kMaxChannels> cells_;
   std::array<int, 8> adc_{-1, -1, -1, -1, -1, -1, -1, -1};
   std::array<bool, 8> button_seen_{};
   std::array<bool, 8> pressed_{};

@@ -3,7 +3,7 @@
 
 #include "host/board/cell_file.h"
 #include "host/commands/board/text.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/output/text_sink.h"
 
 namespace tagwrench {
@@ -26,7 +26,7 @@ class Watch {
     drop_samples();
     load_calibrations();
     if (style_ == Style::csv && !options_.seconds)
-      tell(fmt::format("writing to {}; Ctrl-C ends it", place()));
+      log_info(fmt::format("writing to {}; Ctrl-C ends it", place()));
     const TimePoint begin = clock_now();
     const TimePoint end =
         options_.seconds ? begin + in_seconds(*options_.seconds) : TimePoint::max();
@@ -38,9 +38,9 @@ class Watch {
       if (good && style_ == Style::people && clock_now() >= next_line_) good = write_view();
     }
     if (good && style_ == Style::csv)
-      tell(fmt::format("{} samples and events written to {}", samples_, place()));
+      log_info(fmt::format("{} samples and events written to {}", samples_, place()));
     say_losses();
-    if (!good) tell(out_.failure());
+    if (!good) log_info(out_.failure());
     return good ? 0 : 1;
   }
 
@@ -62,7 +62,7 @@ class Watch {
   void load_calibrations() {
     cells_ = load_cells(options_, loop_.session());
     if (std::none_of(cells_.begin(), cells_.end(), [](const auto& c) { return c.calibrated; }))
-      tell(
+      log_info(
           "the load cells are not calibrated: showing counts; `tagwrench board calibrate-cell` "
           "makes newtons of them");
   }
@@ -121,8 +121,8 @@ class Watch {
     const std::uint64_t lost =
         counters.lost_conversions + loop_.session().overwritten() - overwritten_before_;
     if (lost > 0 || counters.damaged_frames > 0)
-      tell(fmt::format("{} samples were lost, {} frames came damaged", lost,
-                       counters.damaged_frames));
+      log_info(fmt::format("{} samples were lost, {} frames came damaged", lost,
+                           counters.damaged_frames));
   }
 
   const BoardOptions& options_;

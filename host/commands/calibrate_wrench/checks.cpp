@@ -9,10 +9,10 @@
 
 #include "host/app/input.h"
 #include "host/calibration/wrench/coverage.h"
-#include "host/commands/hands_off.h"
+#include "host/commands/static_measurement.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
-#include "host/core/tell.h"
 #include "host/sensor/calibration_file.h"
 
 namespace tagwrench {
@@ -25,7 +25,7 @@ void check_plan(const WrenchPlan& plan, const Vector6& range, bool require_all) 
     missing += (missing.empty() ? "" : "; ") + line;
   if (missing.empty()) return;
   if (require_all) throw ConfigError(fmt::format("--plan {}: {}; add steps", plan.name, missing));
-  tell(
+  log_info(
       fmt::format("--plan {}: {}; that stays as the spring model has it and is marked so "
                   "(--require-all refuses)",
                   plan.name, missing));

@@ -17,7 +17,7 @@ using nlohmann::json;
 constexpr const char* kFormat = "tagwrench-calibrating-1";
 constexpr std::size_t kFrameNumbers = 1 + 6 + 21;       // time, displacement, lower triangle
 constexpr std::size_t kReadingNumbers = 1 + 6 + 6 + 1;  // time, value, sigma, saturated
-constexpr double kLargest = 1e12;
+constexpr double kMax = 1e12;
 
 json frame_json(const TrackedFrame& frame) {
   json row = {frame.time};
@@ -101,7 +101,7 @@ class ProgressReader {
     for (const json& v : row) {
       if (!v.is_number()) damaged();
       out.push_back(v.get<double>());
-      if (!(std::abs(out.back()) < kLargest)) damaged();
+      if (!(std::abs(out.back()) < kMax)) damaged();
     }
     return out;
   }

@@ -19,7 +19,7 @@ constexpr double kStepSigma = 0.289;  // of one count: its uniform distribution,
 /// A load cell on the board.
 class BoardCell final : public Reference {
  public:
-  BoardCell(const ReferenceOptions& options, int channel)
+  BoardCell(const ReferenceInstrumentOptions& options, int channel)
       : options_(board_options(options)),
         loop_(options_.port, session_options(options_), "--board"),
         channel_(static_cast<std::size_t>(channel)) {
@@ -68,7 +68,7 @@ class BoardCell final : public Reference {
   std::string trouble() override { return {}; }  // the loop says its own
 
  private:
-  static BoardOptions board_options(const ReferenceOptions& options) {
+  static BoardOptions board_options(const ReferenceInstrumentOptions& options) {
     BoardOptions out;
     out.port = options.board == "auto" ? "" : options.board;
     out.cells_file = options.cells;
@@ -84,7 +84,7 @@ class BoardCell final : public Reference {
 /// The same, in the simulated hand.
 class PressedCell final : public Reference {
  public:
-  PressedCell(const ReferenceOptions& options, int channel, const sim::Bench& bench,
+  PressedCell(const ReferenceInstrumentOptions& options, int channel, const sim::Bench& bench,
               TimePoint start)
       : cell_(options, channel), hand_(options.emulated_cell, channel, bench, start) {}
 
@@ -107,7 +107,7 @@ class PressedCell final : public Reference {
 
 class Optoforce final : public Reference {
  public:
-  explicit Optoforce(const ReferenceOptions& options)
+  explicit Optoforce(const ReferenceInstrumentOptions& options)
       : port_(options.optoforce),
         counts_per_unit_(options.counts_per_unit),
         sensor_({.port = options.optoforce, .counts_per_unit = options.counts_per_unit}) {}
@@ -177,7 +177,8 @@ class Simulated final : public Reference {
   std::string description_;
 };
 
-std::unique_ptr<Reference> simulated(const WrenchPlan& plan, const ReferenceOptions& options,
+std::unique_ptr<Reference> simulated(const WrenchPlan& plan,
+                                     const ReferenceInstrumentOptions& options,
                                      const sim::Bench& bench, TimePoint start) {
   const bool cell = plan.reference == ReferenceKind::load_cell;
   if (cell && !options.board.empty() && !options.emulated_cell.empty())
@@ -199,7 +200,8 @@ std::unique_ptr<Reference> simulated(const WrenchPlan& plan, const ReferenceOpti
 
 }  // namespace
 
-std::unique_ptr<Reference> open_reference(const WrenchPlan& plan, const ReferenceOptions& options,
+std::unique_ptr<Reference> open_reference(const WrenchPlan& plan,
+                                          const ReferenceInstrumentOptions& options,
                                           const sim::Bench* bench, TimePoint simulation_start) {
   if (plan.reference == ReferenceKind::masses) return nullptr;
   if (bench != nullptr) return simulated(plan, options, *bench, simulation_start);

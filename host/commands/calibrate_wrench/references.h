@@ -11,7 +11,7 @@
 
 namespace tagwrench {
 
-struct ReferenceOptions {
+struct ReferenceInstrumentOptions {
   std::string board;  ///< port, `auto`; empty: none
   std::string cells;
   std::string optoforce;  ///< port; empty: none
@@ -23,7 +23,8 @@ struct ReferenceOptions {
 /// of the emulated board; null: real ones.
 /// `simulation_start`: time of the bench's second 0. Throws ConfigError if it is not named, not
 /// there, or not calibrated.
-std::unique_ptr<Reference> open_reference(const WrenchPlan& plan, const ReferenceOptions& options,
+std::unique_ptr<Reference> open_reference(const WrenchPlan& plan,
+                                          const ReferenceInstrumentOptions& options,
                                           const sim::Bench* bench, TimePoint simulation_start);
 
 }  // namespace tagwrench

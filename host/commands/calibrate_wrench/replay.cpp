@@ -7,15 +7,15 @@
 
 #include "host/calibration/wrench/guide.h"
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/tracker/tracker.h"
 
 namespace tagwrench {
 namespace {
 
 constexpr Duration kRounding = std::chrono::microseconds(1);  // of marks
-constexpr int kMostZeros = 100'000;
-constexpr double kLargestNumber = 1e12;
+constexpr int kMaxZeros = 100'000;
+constexpr double kMaxNumber = 1e12;
 
 double seconds(TimePoint time) {
   return std::chrono::duration<double>(time.time_since_epoch()).count();
@@ -56,8 +56,8 @@ std::vector<NumberedReading> read_readings(record::RecordingReader& recording,
       const auto at = static_cast<std::size_t>(i);
       reading.sample.value[i] = row.value[at];
       reading.sample.sigma[i] = row.sigma[at];
-      numbers = numbers && std::abs(row.value[at]) < kLargestNumber && row.sigma[at] >= 0 &&
-                row.sigma[at] < kLargestNumber;
+      numbers = numbers && std::abs(row.value[at]) < kMaxNumber && row.sigma[at] >= 0 &&
+                row.sigma[at] < kMaxNumber;
     }
     if (!numbers) damaged(recording, "a reading of the reference is not in newtons");
     out.push_back(reading);
@@ -94,7 +94,7 @@ void track_frames(Input& input, const std::vector<AcceptedStep>& steps,
         records[i].frames.push_back({seconds(time), track.displacement, track.covariance});
     }
   }
-  if (const std::string bad = source.unusable(); !bad.empty()) tell(bad);
+  if (const std::string bad = source.unusable(); !bad.empty()) log_info(bad);
 }
 
 }  // namespace
@@ -106,7 +106,7 @@ std::vector<AcceptedStep> accepted_steps(record::RecordingReader& recording,
     if (static_cast<std::size_t>(mark.step) >= plan.steps.size())
       damaged(recording, fmt::format("its step {} is not in the plan", mark.step + 1));
     if (mark.begin) {
-      if (mark.zero < 0 || mark.zero > kMostZeros) damaged(recording, "its marks are damaged");
+      if (mark.zero < 0 || mark.zero > kMaxZeros) damaged(recording, "its marks are damaged");
       steps.push_back({mark.step, mark.zero, mark.time, mark.time, 0});
       continue;
     }

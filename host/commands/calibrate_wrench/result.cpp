@@ -36,7 +36,7 @@ Vector6 known_to(const WrenchData& data, const WrenchFit& fit) {
   for (const HeldOut& h : fit.held_out) {
     const Observation& o = data.observations[h.observation];
     sum += o.wrench_covariance.diagonal();
-    for (const CommonError& error : o.common) sum += error.effect.cwiseAbs2();
+    for (const CorrelatedError& error : o.common) sum += error.effect.cwiseAbs2();
   }
   if (!fit.held_out.empty()) sum /= static_cast<double>(fit.held_out.size());
   return sum.cwiseSqrt();

@@ -10,9 +10,9 @@
 
 #include "host/commands/calibrate_wrench/keys.h"
 #include "host/commands/calibrate_wrench/simulated_person.h"
+#include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/core/tell.h"
-#include "host/tracker/hint_text.h"
+#include "host/tracker/diagnostic_text.h"
 #include "host/tracker/tracker.h"
 
 namespace tagwrench {
@@ -43,7 +43,7 @@ class Telling {
  public:
   void line(const std::string& text) {
     wipe();
-    tell(text);
+    log_info(text);
   }
   void live(const WrenchGuide& guide) {
     if (!terminal_ || Clock::now() - shown_ < kLiveEvery) return;
@@ -85,7 +85,7 @@ class Runner {
 
   GuideEnd run() {
     if (keys_.there() && !run_.events->on())
-      tell("keys: s skips a step, r does the last one again, q stops");
+      log_info("keys: s skips a step, r does the last one again, q stops");
     while (!end_ && !guide_.done()) {
       speak();
       wait();
@@ -96,7 +96,7 @@ class Runner {
     }
     speak();
     tell_.wipe();
-    if (const std::string bad = source_.unusable(); !bad.empty()) tell(bad);
+    if (const std::string bad = source_.unusable(); !bad.empty()) log_info(bad);
     return guide_.failed() ? GuideEnd::failed : end_.value_or(GuideEnd::done);
   }
 
@@ -157,9 +157,10 @@ class Runner {
     if (track.needs_whole_frame && source_.complete(frame)) track = tracker_.track(frame);
     source_.want(track.wanted);
     if (run_.recorder != nullptr) run_.recorder->frame(frame, decoded, source_.raw(), track);
-    const bool news = track.hint != last_hint_ || is_trouble(track.hint);
-    if (track.hint != Hint::none && news) say(hint_text(track.hint, track.details));
-    if (track.hint != Hint::none) last_hint_ = track.hint;
+    const bool news = track.diagnostic != last_diagnostic_ || is_trouble(track.diagnostic);
+    if (track.diagnostic != Diagnostic::none && news)
+      say(diagnostic_text(track.diagnostic, track.details));
+    if (track.diagnostic != Diagnostic::none) last_diagnostic_ = track.diagnostic;
     const double time = clock_seconds(frame.capture_time);
     if (!first_time_) first_time_ = time;
     if (run_.seconds && time - *first_time_ > *run_.seconds) {
@@ -222,7 +223,7 @@ class Runner {
   std::optional<SimulatedPerson> person_;
   std::optional<GuideEnd> end_;
   std::optional<double> first_time_;
-  Hint last_hint_ = Hint::none;
+  Diagnostic last_diagnostic_ = Diagnostic::none;
   bool ready_ = true;
   std::size_t kept_ = 0;
   std::size_t skipped_ = 0;

@@ -1,4 +1,4 @@
-// Starts a program that nothing of who started it reaches: the keepers of the spnav socket and of a
+// Starts a program that nothing of who started it reaches: the daemons of the spnav socket and of a
 // gadget.
 #pragma once
 

@@ -1,14 +1,13 @@
-#include "host/core/tell.h"
-
 #include <unistd.h>
 
 #include <string>
 
+#include "host/core/log.h"
 #include "host/core/os/write_soon.h"
 
 namespace tagwrench {
 
-void tell(std::string_view line) noexcept {
+void log_info(std::string_view line) noexcept {
   try {
     std::string text = "tagwrench: ";
     for (const char c : line) text += c == '\n' || c == '\r' ? ' ' : c;

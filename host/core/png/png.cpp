@@ -12,13 +12,13 @@ struct Free {
 };
 using Context = std::unique_ptr<spng_ctx, Free>;
 
-constexpr std::size_t kMostMetadata = 64U << 20;  // bytes; a small file may unpack to anything
+constexpr std::size_t kMaxMetadata = 64U << 20;  // bytes; a small file may unpack to anything
 
 /// Empty where the bytes are no PNG.
 Context open(std::span<const std::uint8_t> bytes, spng_ihdr& header) {
   Context context(spng_ctx_new(0));
   const bool good = context &&
-                    spng_set_chunk_limits(context.get(), kMostMetadata, kMostMetadata) == 0 &&
+                    spng_set_chunk_limits(context.get(), kMaxMetadata, kMaxMetadata) == 0 &&
                     spng_set_png_buffer(context.get(), bytes.data(), bytes.size()) == 0 &&
                     spng_get_ihdr(context.get(), &header) == 0;
   return good ? std::move(context) : nullptr;

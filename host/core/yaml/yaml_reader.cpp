@@ -13,7 +13,7 @@ namespace tagwrench {
 namespace {
 
 /// In the units that files are written in; squares and products of such numbers stay finite.
-constexpr double kLargest = 1e12;
+constexpr double kMax = 1e12;
 
 std::string joined(const std::vector<std::string_view>& names) {
   std::string out;
@@ -103,8 +103,8 @@ double YamlReader::finite(const std::string& key, const YAML::Node& node) const 
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, value))
     fail(key, "must be a number");
   if (!std::isfinite(value)) fail(key, "must be a finite number, not NaN or infinity");
-  if (std::abs(value) > kLargest)
-    fail(key, fmt::format("{} is beyond all measure; use at most {}", value, kLargest));
+  if (std::abs(value) > kMax)
+    fail(key, fmt::format("{} is beyond all measure; use at most {}", value, kMax));
   return value;
 }
 

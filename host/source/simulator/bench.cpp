@@ -12,7 +12,7 @@ namespace tagwrench::sim {
 namespace {
 
 using std::numbers::pi;
-constexpr double kMostSigmas = 3;
+constexpr double kMaxSigmas = 3;
 constexpr double kKnock = 0.05;        // s that a bump or a slip takes
 constexpr double kHandEase = 0.5;      // s to take hold of the platform and to let it go
 constexpr double kFirstStep = 2.0e-4;  // s between felt wrenches, nominal
@@ -29,7 +29,7 @@ double eased(double time, double length) {
 // Nobody who measures leaves an error of more than three standard deviations unnoticed.
 double error(Random& random, double sigma) {
   double value = random.normal();
-  while (std::abs(value) > kMostSigmas) value = random.normal();
+  while (std::abs(value) > kMaxSigmas) value = random.normal();
   return sigma * value;
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kMilli = 1e-3;
 constexpr double kPercent = 1e-2;
-constexpr int kMostOrders = 100'000;
+constexpr int kMaxOrders = 100'000;
 
 void read(YamlSection& s, sim::BenchErrors& e) {
   s.number("mass_percent", e.mass, kPercent);
@@ -33,12 +33,12 @@ void read(YamlSection& s, sim::BenchTimes& t) {
 }
 
 void read(YamlSection& s, sim::BenchFaults& f) {
-  f.wrong_mass = s.reader().integer_or("wrong_mass", 0, kMostOrders, f.wrong_mass);
+  f.wrong_mass = s.reader().integer_or("wrong_mass", 0, kMaxOrders, f.wrong_mass);
   s.number("wrong_mass_factor", f.wrong_mass_factor);
-  f.bump = s.reader().integer_or("bump", 0, kMostOrders, f.bump);
+  f.bump = s.reader().integer_or("bump", 0, kMaxOrders, f.bump);
   s.numbers("bump_change", f.bump_change);
-  f.slip = s.reader().integer_or("slip", 0, kMostOrders, f.slip);
-  f.slip_tag = s.reader().integer_or("slip_tag", 0, kMostOrders, f.slip_tag);
+  f.slip = s.reader().integer_or("slip", 0, kMaxOrders, f.slip);
+  f.slip_tag = s.reader().integer_or("slip_tag", 0, kMaxOrders, f.slip_tag);
   s.numbers("slip_change", f.slip_change);
   s.numbers("drift_per_hour", f.drift_per_hour);
 }

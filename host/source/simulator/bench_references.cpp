@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kFilterStep = 1e-3;             // s
 constexpr double kStepVariance = 1.0 / 12;       // of whole counts, counts^2 (uniform)
-constexpr double kMostCounts = 32767;            // of a 16-bit reading
+constexpr double kMaxCounts = 32767;             // of a 16-bit reading
 constexpr std::uint64_t kFirstTick = 1'000'000;  // numbers of the seeds' streams
 constexpr std::uint64_t kScale = 1'000'001;
 constexpr std::uint64_t kPlace = 1'000'002;
@@ -114,7 +114,7 @@ bool SimulatedSixAxis::next(SimulatedReading& reading) noexcept {
     double value = sign(settings_.faults) * (i < 3 ? force[axis] : torque[axis]);
     if (!settings_.ideal) {
       const double per_unit = settings_.counts_per_unit[i];
-      const double most = std::min(settings_.range[i], kMostCounts / per_unit);
+      const double most = std::min(settings_.range[i], kMaxCounts / per_unit);
       reading.saturated = reading.saturated || std::abs(value) > most;
       value = std::clamp(value, -most, most) + settings_.noise_counts / per_unit * random_.normal();
       value = std::round(value * per_unit) / per_unit;

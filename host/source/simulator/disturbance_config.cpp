@@ -9,7 +9,7 @@ namespace tagwrench {
 namespace {
 
 constexpr double kMilli = 1e-3;
-constexpr int kMostMarks = 100;
+constexpr int kMaxMarks = 100;
 
 void read(YamlSection& s, sim::Occluder& o) {
   s.choice("shape", o.shape, {"band", "disc"});
@@ -49,9 +49,9 @@ void read(YamlSection& s, sim::TurningLight& t) {
 }
 
 void read(YamlSection& s, sim::Dirt& d) {
-  d.tag = s.reader().integer_or("tag", 0, kMostMarks, d.tag);
-  d.specks = s.reader().integer_or("specks", 0, kMostMarks, d.specks);
-  d.scratches = s.reader().integer_or("scratches", 0, kMostMarks, d.scratches);
+  d.tag = s.reader().integer_or("tag", 0, kMaxMarks, d.tag);
+  d.specks = s.reader().integer_or("specks", 0, kMaxMarks, d.specks);
+  d.scratches = s.reader().integer_or("scratches", 0, kMaxMarks, d.scratches);
   s.number("size_mm", d.size, kMilli);
   s.number("reflectance", d.reflectance);
 }
@@ -91,7 +91,7 @@ void read_disturbances(YamlReader reader, sim::Disturbances& d) {
     YamlSection s(reader.child("lost_frames"));
     s.number("share", d.lost_frames.share);
     d.lost_frames.most_in_a_row =
-        s.reader().integer_or("most_in_a_row", 1, kMostMarks, d.lost_frames.most_in_a_row);
+        s.reader().integer_or("most_in_a_row", 1, kMaxMarks, d.lost_frames.most_in_a_row);
     s.finish();
   }
   if (reader.has("random")) {

@@ -33,13 +33,13 @@ bool turn_at(const Occurrence& when, double from, double to, double& begin) noex
 }
 
 template <typename T>
-void add_going(const T& what, double begin, Few<Going<T>>& into, Happening& h) noexcept {
+void add_going(const T& what, double begin, StaticVector<Going<T>>& into, Happening& h) noexcept {
   into.push({what, begin});
   h.kinds |= bit(kind_of(what));
 }
 
 template <typename T>
-void add_all(const std::vector<T>& list, double from, double to, Few<Going<T>>& into,
+void add_all(const std::vector<T>& list, double from, double to, StaticVector<Going<T>>& into,
              Happening& h) noexcept {
   double begin = 0;
   for (const T& what : list) {

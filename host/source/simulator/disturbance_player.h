@@ -15,18 +15,18 @@ namespace tagwrench::sim {
 
 /// Up to eight of a kind at the same time; more are not shown.
 template <typename T>
-class Few {
+class StaticVector {
  public:
-  static constexpr std::size_t kMost = 8;
+  static constexpr std::size_t kMax = 8;
   void push(const T& item) noexcept {
-    if (count_ < kMost) items_[count_++] = item;
+    if (count_ < kMax) items_[count_++] = item;
   }
   const T* begin() const noexcept { return items_.data(); }
   const T* end() const noexcept { return items_.data() + count_; }
   bool empty() const noexcept { return count_ == 0; }
 
  private:
-  std::array<T, kMost> items_{};
+  std::array<T, kMax> items_{};
   std::size_t count_ = 0;
 };
 
@@ -46,13 +46,13 @@ struct DirtShown {
 
 /// Everything that goes on in one frame.
 struct Happening {
-  Few<Going<Occluder>> occluders;
-  Few<Going<Glare>> glare;
-  Few<Going<LightChange>> light;
-  Few<Going<Flicker>> flicker;
-  Few<Going<TurningLight>> turning_light;
-  Few<Going<FocusChange>> focus;
-  Few<DirtShown> dirt;
+  StaticVector<Going<Occluder>> occluders;
+  StaticVector<Going<Glare>> glare;
+  StaticVector<Going<LightChange>> light;
+  StaticVector<Going<Flicker>> flicker;
+  StaticVector<Going<TurningLight>> turning_light;
+  StaticVector<Going<FocusChange>> focus;
+  StaticVector<DirtShown> dirt;
   std::uint32_t kinds = 0;  ///< bit() of each DisturbanceKind that is there
 };
 

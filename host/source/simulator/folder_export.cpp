@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPartial = ".partial";  // where files wait until all are there
-constexpr int kMostFrames = 1'000'000;        // names have six digits
+constexpr int kMaxFrames = 1'000'000;         // names have six digits
 
 [[noreturn]] void cannot_write(const fs::path& path, const std::string& reason) {
   throw std::runtime_error(
@@ -172,8 +172,8 @@ std::string sensor_yaml(const Scenario& s) {
 }
 
 void export_folder(const Scenario& scenario, const fs::path& dir, int frames) {
-  if (frames < 1 || frames > kMostFrames) {
-    throw ConfigError(fmt::format("--frames: must lie between 1 and {}", kMostFrames));
+  if (frames < 1 || frames > kMaxFrames) {
+    throw ConfigError(fmt::format("--frames: must lie between 1 and {}", kMaxFrames));
   }
   const std::string wrong = problem(scenario);
   if (!wrong.empty()) throw ConfigError("scenario: " + wrong);

@@ -9,7 +9,7 @@
 namespace tagwrench::sim {
 namespace {
 
-constexpr double kLongestGap = 2.0;  // s
+constexpr double kMaxGap = 2.0;  // s
 
 Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -170,7 +170,7 @@ void PlatformMotion::restart(double time) noexcept {
 
 void PlatformMotion::advance_to(double time) noexcept {
   const double last = start_time_ + static_cast<double>(newest_) * kStep;
-  if (time - last > kLongestGap) restart(time - kLongestGap);
+  if (time - last > kMaxGap) restart(time - kMaxGap);
   while (start_time_ + static_cast<double>(newest_) * kStep < time) step();
 }
 

@@ -11,7 +11,7 @@ namespace tagwrench::sim {
 namespace {
 
 constexpr int kVisibilityGrid = 16;  // points along each side of a tag
-constexpr double kLeastContrast_counts = 10;
+constexpr double kMinContrast_counts = 10;
 constexpr double kSpotReach = 5;  // sigmas, where a spot of light ends
 
 // wave[i] = amplitude sin(k i + phase), by turning a phasor; k in rad per px.
@@ -165,7 +165,7 @@ void Renderer::judge_visibility(double middle_time) noexcept {
                 .cwiseProduct(Eigen::Vector3d(target_.tag_size, target_.tag_size, 0));
         if (point.z() <= 0) continue;
         const Eigen::Vector2d pixel = project(camera_, point.head<2>() / point.z());
-        visible += contrast_at(pixel, middle_time) >= kLeastContrast_counts ? 1 : 0;
+        visible += contrast_at(pixel, middle_time) >= kMinContrast_counts ? 1 : 0;
       }
     }
     visible_[tag] = visible / static_cast<double>(kVisibilityGrid * kVisibilityGrid);

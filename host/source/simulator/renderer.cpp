@@ -18,8 +18,8 @@ constexpr double kPadMargin = 0.7e-3;    // m
 constexpr double kBlurPerPass_px = 3.0;
 constexpr double kStill_px = 2e-3;
 constexpr double kEvenInstantsPerPixel = 3;
-constexpr int kFewestEvenInstants = 4;
-constexpr int kMostEvenInstants = 32;
+constexpr int kMinEvenInstants = 4;
+constexpr int kMaxEvenInstants = 32;
 constexpr double kLightSlant = 0.35;   // of the LED's direction against the optical axis
 constexpr double kNearest = 1e-3;      // m, nothing is drawn nearer to the lens
 constexpr double kTexelsPerPixel = 2;  // of the tags, at rest
@@ -27,7 +27,7 @@ constexpr double kTexelsPerPixel = 2;  // of the tags, at rest
 // is left, which changes with focus, to the picture. Were it all in the picture, the sampled edges
 // would depend on their place in the pixel: 0.1 grey level, but alike along the whole of an edge,
 // which in alignment is worth 0.17 um in z.
-constexpr double kMostBeforeSampling_px = 0.6;
+constexpr double kMaxBeforeSampling_px = 0.6;
 
 std::size_t pixel_count(const Camera& camera) {
   return static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
@@ -243,8 +243,8 @@ int Renderer::instants_for(const RigidPose& first, const RigidPose& middle,
   if (exposure_.even) {
     const double way_px = farthest_px(first, middle) + farthest_px(middle, last);
     if (way_px < kStill_px) return 1;
-    return std::clamp(static_cast<int>(std::ceil(kEvenInstantsPerPixel * way_px)),
-                      kFewestEvenInstants, kMostEvenInstants);
+    return std::clamp(static_cast<int>(std::ceil(kEvenInstantsPerPixel * way_px)), kMinEvenInstants,
+                      kMaxEvenInstants);
   }
   const double blur_px = farthest_px(first, last);
   const int passes =
@@ -349,7 +349,7 @@ double Renderer::depth_at_row(int row) const noexcept {
 
 // Standard deviation of the part of the point spread that the tags' textures have.
 double Renderer::before_sampling_px() const noexcept {
-  return std::min(optics_.psf_sigma_px, kMostBeforeSampling_px);
+  return std::min(optics_.psf_sigma_px, kMaxBeforeSampling_px);
 }
 
 void Renderer::choose_point_spread(double focus_distance) noexcept {

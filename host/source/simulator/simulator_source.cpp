@@ -15,9 +15,9 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kWarmUp = 0.05;      // s, simulated before the first frame
-constexpr double kShortest = 50e-6;   // s, exposure that can be set
-constexpr double kMostJitters = 8.0;  // more than the mean delay; keeps the stamps in order
+constexpr double kWarmUp = 0.05;     // s, simulated before the first frame
+constexpr double kMin = 50e-6;       // s, exposure that can be set
+constexpr double kMaxJitters = 8.0;  // more than the mean delay; keeps the stamps in order
 constexpr int kExposureSteps = 16;
 
 const sim::Scenario& checked(const sim::Scenario& scenario) {
@@ -94,7 +94,7 @@ TimePoint SimulatorSource::delivery_time(std::uint64_t sequence) const noexcept 
   const sim::Delivery& delivery = scenario_.delivery;
   if (delivery.latency <= 0) return exposed;
   sim::Random random = sim::Random::numbered(scenario_.seed, sim::kDeliveryJitter, sequence);
-  const double exponential = std::min(-std::log(1 - random.uniform()), kMostJitters);
+  const double exponential = std::min(-std::log(1 - random.uniform()), kMaxJitters);
   return exposed + to_duration(delivery.latency + delivery.jitter * (exponential - 1));
 }
 
@@ -126,7 +126,7 @@ bool SimulatorSource::stale(std::uint64_t sequence) const noexcept {
 
 CameraLight::Range SimulatorSource::exposure_range_us() const noexcept {
   const double longest = sim::true_period(scenario_) - scenario_.exposure.rolling_readout;
-  return {kShortest * 1e6, std::max(kShortest, longest) * 1e6};
+  return {kMin * 1e6, std::max(kMin, longest) * 1e6};
 }
 
 bool SimulatorSource::set_exposure_us(double exposure_us) noexcept {
@@ -139,7 +139,7 @@ bool SimulatorSource::set_exposure_us(double exposure_us) noexcept {
 
 bool SimulatorSource::set_gain(double gain) noexcept {
   if (!std::isfinite(gain)) return false;
-  renderer_.set_exposure(renderer_.exposure(), std::clamp(gain, 1.0, kMostGain));
+  renderer_.set_exposure(renderer_.exposure(), std::clamp(gain, 1.0, kMaxGain));
   return true;
 }
 

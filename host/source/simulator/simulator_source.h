@@ -48,7 +48,7 @@ namespace tagwrench {
 /// ever. Frames that the scenario loses are skipped and counted on either clock.
 class SimulatorSource final : public FrameSource, private CameraLight {
  public:
-  static constexpr double kMostGain = 8;
+  static constexpr double kMaxGain = 8;
 
   /// Throws ConfigError if the scenario cannot be simulated. `led`, borrowed, lights the scene in
   /// place of the scenario's even light, `load`, borrowed, loads the platform in place of the
@@ -71,7 +71,7 @@ class SimulatorSource final : public FrameSource, private CameraLight {
   Range exposure_range_us() const noexcept override;
   double exposure_us() const noexcept override { return renderer_.exposure() * 1e6; }
   bool set_exposure_us(double exposure_us) noexcept override;
-  Range gain_range() const noexcept override { return {1, kMostGain}; }
+  Range gain_range() const noexcept override { return {1, kMaxGain}; }
   double gain() const noexcept override { return renderer_.sensor_gain(); }
   bool set_gain(double gain) noexcept override;
 

@@ -38,10 +38,10 @@ constexpr std::array<Family, 21> kFamilies{{
     {"apriltag_36h11", cv::aruco::DICT_APRILTAG_36h11},
 }};
 
-constexpr double kInkGrainSize = 22e-6;     // m, toner clusters and paper fibres
-constexpr double kInkEdgeSize = 45e-6;      // m, correlation length of the ink's edge
-constexpr double kCutSize = 140e-6;         // m, correlation length of the scissors' edge
-constexpr double kLargestRaggedness = 3.0;  // standard deviations; the texture ends there
+constexpr double kInkGrainSize = 22e-6;  // m, toner clusters and paper fibres
+constexpr double kInkEdgeSize = 45e-6;   // m, correlation length of the ink's edge
+constexpr double kCutSize = 140e-6;      // m, correlation length of the scissors' edge
+constexpr double kMaxRaggedness = 3.0;   // standard deviations; the texture ends there
 
 constexpr std::string_view kGrid = "grid_10x10";  // host/core/grid_tags.h
 
@@ -156,7 +156,7 @@ TagCells tag_cells(const std::string& family, int id) {
 Texture print_tag(const Target& target, const TagCells& cells, double texels_per_m,
                   std::uint64_t seed) {
   const double half_paper = 0.5 * target.tag_size + target.border;
-  const double half = half_paper + kLargestRaggedness * target.paper_raggedness;
+  const double half = half_paper + kMaxRaggedness * target.paper_raggedness;
   Texture t = Texture::of_size(half, half, texels_per_m);
   Random random(seed, kPrint);
   const SmoothNoise ink_x(random, kInkEdgeSize), ink_y(random, kInkEdgeSize);
@@ -164,7 +164,7 @@ Texture print_tag(const Target& target, const TagCells& cells, double texels_per
   const SmoothNoise grain(random, kInkGrainSize);
   const InkCoverage ink(cells, target.tag_size, target.ink_spread);
   const double h = 0.5 / texels_per_m;
-  const double limit = kLargestRaggedness * target.paper_raggedness;
+  const double limit = kMaxRaggedness * target.paper_raggedness;
   for (int v = 0; v < t.height; ++v) {
     for (int u = 0; u < t.width; ++u) {
       const double x = t.x(u);

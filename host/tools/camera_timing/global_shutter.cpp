@@ -17,7 +17,7 @@ constexpr double kNoise = 0.03;     // of the brightness; the response may bend 
 constexpr double kOutliers = 0.03;  // share of pictures of any brightness
 constexpr double kReach = 4;        // standard deviations of the delay
 constexpr double kLevel = 1e-6;     // slope of the brightness, per exposure
-constexpr int kFewestSteps = 40, kMostSteps = 400;
+constexpr int kMinSteps = 40, kMaxSteps = 400;
 constexpr double kStepsPerExposure = 20;
 
 struct Moments {
@@ -28,7 +28,8 @@ struct Moments {
 
 class Likelihood {
  public:
-  Likelihood(const BandwidthInput& input, const LightSignal& light) : input_(input), light_(light) {
+  Likelihood(const CameraTimingInput& input, const LightSignal& light)
+      : input_(input), light_(light) {
     for (const ObservedFrame& frame : input.frames) {
       double sum = 0, gains = 0;
       for (std::size_t b = 0; b < input.bands.size(); ++b) {
@@ -48,9 +49,8 @@ class Likelihood {
   Moments of(std::size_t picture, const Parameters& p) const {
     const double jitter = std::exp(p[1]), exposure = std::exp(p[2]);
     const double middle = input_.frames[picture].stamp - p[0];
-    const int steps =
-        std::clamp(static_cast<int>(2 * kReach * jitter / exposure * kStepsPerExposure),
-                   kFewestSteps, kMostSteps);
+    const int steps = std::clamp(
+        static_cast<int>(2 * kReach * jitter / exposure * kStepsPerExposure), kMinSteps, kMaxSteps);
     double weights = 0, sum = 0, first = 0, second = 0, level = 0;
     double least = std::numeric_limits<double>::infinity();
     for (int k = 0; k < steps; ++k) {
@@ -81,7 +81,7 @@ class Likelihood {
   }
 
  private:
-  const BandwidthInput& input_;
+  const CameraTimingInput& input_;
   const LightSignal& light_;
   std::vector<double> brightness_;  ///< 0 dark, 1 lit, about
 };
@@ -153,7 +153,7 @@ bool covariance(const Likelihood& likelihood, const Parameters& at, const Parame
 
 }  // namespace
 
-GlobalShutter fit_global_shutter(const BandwidthInput& input, const LightSignal& light,
+GlobalShutter fit_global_shutter(const CameraTimingInput& input, const LightSignal& light,
                                  const GlobalShutter& start) {
   const Likelihood likelihood(input, light);
   const Parameters wide(0.3 * input.bit, 0.5, 0.5, 0.03, 0.05);

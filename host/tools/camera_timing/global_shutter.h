@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "host/tools/camera_timing/bandwidth.h"
+#include "host/tools/camera_timing/camera_timing.h"
 #include "host/tools/camera_timing/light_signal.h"
 
 namespace tagwrench {
@@ -23,7 +23,7 @@ struct GlobalShutter {
 /// Greatest likelihood, each picture's time integrated out: its delay normal about the latency, its
 /// brightness that of the light at that time, but for a few outliers (stale ones). `start` is where
 /// to look: latency to half a bit, jitter and exposure to a factor of two.
-GlobalShutter fit_global_shutter(const BandwidthInput& input, const LightSignal& light,
+GlobalShutter fit_global_shutter(const CameraTimingInput& input, const LightSignal& light,
                                  const GlobalShutter& start);
 
 }  // namespace tagwrench

@@ -7,7 +7,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kShortest = 20e-6;  // s; less is no different from an instant, but for rounding
+constexpr double kMin = 20e-6;  // s; less is no different from an instant, but for rounding
 
 }  // namespace
 
@@ -59,10 +59,10 @@ LightSignal::Integrals LightSignal::at(double time) const noexcept {
 SeenLight LightSignal::seen(const RowBand& band, const ExposureTimes& times) const noexcept {
   const double first = band.first - 0.5;
   const double last = band.last - 0.5;
-  const double exposure = std::max(times.exposure, kShortest);
+  const double exposure = std::max(times.exposure, kMin);
   const double half = 0.5 * exposure;
   const double width = times.readout * (last - first);
-  if (std::abs(width) < kShortest) {
+  if (std::abs(width) < kMin) {
     const double place = 0.5 * (first + last);
     const double centre = times.middle + times.readout * place;
     const Integrals begin = at(centre - half);

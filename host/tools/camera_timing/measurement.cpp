@@ -16,16 +16,16 @@ constexpr double kSettle = 0.6;  // s, longer than the longest latency that is l
 constexpr double kDarkSeconds = 0.6;
 constexpr double kPatience = 3;  // s without a frame
 constexpr int kWhite_counts = 235;
-constexpr double kMostWhite = 0.02;  // of a picture that is not too bright
+constexpr double kMaxWhite = 0.02;  // of a picture that is not too bright
 constexpr double kShorten = 0.4;
-constexpr int kMostShortenings = 6;
+constexpr int kMaxShortenings = 6;
 constexpr std::uint16_t kSeed = 0x2A5C;
 
 double seconds(TimePoint time) {
   return std::chrono::duration<double>(time.time_since_epoch()).count();
 }
 
-double white_part(const ImageView& image) {
+double white_fraction(const ImageView& image) {
   std::size_t white = 0;
   for (int row = 0; row < image.height; ++row) {
     const std::uint8_t* pixels = image.pixels + static_cast<std::ptrdiff_t>(row) * image.stride;
@@ -37,13 +37,13 @@ double white_part(const ImageView& image) {
 
 class Run {
  public:
-  Run(FrameSource& source, PatternLamp& lamp, const BandwidthOptions& options)
+  Run(FrameSource& source, PatternLamp& lamp, const CameraTimingOptions& options)
       : source_(source),
         lamp_(lamp),
         options_(options),
         profiler_(source.format().width, source.format().height) {}
 
-  BandwidthMeasurement measure();
+  CameraTimingMeasurement measure();
 
  private:
   bool next(Frame& frame);
@@ -64,10 +64,10 @@ class Run {
 
   FrameSource& source_;
   PatternLamp& lamp_;
-  const BandwidthOptions& options_;
+  const CameraTimingOptions& options_;
   RowProfiler profiler_;
-  BandwidthInput input_;
-  BandwidthMeasurement out_;
+  CameraTimingInput input_;
+  CameraTimingMeasurement out_;
 };
 
 bool Run::fail(std::string why) {
@@ -120,10 +120,10 @@ bool Run::settle() {
 
 bool Run::shorten_exposure() {
   CameraLight* camera = source_.camera_light();
-  for (int i = 0; i < kMostShortenings; ++i) {
+  for (int i = 0; i < kMaxShortenings; ++i) {
     Frame frame;
     if (!next(frame)) return false;
-    if (white_part(frame.image) <= kMostWhite) return true;
+    if (white_fraction(frame.image) <= kMaxWhite) return true;
     if (camera == nullptr) return true;  // the profiler will say
     const double wanted =
         std::max(kShorten * camera->exposure_us(), camera->exposure_range_us().least);
@@ -188,11 +188,11 @@ void Run::evaluate() {
     light = link::pattern_light(state);
     state = link::next_pattern_state(state);
   }
-  out_.result = measure_bandwidth(input_);
+  out_.result = measure_camera_timing(input_);
   out_.refusal = out_.result.refusal;
 }
 
-BandwidthMeasurement Run::measure() {
+CameraTimingMeasurement Run::measure() {
   const auto say = [&](const std::string& line) {
     if (options_.say) options_.say(line);
   };
@@ -206,9 +206,9 @@ BandwidthMeasurement Run::measure() {
   }
   if (good) {
     out_.refusal = profiler_.choose();
-    out_.used_part = profiler_.used_part();
-    out_.saturated_part = profiler_.saturated_part();
-    out_.ambient_part = profiler_.ambient_part();
+    out_.used_fraction = profiler_.used_fraction();
+    out_.saturated_fraction = profiler_.saturated_fraction();
+    out_.ambient_fraction = profiler_.ambient_fraction();
     good = out_.refusal.empty();
   }
   if (good) {
@@ -225,8 +225,8 @@ BandwidthMeasurement Run::measure() {
 
 }  // namespace
 
-BandwidthMeasurement measure_bandwidth(FrameSource& source, PatternLamp& lamp,
-                                       const BandwidthOptions& options) {
+CameraTimingMeasurement measure_camera_timing(FrameSource& source, PatternLamp& lamp,
+                                              const CameraTimingOptions& options) {
   return Run(source, lamp, options).measure();
 }
 

@@ -1,4 +1,4 @@
-// `tagwrench bandwidth` without its options: a camera, a lamp, and what is done with them.
+// `tagwrench camera-timing` without its options: a camera, a lamp, and what is done with them.
 #pragma once
 
 #include <functional>
@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "host/source/frame_source.h"
-#include "host/tools/camera_timing/bandwidth.h"
+#include "host/tools/camera_timing/camera_timing.h"
 #include "host/tools/camera_timing/pattern_lamp.h"
 #include "host/tools/camera_timing/row_profile.h"
 
 namespace tagwrench {
 
-struct BandwidthOptions {
+struct CameraTimingOptions {
   double seconds = 10;             ///< of pattern
   int reference_permille = 1000;   ///< level of the LED that a pattern's bits have
   double reference_seconds = 2.5;  ///< of steady light; the frames are handed to `process`
@@ -23,22 +23,23 @@ struct BandwidthOptions {
   std::function<void(const std::string&)> say;  ///< what is being done; may be empty
 };
 
-struct BandwidthMeasurement {
+struct CameraTimingMeasurement {
   std::string refusal;  ///< one line: why there is no result
   bool failed =
       false;  ///< the refusal is a fault of the run (stopped, unplugged), not of the scene
-  BandwidthResult result;
+  CameraTimingResult result;
   std::vector<double> processing;  ///< stamp to output of each processed frame, s, ascending
-  double used_part = 0, saturated_part = 0, ambient_part = 0;  ///< of the picture; see RowProfiler
-  double exposure_set_us = 0;  ///< that the camera was set to for it; 0: left alone
-  double bit = 0;              ///< s
-  double edge_sigma = 0;       ///< s, of the pattern on the host's clock
+  double used_fraction = 0, saturated_fraction = 0,
+         ambient_fraction = 0;  ///< of the picture; see RowProfiler
+  double exposure_set_us = 0;   ///< that the camera was set to for it; 0: left alone
+  double bit = 0;               ///< s
+  double edge_sigma = 0;        ///< s, of the pattern on the host's clock
 };
 
 /// Takes reference pictures with the LED steady and off, then pictures of the pattern. On a virtual
 /// clock as fast as it goes. The exposure is shortened if the LED alone makes the picture white,
 /// and put back.
-BandwidthMeasurement measure_bandwidth(FrameSource& source, PatternLamp& lamp,
-                                       const BandwidthOptions& options);
+CameraTimingMeasurement measure_camera_timing(FrameSource& source, PatternLamp& lamp,
+                                              const CameraTimingOptions& options);
 
 }  // namespace tagwrench

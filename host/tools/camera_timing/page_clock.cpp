@@ -5,11 +5,11 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kLongest_ms = 1e12;  // thirty years: no page is older
-constexpr double kDrift = 1e-4;       // two ordinary crystals, 50 ppm each
+constexpr double kMax_ms = 1e12;  // thirty years: no page is older
+constexpr double kDrift = 1e-4;   // two ordinary crystals, 50 ppm each
 
 bool is_reading(double page_ms) {
-  return std::isfinite(page_ms) && page_ms >= 0 && page_ms <= kLongest_ms;
+  return std::isfinite(page_ms) && page_ms >= 0 && page_ms <= kMax_ms;
 }
 
 Duration from_ms(double ms) { return Duration(std::llround(1e6 * ms)); }

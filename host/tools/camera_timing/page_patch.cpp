@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "host/core/config_error.h"
-#include "host/web/server/ask.h"
+#include "host/web/server/page_request.h"
 
 namespace tagwrench {
 namespace {
@@ -21,7 +21,7 @@ using nlohmann::json;
 
 constexpr int kExchanges = 16;                          // before the first flip
 constexpr auto kSlack = std::chrono::milliseconds(20);  // browsers round their clocks
-constexpr auto kLongestDelay = std::chrono::seconds(1);
+constexpr auto kMaxDelay = std::chrono::seconds(1);
 
 const WebOptions& with_page(const WebOptions& options) {
   const auto page = options.pages / "flip/index.html";
@@ -73,7 +73,7 @@ bool PagePatch::wait_for_page(int stop_fd) {
 
 void PagePatch::show(bool white, TimePoint when) {
   const TimePoint now = Clock::now();
-  const Duration delay = std::clamp<Duration>(when - now, Duration::zero(), kLongestDelay);
+  const Duration delay = std::clamp<Duration>(when - now, Duration::zero(), kMaxDelay);
   const std::lock_guard lock(mutex_);
   shown_.reset();
   flip_sent_ = now;
@@ -108,37 +108,38 @@ std::string PagePatch::description() const {
                      1e-6 * static_cast<double>(clock_error().count()));
 }
 
-void PagePatch::ask(Ask ask) {
-  const std::string trouble = take(ask);
-  server_.answer(ask.page, ask.id, trouble.empty(), trouble);
+void PagePatch::handle(PageRequest request) {
+  const std::string trouble = take(request);
+  server_.answer(request.page, request.id, trouble.empty(), trouble);
   const std::lock_guard lock(mutex_);
-  if (page_ == ask.page && ended_.empty() && (ask.what == "screen" || ask.what == "flipped"))
+  if (page_ == request.page && ended_.empty() &&
+      (request.what == "screen" || request.what == "flipped"))
     send_time();
 }
 
 /// What is wrong with it; empty: nothing.
-std::string PagePatch::take(const Ask& ask) {
+std::string PagePatch::take(const PageRequest& request) {
   const std::lock_guard lock(mutex_);
   if (!ended_.empty()) return "it is over: " + ended_;
-  if (ask.what == "screen") {
-    if (page_ && *page_ != ask.page) return "another page is the screen; close it there first";
-    page_ = ask.page;
+  if (request.what == "screen") {
+    if (page_ && *page_ != request.page) return "another page is the screen; close it there first";
+    page_ = request.page;
     return {};
   }
-  if (page_ != ask.page) return "this page is not the screen";
-  if (ask.what == "time") return take_time(ask);
-  if (ask.what == "flipped") return take_flip(ask);
-  if (ask.what == "leave") {
+  if (page_ != request.page) return "this page is not the screen";
+  if (request.what == "time") return take_time(request);
+  if (request.what == "flipped") return take_flip(request);
+  if (request.what == "leave") {
     end("somebody ended it at the page");
     return {};
   }
-  return fmt::format("'{}' is nothing that a screen can ask", ask.what);
+  return fmt::format("'{}' is nothing that a screen can ask", request.what);
 }
 
-std::string PagePatch::take_time(const Ask& ask) {
-  if (exchange_ == 0 || !is_number(ask.arguments, "number", exchange_))
+std::string PagePatch::take_time(const PageRequest& request) {
+  if (exchange_ == 0 || !is_number(request.arguments, "number", exchange_))
     return "nobody asked for the time";
-  const std::optional<double> page_ms = number(ask.arguments, "page_ms");
+  const std::optional<double> page_ms = number(request.arguments, "page_ms");
   if (!page_ms || !clock_.exchange(exchange_sent_, *page_ms, Clock::now()))
     return "page_ms must be the page's time in milliseconds";
   if (!ready_ && clock_.exchanges() < kExchanges) {
@@ -150,10 +151,10 @@ std::string PagePatch::take_time(const Ask& ask) {
   return {};
 }
 
-std::string PagePatch::take_flip(const Ask& ask) {
-  if (flip_ == 0 || !is_number(ask.arguments, "number", flip_) || shown_)
+std::string PagePatch::take_flip(const PageRequest& request) {
+  if (flip_ == 0 || !is_number(request.arguments, "number", flip_) || shown_)
     return "no such flip was ordered";
-  const std::optional<double> page_ms = number(ask.arguments, "page_ms");
+  const std::optional<double> page_ms = number(request.arguments, "page_ms");
   const std::optional<TimePoint> at = page_ms ? clock_.host_time(*page_ms) : std::nullopt;
   if (!at) return "page_ms must be the page's time in milliseconds";
   const Duration slack = clock_.error() + kSlack;

@@ -15,7 +15,7 @@ namespace tagwrench {
 
 /// Serves host/web/pages/flip and tells it when to flip; the page tells when it has, by its own
 /// clock, which exchanges of messages put on the host's. Messages: host/web/README.md.
-class PagePatch final : public FlipPatch, private AskHandler {
+class PagePatch final : public FlipPatch, private PageRequestHandler {
  public:
   /// Throws ConfigError: the address cannot be used or needs a token, or the page is not built.
   explicit PagePatch(const WebOptions& options);
@@ -38,11 +38,11 @@ class PagePatch final : public FlipPatch, private AskHandler {
 
  private:
   // The server's thread.
-  void ask(Ask ask) override;
+  void handle(PageRequest request) override;
   void page_gone(std::uint64_t page) override;
-  std::string take(const Ask& ask);
-  std::string take_time(const Ask& ask);
-  std::string take_flip(const Ask& ask);
+  std::string take(const PageRequest& request);
+  std::string take_time(const PageRequest& request);
+  std::string take_flip(const PageRequest& request);
   void send_time();
 
   void end(std::string why);  ///< with the mutex held

@@ -33,12 +33,12 @@ std::string milliseconds(const Figure& figure) {
   return with_sigma(1e3 * figure.value, 1e3 * figure.sigma, "ms");
 }
 
-bool rolls(const BandwidthResult& r) {
+bool rolls(const CameraTimingResult& r) {
   return r.readout.known && std::abs(r.readout.value) > kRolls * r.readout.sigma &&
          std::abs(r.readout.value) > 1e-4;
 }
 
-std::string shutter(const BandwidthResult& r) {
+std::string shutter(const CameraTimingResult& r) {
   if (!r.readout.known) return "";
   if (!rolls(r)) return "all rows at once: a global shutter";
   return r.readout.value > 0 ? "first row to last: a rolling shutter"
@@ -61,8 +61,8 @@ class Lines {
   std::string text_;
 };
 
-void add_latency(const BandwidthMeasurement& m, Lines& lines) {
-  const BandwidthResult& r = m.result;
+void add_latency(const CameraTimingMeasurement& m, Lines& lines) {
+  const CameraTimingResult& r = m.result;
   lines.add("latency", milliseconds(r.latency),
             "mean, from the middle of the exposure to the kernel's time stamp");
   if (r.latency.known && r.timed > 0) {
@@ -75,7 +75,8 @@ void add_latency(const BandwidthMeasurement& m, Lines& lines) {
   lines.add("exposure", milliseconds(r.exposure), "of each row");
 }
 
-void add_processing(const BandwidthMeasurement& m, const BandwidthSetting& setting, Lines& lines) {
+void add_processing(const CameraTimingMeasurement& m, const CameraTimingSetting& setting,
+                    Lines& lines) {
   if (m.processing.empty()) return;
   const double median = quantile(m.processing, 0.5);
   lines.add("processing", fmt::format("{:.2f} ms", 1e3 * median),
@@ -94,8 +95,8 @@ nlohmann::json figure(const Figure& f) {
 
 }  // namespace
 
-std::string report_text(const BandwidthMeasurement& m, const BandwidthSetting& setting) {
-  const BandwidthResult& r = m.result;
+std::string report_text(const CameraTimingMeasurement& m, const CameraTimingSetting& setting) {
+  const CameraTimingResult& r = m.result;
   Lines lines;
   lines.add("camera", setting.camera);
   lines.add("lamp", setting.lamp);
@@ -118,9 +119,9 @@ std::string report_text(const BandwidthMeasurement& m, const BandwidthSetting& s
                         r.dropped_by_driver, r.stale));
   if (r.strange > 0)
     lines.add("strange", percent(r.strange, r.frames), "that show the light of no time near");
-  lines.add("light", fmt::format("{:.1f} % not the LED's", 100 * m.ambient_part),
-            fmt::format("{:.0f} % of the picture used, {:.1f} % white", 100 * m.used_part,
-                        100 * m.saturated_part));
+  lines.add("light", fmt::format("{:.1f} % not the LED's", 100 * m.ambient_fraction),
+            fmt::format("{:.0f} % of the picture used, {:.1f} % white", 100 * m.used_fraction,
+                        100 * m.saturated_fraction));
   if (m.exposure_set_us > 0) {
     lines.add("", fmt::format("exposure {:.1f} ms", 1e-3 * m.exposure_set_us),
               "set for this measurement, or the LED had made the picture white");
@@ -134,8 +135,8 @@ std::string report_text(const BandwidthMeasurement& m, const BandwidthSetting& s
   return lines.take();
 }
 
-std::string report_json(const BandwidthMeasurement& m, const BandwidthSetting& setting) {
-  const BandwidthResult& r = m.result;
+std::string report_json(const CameraTimingMeasurement& m, const CameraTimingSetting& setting) {
+  const CameraTimingResult& r = m.result;
   nlohmann::ordered_json json;
   json["format"] = "tagwrench-bandwidth-1";
   json["camera"] = setting.camera;
@@ -167,9 +168,9 @@ std::string report_json(const BandwidthMeasurement& m, const BandwidthSetting& s
                     {"strange", r.strange},
                     {"missing", r.missing},
                     {"driver_dropped", r.dropped_by_driver}};
-  json["light"] = {{"ambient_part", m.ambient_part},
-                   {"used_part", m.used_part},
-                   {"saturated_part", m.saturated_part}};
+  json["light"] = {{"ambient_part", m.ambient_fraction},
+                   {"used_part", m.used_fraction},
+                   {"saturated_part", m.saturated_fraction}};
   json["exposure_set_us"] = m.exposure_set_us > 0 ? nlohmann::json(m.exposure_set_us) : nullptr;
   json["bit_s"] = m.bit;
   json["edge_sigma_s"] = m.edge_sigma;

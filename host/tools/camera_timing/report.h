@@ -1,4 +1,4 @@
-// What `tagwrench bandwidth` says: for people, and as JSON.
+// What `tagwrench camera-timing` says: for people, and as JSON.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace tagwrench {
 
-struct BandwidthSetting {
+struct CameraTimingSetting {
   std::string camera;           ///< one line about the source
   std::string lamp;             ///< one line about the lamp
   std::string output;           ///< where processed frames went: "wrench sensor"
@@ -15,9 +15,11 @@ struct BandwidthSetting {
 };
 
 /// Some twenty lines.
-std::string report_text(const BandwidthMeasurement& measurement, const BandwidthSetting& setting);
+std::string report_text(const CameraTimingMeasurement& measurement,
+                        const CameraTimingSetting& setting);
 
 /// One object; figures that the pictures cannot tell are null.
-std::string report_json(const BandwidthMeasurement& measurement, const BandwidthSetting& setting);
+std::string report_json(const CameraTimingMeasurement& measurement,
+                        const CameraTimingSetting& setting);
 
 }  // namespace tagwrench

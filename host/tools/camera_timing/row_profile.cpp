@@ -8,12 +8,12 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kWhite_counts = 235;     // mean of a pixel that is sometimes clipped
-constexpr double kLeastRise_counts = 12;  // of a pixel that the LED lights
-constexpr double kLeastUsed = 0.05;       // of the picture
-constexpr double kMostSaturated = 0.5;    // of the picture
-constexpr double kMostAmbient = 0.8;
-constexpr int kLeastBandPixels = 64;
+constexpr double kWhite_counts = 235;   // mean of a pixel that is sometimes clipped
+constexpr double kMinRise_counts = 12;  // of a pixel that the LED lights
+constexpr double kMinUsed = 0.05;       // of the picture
+constexpr double kMaxSaturated = 0.5;   // of the picture
+constexpr double kMaxAmbient = 0.8;
+constexpr int kMinBandPixels = 64;
 
 }  // namespace
 
@@ -41,24 +41,24 @@ std::string RowProfiler::choose() {
     const double bright = lit_.mean(i), dim = dark_.mean(i);
     rise = std::max(rise, bright - dim);
     saturated_count_ += bright >= kWhite_counts ? 1 : 0;
-    used_[i] = bright < kWhite_counts && bright - dim >= kLeastRise_counts ? 1 : 0;
+    used_[i] = bright < kWhite_counts && bright - dim >= kMinRise_counts ? 1 : 0;
     used_count_ += used_[i];
     lit += used_[i] * bright;
     dark += used_[i] * dim;
   }
-  if (saturated_part() > kMostSaturated) {
+  if (saturated_fraction() > kMaxSaturated) {
     return fmt::format(
         "{:.0f} % of the picture is white when the LED is on: shorten the exposure or dim the room",
-        100 * saturated_part());
+        100 * saturated_fraction());
   }
-  if (used_part() < kLeastUsed) {
+  if (used_fraction() < kMinUsed) {
     return fmt::format(
         "the LED does not show in the picture (it makes no pixel brighter by more than {:.0f} grey "
         "levels, or too few): is it before this camera, wired and lit?",
         rise);
   }
   ambient_part_ = lit > 0 ? dark / lit : 0;
-  if (ambient_part_ > kMostAmbient) {
+  if (ambient_part_ > kMaxAmbient) {
     return fmt::format(
         "{:.0f} % of the light is not the LED's: shade the sensor, or shorten the exposure",
         100 * ambient_part_);
@@ -67,18 +67,18 @@ std::string RowProfiler::choose() {
   return {};
 }
 
-double RowProfiler::used_part() const noexcept {
+double RowProfiler::used_fraction() const noexcept {
   return static_cast<double>(used_count_) / static_cast<double>(used_.size());
 }
 
-double RowProfiler::saturated_part() const noexcept {
+double RowProfiler::saturated_fraction() const noexcept {
   return static_cast<double>(saturated_count_) / static_cast<double>(used_.size());
 }
 
 // A band's place and height are those of its light: rows have no height in time, and the brighter
 // ones count for more.
 void RowProfiler::make_bands() {
-  const int bands = std::min(kMostBands, height_);
+  const int bands = std::min(kMaxBands, height_);
   for (int band = 0; band < bands; ++band) {
     const int first = band * height_ / bands;
     const int last = (band + 1) * height_ / bands;
@@ -98,7 +98,7 @@ void RowProfiler::make_bands() {
         ++count;
       }
     }
-    if (count < kLeastBandPixels) continue;
+    if (count < kMinBandPixels) continue;
     const double mean = rows / (bright - dim);
     const double variance = std::max(squares / (bright - dim) - mean * mean, 0.0);
     const double half = std::sqrt(3 * variance) / height_;  // an even band that scatters as much

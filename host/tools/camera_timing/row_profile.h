@@ -17,7 +17,7 @@ using RowProfile = std::vector<double>;
 /// Learns which pixels to use from pictures of one scene, lit and dark; then measures.
 class RowProfiler {
  public:
-  static constexpr int kMostBands = 48;
+  static constexpr int kMaxBands = 48;
 
   RowProfiler(int width, int height);
 
@@ -31,10 +31,10 @@ class RowProfiler {
   const std::vector<RowBand>& bands() const noexcept { return bands_; }
   const RowProfile& lit() const noexcept { return lit_profile_; }
   const RowProfile& dark() const noexcept { return dark_profile_; }
-  double used_part() const noexcept;       ///< of the pixels
-  double saturated_part() const noexcept;  ///< of the pixels, when lit
+  double used_fraction() const noexcept;       ///< of the pixels
+  double saturated_fraction() const noexcept;  ///< of the pixels, when lit
   /// Light that is not the LED's, over all light, of the pixels in use, 0..1.
-  double ambient_part() const noexcept { return ambient_part_; }
+  double ambient_fraction() const noexcept { return ambient_part_; }
 
   RowProfile measure(const ImageView& image) const;
 

@@ -16,14 +16,14 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kSettle = 0.6;       // s
-constexpr double kReference = 0.5;    // s of black, and of white
-constexpr double kPatience = 3;       // s without a frame
-constexpr double kLongest = 1.5;      // s from a flip to its picture
-constexpr double kSlowest = 3;        // s from an order to its flip
-constexpr double kLeastContrast = 4;  // grey levels
-constexpr double kClearly = 6;        // standard deviations
-constexpr int kFewestFlips = 10;
+constexpr double kSettle = 0.6;     // s
+constexpr double kReference = 0.5;  // s of black, and of white
+constexpr double kPatience = 3;     // s without a frame
+constexpr double kMax = 1.5;        // s from a flip to its picture
+constexpr double kSlowest = 3;      // s from an order to its flip
+constexpr double kMinContrast = 4;  // grey levels
+constexpr double kClearly = 6;      // standard deviations
+constexpr int kMinFlips = 10;
 
 double seconds(Duration d) { return std::chrono::duration<double>(d).count(); }
 
@@ -48,7 +48,7 @@ class ScreenRun {
   ScreenMeasurement measure() {
     if (!reference(false, black_) || !reference(true, white_)) return out_;
     out_.contrast = white_.mean - black_.mean;
-    if (out_.contrast < std::max(kLeastContrast, kClearly * (white_.sigma + black_.sigma))) {
+    if (out_.contrast < std::max(kMinContrast, kClearly * (white_.sigma + black_.sigma))) {
       out_.refusal = fmt::format(
           "the camera does not see the screen flip ({:.1f} grey levels between black and white): "
           "point it there, and fix its exposure",
@@ -143,7 +143,7 @@ class ScreenRun {
       patch_.show(white, ordered + duration(phase(random)));
       Frame frame;
       bool seen = false;
-      while (!seen && seconds(last_ - patch_.shown().value_or(last_)) < kLongest) {
+      while (!seen && seconds(last_ - patch_.shown().value_or(last_)) < kMax) {
         if (seconds(now() - ordered) > kSlowest) return fail("the screen does not flip any more");
         if (!next(frame)) return false;
         seen = last_ > patch_.shown().value_or(ordered) &&
@@ -190,7 +190,7 @@ class ScreenRun {
   }
 
   void evaluate() {
-    if (out_.flips < kFewestFlips) {
+    if (out_.flips < kMinFlips) {
       out_.refusal = fmt::format("only {} flips were seen: give it more time", out_.flips);
       return;
     }

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "host/source/frame_source.h"
-#include "host/tools/camera_timing/bandwidth.h"
+#include "host/tools/camera_timing/camera_timing.h"
 
 namespace tagwrench {
 

@@ -33,8 +33,8 @@ void wait_until(TimePoint when) {
 ScreenWindow::ScreenWindow() {
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   if (SDL_Init(SDL_INIT_VIDEO) != 0) no_screen();
-  window_ = SDL_CreateWindow("tagwrench bandwidth", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
-                             kEdge_px, kEdge_px, SDL_WINDOW_SHOWN);
+  window_ = SDL_CreateWindow("tagwrench camera-timing", SDL_WINDOWPOS_CENTERED,
+                             SDL_WINDOWPOS_CENTERED, kEdge_px, kEdge_px, SDL_WINDOW_SHOWN);
   if (window_ == nullptr) no_screen();
   // No waiting for the screen's refresh: its time is part of what is measured.
   renderer_ = SDL_CreateRenderer(window_, -1, 0);

@@ -12,10 +12,10 @@ namespace {
 
 constexpr double kToMm = 1e3;
 constexpr double kImageMargin_px = 4;
-constexpr double kLeastTag_px = 60;    // of the black square: below, bits and noise suffer
+constexpr double kMinTag_px = 60;      // of the black square: below, bits and noise suffer
 constexpr double kSpringGap = 0.3e-3;  // between a spring and a line of sight
 constexpr double kFromSolid = 0.3e-3;  // between coils in all, at the stop
-constexpr double kLeastWalls = 2;      // nozzle widths
+constexpr double kMinWalls = 2;        // nozzle widths
 constexpr double kNothing = 1e-9;      // rounding
 
 Eigen::Isometry3d moved(const Geometry& g, const Vector6& d) {
@@ -63,7 +63,7 @@ class Checker {
   }
 
   void wall(const char* parameter, double thickness) {
-    const double least = kLeastWalls * p_.printing.nozzle;
+    const double least = kMinWalls * p_.printing.nozzle;
     if (thickness < least) {
       say(parameter,
           fmt::format("{:.2f} mm is thinner than two lines of the {:.2f} mm nozzle; take {:.2f} mm "
@@ -237,12 +237,12 @@ class Checker {
                       kToMm * nearest, p_.camera.name, kToMm * p_.camera.nearest_focus));
     }
     const double tag_px = p_.camera.image.fx_px * p_.target.tag_size / p_.target.lens_distance;
-    if (tag_px < kLeastTag_px) {
+    if (tag_px < kMinTag_px) {
       say("target.tag_size_mm",
           fmt::format("tags of {:.2f} mm are {:.0f} px wide at {:.1f} mm, {:.0f} are needed; take "
                       "larger tags, a shorter target.lens_distance_mm, or a camera of more pixels",
                       kToMm * p_.target.tag_size, tag_px, kToMm * p_.target.lens_distance,
-                      kLeastTag_px));
+                      kMinTag_px));
     }
     const double front = g_.lens_front;
     double lowest = g_.platform;

@@ -153,7 +153,7 @@ struct Reach {
 };
 
 /// N. A design that stands more is said to stand more than this.
-inline constexpr double kMostForce = 1000;
+inline constexpr double kMaxForce = 1000;
 
 /// Along camera x, y, z at the platform's origin. Up to `most` (N). Small angles.
 std::array<Reach, 3> reach(const Instrument& instrument, double most);

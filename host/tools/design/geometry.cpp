@@ -25,8 +25,8 @@ constexpr double kMirrorBack = 1.6e-3;  // of glass and holder at 45 degrees, al
 constexpr double kMirrorEdge = 0.6e-3;  // of the mirror around what is seen in it
 constexpr double kBoltInset = 3.5e-3;   // of a barrel's bolts from the corners of its block
 constexpr double kScrewRoom = 2.6e-3;   // from a screw of the roof to the next edge
-constexpr double kMostThread = 8e-3;    // of a bolt in the cover
-constexpr double kLeastThread = 4e-3;   // of a stop screw in its wall
+constexpr double kMaxThread = 8e-3;     // of a bolt in the cover
+constexpr double kMinThread = 4e-3;     // of a stop screw in its wall
 
 /// Under the head, mm, as sold (ISO 4762, ISO 7045, ISO 10642).
 constexpr std::array kScrewLengths_mm{4, 5, 6, 8, 10, 12, 14, 16, 20, 25, 30, 35, 40, 45, 50};
@@ -106,7 +106,7 @@ Geometry::StopScrew stop_screw(const Parameters& p, const Geometry& g, const Eig
   out.along = along;
   out.reach = p.stops.grip + travel;
   out.length = sold_length(out.reach + (along == 0 ? gap_x(p) : gap_y(p)) +
-                           std::max(kLeastThread, p.printing.wall));
+                           std::max(kMinThread, p.printing.wall));
   out.head = out.length - out.reach;
   return out;
 }
@@ -131,7 +131,7 @@ void place_screws(const Parameters& p, Geometry& g) {
     }
   }
   // Up to where the ledge's slope, 45 degrees, ends above them.
-  double room = std::min(g.ledge, (board ? g.board_top : p.mount.thickness) + kMostThread);
+  double room = std::min(g.ledge, (board ? g.board_top : p.mount.thickness) + kMaxThread);
   for (const Eigen::Vector2d& at : g.bolts) {
     const double out = std::max(
         {0.0, p.cover.x_from - at.x(), at.x() - p.cover.x_to, std::abs(at.y()) - p.cover.y_half});

@@ -19,12 +19,12 @@ using hardware::Parameters;
 using hardware::TagLayout;
 
 constexpr double kMm = 1e-3;
-constexpr double kLargest_mm = 1000;
+constexpr double kMax_mm = 1000;
 
 /// Zero is allowed; a part of a metre is not one of ours.
-double length(YamlReader& node, const char* key) { return kMm * node.within(key, 0, kLargest_mm); }
+double length(YamlReader& node, const char* key) { return kMm * node.within(key, 0, kMax_mm); }
 double present_length(YamlReader& node, const char* key) {
-  return kMm * node.within(key, 0.01, kLargest_mm);
+  return kMm * node.within(key, 0.01, kMax_mm);
 }
 
 CameraBoard load_camera(const std::string& path) {
@@ -35,7 +35,7 @@ CameraBoard load_camera(const std::string& path) {
   out.body = static_cast<hardware::CameraBody>(root.one_of("body", {"board", "barrel"}));
   const std::vector<double> size = root.numbers("size_mm", 3);
   for (const double edge : size) {
-    if (!(edge > 0 && edge <= kLargest_mm))
+    if (!(edge > 0 && edge <= kMax_mm))
       root.fail("size_mm",
                 fmt::format("{} is no edge of a camera; give width, depth, thickness", edge));
   }
@@ -116,7 +116,7 @@ hardware::SpringChoice read_springs(YamlReader node) {
                                              : helix * out.axial;
   const std::vector<double> spacing = node.numbers("spacing_mm", 2);
   for (const double between : spacing) {
-    if (!(between > 0 && between <= kLargest_mm))
+    if (!(between > 0 && between <= kMax_mm))
       node.fail("spacing_mm", "the distance between spring axes must be above 0");
   }
   out.spacing_x = kMm * spacing[0];
@@ -166,7 +166,7 @@ hardware::Top read_top(YamlReader node) {
 hardware::Cover read_cover(YamlReader node) {
   hardware::Cover out;
   const std::vector<double> x = node.numbers("x_mm", 2);
-  if (!(x[0] < 0 && x[1] > 0 && x[0] > -kLargest_mm && x[1] < kLargest_mm))
+  if (!(x[0] < 0 && x[1] > 0 && x[0] > -kMax_mm && x[1] < kMax_mm))
     node.fail("x_mm", "give where the upper block begins and ends, below and above 0");
   out.x_from = kMm * x[0];
   out.x_to = kMm * x[1];

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kToMm = 1e3;
 constexpr double kNothing = 1e-9;  // rounding
-constexpr double kLeastBoltThread = 2e-3;
+constexpr double kMinBoltThread = 2e-3;
 constexpr double kCountersink = 1e-3;     // depth of an M2 head
 constexpr double kRim = 0.8e-3;           // of the ledge at its thin edge
 constexpr double kEarEdge = 3e-3;         // around a hole in an ear
@@ -73,13 +73,13 @@ class PartChecker {
           fmt::format("the ledge slopes at 45 degrees to what the camera's board stands out, and "
                       "ends {:.1f} mm thin; make it {:.1f} mm or more",
                       kToMm * rim, kToMm * (p_.cover.ledge + kRim - rim)));
-    } else if (g_.bolt_length - foot < kLeastBoltThread - kNothing) {
+    } else if (g_.bolt_length - foot < kMinBoltThread - kNothing) {
       say("cover.ledge_mm",
           fmt::format(
               "the bolts find {:.1f} mm of thread in the cover, {:.0f} are needed; make the "
               "ledge {:.1f} mm or more",
-              std::max(0.0, kToMm * (g_.bolt_length - foot)), kToMm * kLeastBoltThread,
-              kToMm * (p_.cover.ledge + kLeastBoltThread - (g_.bolt_length - foot))));
+              std::max(0.0, kToMm * (g_.bolt_length - foot)), kToMm * kMinBoltThread,
+              kToMm * (p_.cover.ledge + kMinBoltThread - (g_.bolt_length - foot))));
     }
     const double room = g_.cover_top - foot - p_.light.diffuser;
     if (p_.light.height > room)

@@ -8,9 +8,9 @@
 namespace tagwrench::hardware {
 namespace {
 
-constexpr int kAround = 16;                       // lines along a screw
-constexpr double kReach = 0.1;                    // m, about which something turns
-constexpr double kFirst = 0.1e-3, kMost = 20e-3;  // m, tried
+constexpr int kAround = 16;                      // lines along a screw
+constexpr double kReach = 0.1;                   // m, about which something turns
+constexpr double kFirst = 0.1e-3, kMax = 20e-3;  // m, tried
 constexpr double kGrow = 1.1;
 constexpr int kHalvings = 48;
 
@@ -91,7 +91,7 @@ bool hood_stopped(const Parameters& p, const Geometry& g, const Motion& motion) 
 double times(const Parameters& p, const Geometry& g, const Vector6& d) {
   const double size = d.head<3>().norm() + kReach * d.tail<3>().norm();
   double clear = 0, met = kFirst / size;
-  while (!stopped(p, g, met * d) && met * size < kMost) {
+  while (!stopped(p, g, met * d) && met * size < kMax) {
     clear = met;
     met *= kGrow;
   }

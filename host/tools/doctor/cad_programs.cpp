@@ -89,7 +89,7 @@ SpnavServer server_at(const fs::path& socket) {
       ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     return SpnavServer::silent;
   }
-  // The bridge's own socket lies beside a keeper's.
+  // The bridge's own socket lies beside a daemon's.
   return present(socket.string() + ".bridge") ? SpnavServer::tagwrench : SpnavServer::other;
 }
 

@@ -14,7 +14,7 @@ struct tagwrench_device {
 };
 
 // Reports that are drained at once: the kernel keeps 64, the rest came meanwhile.
-enum { kMostDrained = 256 };
+enum { kMaxDrained = 256 };
 
 // hidapi's libusb backend knows no usages and says 0. A device without a path went while it was
 // looked at.
@@ -125,7 +125,7 @@ int tagwrench_read_newest(tagwrench_device* device, tagwrench_sample* sample, in
                           uint32_t* skipped) {
   uint32_t older = 0;
   const int first = tagwrench_read(device, sample, timeout_ms);
-  while (first > 0 && older < kMostDrained && tagwrench_read(device, sample, 0) > 0) ++older;
+  while (first > 0 && older < kMaxDrained && tagwrench_read(device, sample, 0) > 0) ++older;
   if (skipped != NULL) *skipped = older;
   return first;
 }

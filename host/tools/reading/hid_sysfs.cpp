@@ -17,12 +17,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostBytes = 4096;  // of an attribute; HID_MAX_DESCRIPTOR_SIZE is the same
+constexpr std::size_t kMaxBytes = 4096;  // of an attribute; HID_MAX_DESCRIPTOR_SIZE is the same
 
 /// Nothing where it cannot be read: the device went.
 std::optional<std::string> attribute(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
-  std::string bytes(kMostBytes, '\0');
+  std::string bytes(kMaxBytes, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   if (!file.is_open() || file.bad() || file.gcount() == 0) return std::nullopt;
   bytes.resize(static_cast<std::size_t>(file.gcount()));
@@ -45,8 +45,8 @@ wchar_t next_character(std::string_view& text) {
     whole = (byte & 0xc0U) == 0x80U;
     character = character << 6 | (byte & 0x3fU);
   }
-  constexpr std::array<std::uint32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
-  whole = whole && character >= kLeast[size];  // an overlong form is none
+  constexpr std::array<std::uint32_t, 5> kMin{0, 0, 0x80, 0x800, 0x10000};
+  whole = whole && character >= kMin[size];  // an overlong form is none
   text.remove_prefix(whole ? size : 1);
   return whole ? static_cast<wchar_t>(character) : L'?';
 }

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/unique_fd.h"
-#include "host/core/tell.h"
 #include "host/output/text_sink.h"
 #include "host/tools/reading/hid_list.h"
 #include "host/tools/reading/hid_text.h"
@@ -129,7 +129,7 @@ class Reader {
 
   int run() {
     if (!open() && !options_.wait) throw ConfigError(missing());
-    if (!device_) tell(fmt::format("waiting for a {}", choice_.words()));
+    if (!device_) log_info(fmt::format("waiting for a {}", choice_.words()));
     const TimePoint begin = clock_now();
     end_ = options_.time ? begin + *options_.time : TimePoint::max();
     while (!stopped() && clock_now() < end_ && sink_.failure().empty()) {
@@ -174,11 +174,11 @@ class Reader {
       tagwrench_why_not_open(found->path.c_str(), found->vendor, found->product, why.data(),
                              why.size());
       if (!options_.wait) throw ConfigError(why.data());
-      if (!refusal_told_) tell(why.data());
+      if (!refusal_told_) log_info(why.data());
       refusal_told_ = true;
       return false;
     }
-    tell(fmt::format("{} {}: {}", node_ ? "back," : "reading", found->label(), found->name));
+    log_info(fmt::format("{} {}: {}", node_ ? "back," : "reading", found->label(), found->name));
     node_ = found;
     reading_ = {};
     reading_.kind = found->kind;
@@ -257,15 +257,15 @@ class Reader {
     span_.interrupted();
     lost_ = true;
     sink_.end_line();
-    tell(fmt::format("{}: gone: unplugged, or the bridge has ended; {}", node_->label(),
-                     options_.wait ? "waiting for it" : "--wait would wait for it"));
+    log_info(fmt::format("{}: gone: unplugged, or the bridge has ended; {}", node_->label(),
+                         options_.wait ? "waiting for it" : "--wait would wait for it"));
   }
 
   int finish(Duration time) {
     sink_.end_line();
-    if (node_) tell(summary(*node_, all_, time));
+    if (node_) log_info(summary(*node_, all_, time));
     if (!sink_.failure().empty()) {
-      tell(sink_.failure());
+      log_info(sink_.failure());
       return 1;
     }
     return lost_ && !options_.wait ? 1 : 0;
@@ -295,10 +295,10 @@ class Reader {
 
 int list_hid() {
   const std::vector<HidNode> nodes = hid_nodes(kHidrawClass);
-  if (nodes.empty()) tell("no wrench sensor or 6-DOF device is plugged in");
+  if (nodes.empty()) log_info("no wrench sensor or 6-DOF device is plugged in");
   TextSink out("-", /*lossless=*/true);
   if (out.write(list_text(nodes)) != SendStatus::failed) return 0;
-  tell(out.failure());
+  log_info(out.failure());
   return 1;
 }
 

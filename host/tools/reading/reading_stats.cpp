@@ -8,7 +8,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kSmallest_ns = 1e3;
+constexpr double kMin_ns = 1e3;
 const double kLogStep = std::log(1.02);
 
 Duration from_seconds(double seconds) {
@@ -18,7 +18,7 @@ Duration from_seconds(double seconds) {
 }  // namespace
 
 void DurationHistogram::add(Duration value) noexcept {
-  const double ratio = std::max(1.0, static_cast<double>(value.count()) / kSmallest_ns);
+  const double ratio = std::max(1.0, static_cast<double>(value.count()) / kMin_ns);
   const auto index = static_cast<std::size_t>(std::log(ratio) / kLogStep);
   ++classes_[std::min(index, classes_.size() - 1)];
   ++count_;
@@ -31,7 +31,7 @@ Duration DurationHistogram::quantile(double part) const noexcept {
   for (std::size_t i = 0; i < classes_.size(); ++i) {
     below += classes_[i];
     if (below >= wanted && below > 0) {
-      const double upper_ns = kSmallest_ns * std::exp(kLogStep * static_cast<double>(i + 1));
+      const double upper_ns = kMin_ns * std::exp(kLogStep * static_cast<double>(i + 1));
       return std::min(max_, Duration(static_cast<Duration::rep>(upper_ns)));
     }
   }
@@ -88,7 +88,7 @@ Duration ReadingStats::interval_std() const noexcept {
 
 std::optional<Duration> plausible_latency(TimePoint now, TimePoint captured) noexcept {
   const Duration latency = now - captured;
-  if (latency < Duration(0) || latency >= kLongestLatency) return std::nullopt;
+  if (latency < Duration(0) || latency >= kMaxLatency) return std::nullopt;
   return latency;
 }
 

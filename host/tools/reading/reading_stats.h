@@ -61,7 +61,7 @@ class ReadingStats {
 };
 
 /// A latency beyond it is none: the capture times are of another clock.
-inline constexpr Duration kLongestLatency = std::chrono::seconds(10);
+inline constexpr Duration kMaxLatency = std::chrono::seconds(10);
 
 /// now - captured, where both can be of one clock: those of a simulated sensor, a recording or
 /// another computer are not.

@@ -12,7 +12,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::size_t kMostSettings = 64;
+constexpr std::size_t kMaxSettings = 64;
 
 bool ask_camera(int fd, unsigned long request, void* argument) {
   int result = 0;
@@ -40,7 +40,7 @@ std::vector<CameraSetting> CameraSettings::all() {
   if (!reach()) return settings;
   v4l2_queryctrl control{};
   control.id = V4L2_CTRL_FLAG_NEXT_CTRL;
-  while (settings.size() < kMostSettings && ask_camera(fd_.get(), VIDIOC_QUERYCTRL, &control)) {
+  while (settings.size() < kMaxSettings && ask_camera(fd_.get(), VIDIOC_QUERYCTRL, &control)) {
     v4l2_control now{};
     now.id = control.id;
     if (shown(control) && ask_camera(fd_.get(), VIDIOC_G_CTRL, &now)) {

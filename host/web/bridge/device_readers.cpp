@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kOurName = "tagwrench";
-constexpr const char* kGuardian = "tw-guardian";  // holds every device, and reads none
+constexpr const char* kWatchdog = "tw-watchdog";  // holds every device, and reads none
 
 std::string text_of(const fs::path& file) {
   std::ifstream in(file);
@@ -70,7 +70,7 @@ std::vector<DeviceReader> device_readers(const std::string& serial, const Kernel
       const auto node = nodes.find(fs::read_symlink(file, gone).string());
       if (gone || node == nodes.end()) continue;
       const std::string program = text_of(process / "comm");
-      if (program != kGuardian) readers.push_back({program, node->second});
+      if (program != kWatchdog) readers.push_back({program, node->second});
     }
   }
   std::sort(readers.begin(), readers.end(), [](const DeviceReader& a, const DeviceReader& b) {

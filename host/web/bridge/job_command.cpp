@@ -17,8 +17,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kLongestText = 200;
-constexpr double kLongestSeconds = 3600;
+constexpr std::size_t kMaxText = 200;
+constexpr double kMaxSeconds = 3600;
 constexpr double kFarthest_mm = 1000;
 
 enum class Needs : std::uint8_t { nothing, calibration, sensor };
@@ -48,7 +48,7 @@ const JobVerb& verb_named(std::string_view name) {
   const auto found = std::find_if(job_verbs().begin(), job_verbs().end(),
                                   [&](const JobVerb& v) { return v.name == name; });
   if (found != job_verbs().end()) return *found;
-  throw WishRefused(
+  throw RequestRefused(
       "verb: is none of camera, target, wrench, check, zero, certificate and doctor; reload the "
       "page");
 }
@@ -83,12 +83,12 @@ std::string objection_to(const JobVerb& verb, const JobPlace& place) {
   return {};
 }
 
-/// Options of a wish, each looked at once; what was not asked for is refused.
+/// Options of a request, each looked at once; what was not asked for is refused.
 class JobOptions {
  public:
   explicit JobOptions(const json& options) : options_(options) {
     if (!options.is_null() && !options.is_object())
-      throw WishRefused("options: must be an object; reload the page");
+      throw RequestRefused("options: must be an object; reload the page");
   }
 
   const json* find(const char* key) {
@@ -101,32 +101,32 @@ class JobOptions {
     const json* value = find(key);
     if (value == nullptr) return {};
     const bool usable =
-        value->is_string() && value->get_ref<const std::string&>().size() <= kLongestText;
+        value->is_string() && value->get_ref<const std::string&>().size() <= kMaxText;
     if (!usable)
-      throw WishRefused(fmt::format("{}: must be a text of at most {} bytes", key, kLongestText));
+      throw RequestRefused(fmt::format("{}: must be a text of at most {} bytes", key, kMaxText));
     const auto& text = value->get_ref<const std::string&>();
     if (std::any_of(text.begin(), text.end(),
                     [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
-      throw WishRefused(fmt::format("{}: must be one line of plain text", key));
+      throw RequestRefused(fmt::format("{}: must be one line of plain text", key));
     return text;
   }
   bool flag(const char* key) {
     const json* value = find(key);
     if (value != nullptr && !value->is_boolean())
-      throw WishRefused(fmt::format("{}: must be true or false", key));
+      throw RequestRefused(fmt::format("{}: must be true or false", key));
     return value != nullptr && value->get<bool>();
   }
   static double number(const char* key, const json& value, double least, double most) {
     const double number = value.is_number() ? value.get<double>() : std::nan("");
     if (number >= least && number <= most) return number;
-    throw WishRefused(fmt::format("{}: must be a number from {:g} to {:g}", key, least, most));
+    throw RequestRefused(fmt::format("{}: must be a number from {:g} to {:g}", key, least, most));
   }
   /// Refuses what nobody asked for.
   void done() const {
     if (!options_.is_object()) return;
     for (const auto& [key, value] : options_.items()) {
       if (std::find(taken_.begin(), taken_.end(), key) == taken_.end())
-        throw WishRefused("options: has a key that this job does not know; reload the page");
+        throw RequestRefused("options: has a key that this job does not know; reload the page");
     }
   }
 
@@ -140,7 +140,7 @@ void add_camera(JobOptions& options, std::vector<std::string>& arguments) {
   try {
     parse_board(board);
   } catch (const ConfigError& e) {
-    throw WishRefused(e.what());
+    throw RequestRefused(e.what());
   }
   arguments.push_back("--board=" + board);
 }
@@ -148,7 +148,7 @@ void add_camera(JobOptions& options, std::vector<std::string>& arguments) {
 void add_target(JobOptions& options, std::vector<std::string>& arguments) {
   if (const json* seconds = options.find("seconds")) {
     arguments.push_back(
-        fmt::format("--seconds={:g}", JobOptions::number("seconds", *seconds, 1, kLongestSeconds)));
+        fmt::format("--seconds={:g}", JobOptions::number("seconds", *seconds, 1, kMaxSeconds)));
   }
 }
 
@@ -160,18 +160,18 @@ void add_wrench(JobOptions& options, const JobPlace& place, std::vector<std::str
   if (ready == plans.end()) {
     std::string names;
     for (const ReadyPlan& p : plans) names += (names.empty() ? "" : ", ") + p.name;
-    throw WishRefused("plan: must be one of " + names);
+    throw RequestRefused("plan: must be one of " + names);
   }
   const ReferenceKind reference = parse_plan(ready->text, ready->name).reference;
   if (reference == ReferenceKind::six_axis && source_kind(place) != "sim") {
-    throw WishRefused(fmt::format(
+    throw RequestRefused(fmt::format(
         "plan {}: needs the port of the six-axis sensor; run `tagwrench calibrate wrench` in a "
         "terminal",
         plan));
   }
   if (reference == ReferenceKind::load_cell && source_kind(place) != "sim") {
     if (place.board.empty()) {
-      throw WishRefused(
+      throw RequestRefused(
           fmt::format("plan {}: needs a load cell; start with `tagwrench run --board PORT`", plan));
     }
     arguments.push_back("--board=" + place.board);
@@ -182,7 +182,7 @@ void add_wrench(JobOptions& options, const JobPlace& place, std::vector<std::str
     arguments.push_back("--notes=" + notes);
   const bool resume = options.flag("resume");
   const bool force = options.flag("force");
-  if (resume && force) throw WishRefused("resume, force: choose one of the two");
+  if (resume && force) throw RequestRefused("resume, force: choose one of the two");
   if (resume) arguments.emplace_back("--resume");
   if (force) arguments.emplace_back("--force");
 }
@@ -192,7 +192,7 @@ void add_check(JobOptions& options, std::vector<std::string>& arguments) {
   const json* at = options.find("at");
   if (mass == nullptr && at == nullptr) return;
   if (mass == nullptr || at == nullptr || !at->is_array() || at->size() != 3)
-    throw WishRefused("mass_g, at: give both, the place as three numbers in mm");
+    throw RequestRefused("mass_g, at: give both, the place as three numbers in mm");
   arguments.push_back(fmt::format("--mass-g={:g}", JobOptions::number("mass_g", *mass, 0.1, 1e5)));
   std::string place;
   for (const json& mm : *at) {
@@ -206,7 +206,7 @@ void add_check(JobOptions& options, std::vector<std::string>& arguments) {
 
 JobCommand job_command(std::string_view verb, const json& wished, const JobPlace& place) {
   const JobVerb& of = verb_named(verb);
-  if (const std::string why = objection_to(of, place); !why.empty()) throw WishRefused(why);
+  if (const std::string why = objection_to(of, place); !why.empty()) throw RequestRefused(why);
   JobCommand command{std::string(verb), of.words, of.camera, of.keys, of.camera};
   JobOptions options(wished);
   if (of.needs != Needs::nothing) command.arguments.push_back("--sensor=" + place.sensor);

@@ -1,4 +1,4 @@
-// From a page's wish for a calibration to the command line of our own program. Nothing of a page
+// From a page's request for a calibration to the command line of our own program. Nothing of a page
 // gets there that was not looked at: names from fixed lists, numbers in their range, never a path.
 #pragma once
 
@@ -11,7 +11,7 @@
 namespace tagwrench {
 
 /// One line for the page that wished: what cannot be, and what to do.
-class WishRefused : public std::runtime_error {
+class RequestRefused : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
@@ -34,7 +34,7 @@ struct JobCommand {
   bool tells_events = false;
 };
 
-/// Throws WishRefused.
+/// Throws RequestRefused.
 JobCommand job_command(std::string_view verb, const nlohmann::json& options, const JobPlace& place);
 
 /// Those that job_command() would not refuse whatever the options.

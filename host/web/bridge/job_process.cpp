@@ -25,8 +25,8 @@ namespace {
 constexpr int kAboveOthers = 10;       // no descriptor of the child's own
 constexpr int kRoom = 1 << 20;         // of the pipe for events: a picture is large
 constexpr int kUnknownEnd = 255 << 8;  // where the kernel does not keep it: SIGCHLD is ignored
-constexpr std::size_t kLongestSaid = 8192;
-constexpr std::size_t kLongestEvent = std::size_t{8} << 20;
+constexpr std::size_t kMaxSaid = 8192;
+constexpr std::size_t kMaxEvent = std::size_t{8} << 20;
 
 struct Pipe {
   UniqueFd read;
@@ -89,9 +89,9 @@ JobProcess::JobProcess(boost::asio::io_context& context, Listener listener)
   out_.by_lines = false;
   out_.whole = listener_.printed;
   err_.whole = listener_.said;
-  err_.longest = kLongestSaid;
+  err_.longest = kMaxSaid;
   events_.whole = listener_.event;
-  events_.longest = kLongestEvent;
+  events_.longest = kMaxEvent;
 }
 
 JobProcess::~JobProcess() { abandon(); }

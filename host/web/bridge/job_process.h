@@ -26,7 +26,7 @@ class JobProcess : public std::enable_shared_from_this<JobProcess> {
     /// The last that is heard of it; `status` as waitpid() has it.
     std::function<void(int status)> ended;
   };
-  /// From a wish to stop to the end by force.
+  /// From a request to stop to the end by force.
   static constexpr std::chrono::seconds kPatience{5};
   /// Its own descriptor for events.
   static constexpr int kEventsFd = 3;

@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kLargestPicture_px = 16'384;
+constexpr int kMaxPicture_px = 16'384;
 
 int digit_of(char c) {
   if (c >= 'A' && c <= 'Z') return c - 'A';
@@ -43,7 +43,7 @@ int size_of(const json& picture, const char* key) {
   const auto found = picture.find(key);
   if (found == picture.end() || !found->is_number_integer()) return 0;
   const auto size = found->get<std::int64_t>();
-  return size > 0 && size <= kLargestPicture_px ? static_cast<int>(size) : 0;
+  return size > 0 && size <= kMaxPicture_px ? static_cast<int>(size) : 0;
 }
 
 std::optional<JobPicture> picture_in(const json& event) {
@@ -68,11 +68,11 @@ void JobReport::said(std::string_view line) {
   if (line.starts_with(kProgram)) line.remove_prefix(kProgram.size());
   const bool task = line.starts_with(kTask);
   if (task) line.remove_prefix(kTask.size());
-  if (!line.empty()) add(task ? "task" : "note", std::string(line.substr(0, kLongestLine)));
+  if (!line.empty()) add(task ? "task" : "note", std::string(line.substr(0, kMaxLine)));
 }
 
 void JobReport::printed(std::string_view text) {
-  printed_ += text.substr(0, kLongestText - std::min(kLongestText, printed_.size()));
+  printed_ += text.substr(0, kMaxText - std::min(kMaxText, printed_.size()));
 }
 
 std::optional<JobPicture> JobReport::event(std::string_view text) {
@@ -82,7 +82,7 @@ std::optional<JobPicture> JobReport::event(std::string_view text) {
     const json* kind = member(*line, "kind", json::value_t::string);
     const json* words = member(*line, "text", json::value_t::string);
     if (kind != nullptr && words != nullptr)
-      add(kind->get<std::string>(), words->get<std::string>().substr(0, kLongestLine));
+      add(kind->get<std::string>(), words->get<std::string>().substr(0, kMaxLine));
   }
   if (const json* live = member(event, "live", json::value_t::string))
     live_ = live->get<std::string>();
@@ -125,7 +125,7 @@ json JobReport::to_json() const {
 
 void JobReport::add(std::string kind, std::string text) {
   lines_.push_back({std::move(kind), std::move(text)});
-  if (lines_.size() > kMostLines) lines_.pop_front();
+  if (lines_.size() > kMaxLines) lines_.pop_front();
 }
 
 std::optional<std::vector<std::uint8_t>> from_base64(std::string_view text) {

@@ -23,9 +23,9 @@ struct JobPicture {
 class JobReport {
  public:
   enum class State : std::uint8_t { running, done, failed, stopped };
-  static constexpr std::size_t kMostLines = 200;
-  static constexpr std::size_t kLongestLine = 2000;
-  static constexpr std::size_t kLongestText = 65'536;
+  static constexpr std::size_t kMaxLines = 200;
+  static constexpr std::size_t kMaxLine = 2000;
+  static constexpr std::size_t kMaxText = 65'536;
 
   explicit JobReport(std::string verb, std::vector<std::string> keys);
 

@@ -38,7 +38,8 @@ Jobs::~Jobs() {
 }
 
 void Jobs::start(JobCommand command, bool camera_is_free) {
-  if (running()) throw WishRefused(fmt::format("{} runs already; stop it first", report_->verb()));
+  if (running())
+    throw RequestRefused(fmt::format("{} runs already; stop it first", report_->verb()));
   command_ = std::move(command);
   std::vector<std::string> keys{"stop"};
   if (command_.takes_keys) keys = {"skip", "redo", "stop"};
@@ -49,7 +50,7 @@ void Jobs::start(JobCommand command, bool camera_is_free) {
     hooks_.want_camera();
   }
   hooks_.changed();
-  tell_soon();
+  log_soon();
 }
 
 void Jobs::camera_free() {
@@ -61,7 +62,7 @@ void Jobs::spawn() {
   const auto on_line = [this](auto take) {
     return [this, take](std::string_view text) {
       ((*report_).*take)(text);
-      tell_soon();
+      log_soon();
     };
   };
   JobProcess::Listener listener;
@@ -71,7 +72,7 @@ void Jobs::spawn() {
     if (const std::optional<JobPicture> picture = report_->event(line)) {
       hooks_.show(*picture);
     } else {
-      tell_soon();
+      log_soon();
     }
   };
   listener.ended = [this](int status) { ended(status); };
@@ -102,31 +103,31 @@ void Jobs::finish(JobReport::State state, std::string why, nlohmann::json result
   report_->ended(state, std::move(why), std::move(result));
   if (command_.needs_camera) hooks_.give_back_camera();
   hooks_.changed();
-  tell_soon();
+  log_soon();
 }
 
 void Jobs::press(const std::string& key) {
-  if (!running()) throw WishRefused("key: no job runs that could take it");
+  if (!running()) throw RequestRefused("key: no job runs that could take it");
   if (key == "stop") {
     if (process_) return process_->stop();
     report_->ended(JobReport::State::stopped, {}, nullptr);  // it has not begun
     hooks_.changed();
-    return tell_soon();
+    return log_soon();
   }
   const bool known = key == "skip" || key == "redo";
   if (!known || !command_.takes_keys || !process_)
-    throw WishRefused(fmt::format("key: {} takes {}", report_->verb(),
-                                  command_.takes_keys ? "skip, redo and stop" : "stop alone"));
+    throw RequestRefused(fmt::format("key: {} takes {}", report_->verb(),
+                                     command_.takes_keys ? "skip, redo and stop" : "stop alone"));
   process_->press(key == "skip" ? 's' : 'r');
 }
 
 void Jobs::close() {
-  if (running()) throw WishRefused(fmt::format("{} runs; stop it first", report_->verb()));
+  if (running()) throw RequestRefused(fmt::format("{} runs; stop it first", report_->verb()));
   report_.reset();
   hooks_.changed();
 }
 
-void Jobs::tell_soon() {
+void Jobs::log_soon() {
   if (std::exchange(will_tell_, true)) return;
   telling_.after(kTellEvery, [this] {
     will_tell_ = false;

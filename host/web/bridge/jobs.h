@@ -42,12 +42,12 @@ class Jobs {
   /// It has the camera, or waits for it.
   bool holds_camera() const { return running() && command_.needs_camera; }
 
-  /// `camera_is_free`: there is no run that has it. Throws WishRefused: one runs already.
+  /// `camera_is_free`: there is no run that has it. Throws RequestRefused: one runs already.
   void start(JobCommand command, bool camera_is_free);
   void camera_free();
-  /// "skip", "redo" or "stop". Throws WishRefused.
+  /// "skip", "redo" or "stop". Throws RequestRefused.
   void press(const std::string& key);
-  /// Forgets one that is over. Throws WishRefused: it runs.
+  /// Forgets one that is over. Throws RequestRefused: it runs.
   void close();
 
   /// Null: there is none.
@@ -57,7 +57,7 @@ class Jobs {
   void spawn();
   void ended(int status);
   void finish(JobReport::State state, std::string why, nlohmann::json result = nullptr);
-  void tell_soon();
+  void log_soon();
 
   boost::asio::io_context& context_;
   std::string program_;

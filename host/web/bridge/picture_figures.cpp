@@ -44,7 +44,7 @@ void PictureFigures::look(const ImageView& picture, std::span<const TagCorners> 
   }
   figures_ = {{"white", light.white_counts},
               {"black", picture_quality(picture).dark_counts},
-              {"clipped_part", light.clipped_part},
+              {"clipped_part", light.clipped_fraction},
               {"edges_px", std::move(widths)}};
 }
 

@@ -43,7 +43,7 @@ std::string merged(const std::string& before, const std::string& file, const std
     const std::string changed = with_changes(before, file, was, wanted);
     return same_profile(parse_profile(changed, file, defaults), wanted) ? changed : text;
   } catch (const ConfigError& e) {
-    throw WishRefused(e.what());
+    throw RequestRefused(e.what());
   }
 }
 
@@ -57,7 +57,7 @@ SavedProfile save_profile(const std::string& of, const std::string& name, const 
     return {file, false};
   }
   if (!is_recording_name(name)) {
-    throw WishRefused(
+    throw RequestRefused(
         "name: must be 1 to 64 letters, digits, -, _ and ., beginning with a letter or digit; "
         "choose another");
   }
@@ -67,7 +67,7 @@ SavedProfile save_profile(const std::string& of, const std::string& name, const 
   if (error)
     throw ConfigError(fmt::format("{}: cannot be made: {}", own.string(), error.message()));
   if (fs::exists(fs::symlink_status(target, error))) {
-    throw WishRefused(fmt::format("name: {} is there already; choose another", target.string()));
+    throw RequestRefused(fmt::format("name: {} is there already; choose another", target.string()));
   }
   const std::string changed = merged(text_of_ready(of), target.string(), text, sensor);
   write_atomically(target, with_value(changed, {"name"}, "\"" + name + "\"", target.string()));

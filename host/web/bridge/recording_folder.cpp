@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostListed = 500;
+constexpr std::size_t kMaxListed = 500;
 
 bool is_plain(unsigned char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
@@ -43,7 +43,7 @@ fs::path usual_recording_folder() {
 }
 
 bool is_recording_name(std::string_view name) {
-  return !name.empty() && name.size() <= RecordingFolder::kLongestName &&
+  return !name.empty() && name.size() <= RecordingFolder::kMaxName &&
          is_plain(static_cast<unsigned char>(name.front())) &&
          std::all_of(name.begin(), name.end(), [](unsigned char c) {
            return is_plain(c) || c == '-' || c == '_' || c == '.';
@@ -52,7 +52,7 @@ bool is_recording_name(std::string_view name) {
 
 fs::path RecordingFolder::new_file(std::string_view name) const {
   if (!is_recording_name(name)) {
-    throw WishRefused(
+    throw RequestRefused(
         "name: must be 1 to 64 letters, digits, -, _ and ., beginning with a letter or digit; "
         "choose another");
   }
@@ -69,7 +69,7 @@ fs::path RecordingFolder::new_file(std::string_view name) const {
   std::string file(name);
   if (!file.ends_with(kExtension)) file += kExtension;
   if (fs::exists(fs::symlink_status(folder_ / file, error))) {
-    throw WishRefused(fmt::format(
+    throw RequestRefused(fmt::format(
         "name: there is a {} already, and a recording replaces nothing; choose another", file));
   }
   return folder_ / file;
@@ -92,7 +92,7 @@ nlohmann::json RecordingFolder::list() const {
     return a.about.st_mtime != b.about.st_mtime ? a.about.st_mtime > b.about.st_mtime
                                                 : a.name < b.name;
   });
-  if (all.size() > kMostListed) all.resize(kMostListed);
+  if (all.size() > kMaxListed) all.resize(kMaxListed);
   nlohmann::json list = nlohmann::json::array();
   for (const Found& found : all) {
     list.push_back(

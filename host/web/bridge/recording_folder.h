@@ -14,14 +14,14 @@ std::filesystem::path usual_recording_folder();
 
 class RecordingFolder {
  public:
-  static constexpr std::size_t kLongestName = 64;
+  static constexpr std::size_t kMaxName = 64;
   static constexpr std::string_view kExtension = ".twr";
 
   explicit RecordingFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   const std::filesystem::path& path() const { return folder_; }
 
-  /// The file of a new recording: the folder is made if it is not there. Throws WishRefused: no
+  /// The file of a new recording: the folder is made if it is not there. Throws RequestRefused: no
   /// name for a recording, or one that is taken; ConfigError: the folder cannot be had.
   std::filesystem::path new_file(std::string_view name) const;
 

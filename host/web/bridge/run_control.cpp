@@ -39,7 +39,7 @@ void clear_event(const UniqueFd& event) noexcept {
 
 RunControl::RunControl(int stop)
     : camera_wanted_(make_event()),
-      wishes_ready_(make_event()),
+      requests_ready_(make_event()),
       end_(::epoll_create1(EPOLL_CLOEXEC)) {
   if (!end_) no_descriptor();
   for (const int fd : {stop, camera_wanted_.get()}) {
@@ -49,16 +49,16 @@ RunControl::RunControl(int stop)
   }
 }
 
-void RunControl::wish(Wish wish) {
+void RunControl::request(Request request) {
   {
     const std::lock_guard lock(mutex_);
     if (open_) {
-      wishes_.push_back(std::move(wish));
-      raise_event(wishes_ready_);
+      requests_.push_back(std::move(request));
+      raise_event(requests_ready_);
       return;
     }
   }
-  wish(nullptr);
+  request(nullptr);
 }
 
 void RunControl::want_camera() noexcept { raise_event(camera_wanted_); }
@@ -70,14 +70,14 @@ void RunControl::open() {
   open_ = true;
 }
 
-std::vector<RunControl::Wish> RunControl::take() noexcept {
+std::vector<RunControl::Request> RunControl::take() noexcept {
   const std::lock_guard lock(mutex_);
-  return std::exchange(wishes_, {});
+  return std::exchange(requests_, {});
 }
 
-void RunControl::run_wishes(WebOutput& output) noexcept {
-  clear_event(wishes_ready_);
-  for (const Wish& wish : take()) wish(&output);
+void RunControl::run_requests(WebOutput& output) noexcept {
+  clear_event(requests_ready_);
+  for (const Request& request : take()) request(&output);
 }
 
 void RunControl::close() noexcept {
@@ -85,7 +85,7 @@ void RunControl::close() noexcept {
     const std::lock_guard lock(mutex_);
     open_ = false;
   }
-  for (const Wish& wish : take()) wish(nullptr);
+  for (const Request& request : take()) request(nullptr);
 }
 
 }  // namespace tagwrench

@@ -66,7 +66,7 @@ json hello_of(const RunFacts& facts, const std::string& recordings) {
            {{"camera_settings", !facts.camera_device.empty()},
             {"led", facts.board},
             {"cells", cells},
-            {"profiles", facts.desk},
+            {"profiles", facts.profiles},
             {"record", facts.head.has_value()},
             {"jobs", possible_jobs(facts.place)}}}};
 }

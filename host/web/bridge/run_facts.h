@@ -20,7 +20,7 @@ struct RunFacts {
   JobPlace place;
   std::string camera_device;  ///< node; empty: no camera
   bool board = false;
-  bool desk = false;                 ///< its socket listens
+  bool profiles = false;             ///< its socket listens
   std::optional<record::Head> head;  ///< of a recording; none: something else records already
 };
 

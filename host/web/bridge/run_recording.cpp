@@ -9,7 +9,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kLongestLeft_s = 1e7;
+constexpr double kMaxLeft_s = 1e7;
 
 }  // namespace
 
@@ -32,7 +32,7 @@ nlohmann::json RunRecording::progress() const {
           {"bytes", state.bytes},
           {"frames", state.frames},
           {"dropped", dropped_.load(std::memory_order_relaxed) + state.lost_frames},
-          {"disk_left_s", std::min(left, kLongestLeft_s)}};
+          {"disk_left_s", std::min(left, kMaxLeft_s)}};
 }
 
 RunRecording::Ending RunRecording::finish() noexcept {

@@ -7,9 +7,9 @@
 #include <future>
 #include <utility>
 
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/motion/control_socket.h"
-#include "host/tracker/hint_text.h"
+#include "host/tracker/diagnostic_text.h"
 #include "host/web/bridge/web_bridge_impl.h"
 #include "host/web/server/picture_message.h"
 
@@ -52,7 +52,7 @@ WebBridge::Impl::~Impl() {
     in_server([this] {  // all that belongs to its thread
       ticker_.reset();
       jobs_.reset();
-      desk_.reset();
+      profiles_.reset();
     });
     server_.stop();  // from here on nobody asks
   }
@@ -96,10 +96,10 @@ std::unique_ptr<WebOutput> WebBridge::Impl::begin_run(const RunFacts& facts,
     trial_.reset();
     trying_.reset();
     programs_.clear();
-    desk_.reset();
+    profiles_.reset();
     camera_.reset();
     controls_ = json::array();
-    if (facts.desk) desk_.emplace(server_.context(), control_path(facts.name));
+    if (facts.profiles) profiles_.emplace(server_.context(), control_path(facts.name));
     if (!facts.camera_device.empty()) camera_.emplace(facts.camera_device);
     if (!facts.place.sensor.empty()) {
       const std::string folder = certificate_folder(facts.place);
@@ -110,7 +110,7 @@ std::unique_ptr<WebOutput> WebBridge::Impl::begin_run(const RunFacts& facts,
     }
     server_.set_hello(hello);
     // The desk answers once the loop turns.
-    if (desk_) read_profile();
+    if (profiles_) read_profile();
     look_around();
     send_state();
   });
@@ -192,7 +192,7 @@ void WebBridge::Impl::page_gone(std::uint64_t page) {
   pages_.erase(page);
   if (!trial_ || trial_->page != page) return;
   trial_.reset();
-  if (desk_) desk_->ask("revert", [this](const DeskAnswer&) { read_profile(); });
+  if (profiles_) profiles_->ask("revert", [this](const ControlAnswer&) { read_profile(); });
 }
 
 void WebBridge::Impl::heard(std::string line, std::vector<std::string> programs) {
@@ -219,8 +219,8 @@ void WebBridge::Impl::show(const JobPicture& picture) {
 
 /// What the desk has in force, as pages see it.
 void WebBridge::Impl::read_profile() {
-  if (!desk_) return;
-  desk_->ask("status", [this](const DeskAnswer& status) {
+  if (!profiles_) return;
+  profiles_->ask("status", [this](const ControlAnswer& status) {
     constexpr std::string_view kHead = "profile ";
     constexpr std::string_view kOf = " of ";
     const std::size_t of = status.text.find(kOf);
@@ -234,7 +234,7 @@ void WebBridge::Impl::read_profile() {
       rest.remove_prefix(std::min(end + 1, rest.size()));
     }
     profile_ = {{"name", name}, {"names", names}, {"text", ""}, {"trial", trial_.has_value()}};
-    desk_->ask("show " + name, [this](const DeskAnswer& shown) {
+    profiles_->ask("show " + name, [this](const ControlAnswer& shown) {
       const std::size_t line_end = shown.text.find('\n');
       if (shown.ok && line_end != std::string::npos && profile_.is_object())
         profile_["text"] = shown.text.substr(line_end + 1);
@@ -245,8 +245,8 @@ void WebBridge::Impl::read_profile() {
 
 /// A trial lasts as long as who tries goes on asking.
 void WebBridge::Impl::keep_trial() {
-  if (!trial_ || !desk_) return;
-  desk_->ask("live", [this](const DeskAnswer& live) {
+  if (!trial_ || !profiles_) return;
+  profiles_->ask("live", [this](const ControlAnswer& live) {
     if (!trial_ || (live.ok && live.text.ends_with(" 1"))) return;
     trial_.reset();
     read_profile();
@@ -262,7 +262,7 @@ void WebBridge::Impl::end_recording(std::function<void(RunRecording::Ending)> th
     server_.post([this, then, ending] {
       ending_recording_ = false;
       if (!ending.line.empty()) {
-        tell(ending.line);
+        log_info(ending.line);
         say(ending.line);
       }
       then(ending);
@@ -278,7 +278,7 @@ void WebBridge::Impl::tick() {
   fresh_ = samples != std::exchange(seen_, samples);
   ++ticks_;
   if (recording_ && recording_->failed() && !ending_recording_) {
-    control_.wish([this](WebOutput* run) {
+    control_.request([this](WebOutput* run) {
       if (run != nullptr) {
         run->record(nullptr);
         run->source().narrow(false);
@@ -309,8 +309,8 @@ std::string WebBridge::Impl::words(const SeenNow& seen, bool fresh) const {
   if (!running_ && jobs_->holds_camera()) return "the camera is lent to what is being done";
   if (!running_) return "the sensor is being set up";
   if (!fresh && seen.status != Status::ok) return "no pictures come";
-  if (seen.trouble != Hint::none && !carries_numbers(seen.status))
-    return hint_text(seen.trouble, seen.details);
+  if (seen.trouble != Diagnostic::none && !carries_numbers(seen.status))
+    return diagnostic_text(seen.trouble, seen.details);
   switch (seen.status) {
     case Status::ok:
       return "held";
@@ -329,7 +329,7 @@ std::string WebBridge::Impl::words(const SeenNow& seen, bool fresh) const {
 json WebBridge::Impl::image() const {
   if (!figures_ || !figures_->figures().is_object()) return nullptr;
   json image = figures_->figures();
-  image["residual_part"] = views_.seen.get().residual_part;
+  image["residual_part"] = views_.seen.get().residual_fraction;
   return image;
 }
 

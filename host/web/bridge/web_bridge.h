@@ -1,5 +1,5 @@
-// The pages' other end: what they see of runs, and what their wishes become. It outlives the runs:
-// a job that needs the camera ends one, and another is built when the job is over.
+// The pages' other end: what they see of runs, and what their requests become. It outlives the
+// runs: a job that needs the camera ends one, and another is built when the job is over.
 #pragma once
 
 #include <filesystem>

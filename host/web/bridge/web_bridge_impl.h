@@ -16,7 +16,7 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/web/bridge/camera_settings.h"
-#include "host/web/bridge/desk_link.h"
+#include "host/web/bridge/control_link.h"
 #include "host/web/bridge/device_readers.h"
 #include "host/web/bridge/jobs.h"
 #include "host/web/bridge/picture_figures.h"
@@ -25,13 +25,13 @@
 #include "host/web/bridge/run_facts.h"
 #include "host/web/bridge/web_bridge.h"
 #include "host/web/bridge/web_output.h"
-#include "host/web/server/ask.h"
+#include "host/web/server/page_request.h"
 #include "host/web/server/server_timer.h"
 #include "host/web/server/web_server.h"
 
 namespace tagwrench {
 
-class WebBridge::Impl final : private AskHandler {
+class WebBridge::Impl final : private PageRequestHandler {
  public:
   Impl(const WebBridgeOptions& options, int stop);
   ~Impl() override;
@@ -48,41 +48,42 @@ class WebBridge::Impl final : private AskHandler {
   bool wait_after(const std::string& failure, Beside beside);
 
  private:
-  using Answer = void (Impl::*)(const Ask&);
+  using Answer = void (Impl::*)(const PageRequest&);
   struct Trial {
     std::uint64_t page = 0;
     std::string name;
-    int unanswered = 0;  ///< wishes that the desk has still to answer
+    int unanswered = 0;  ///< requests that the desk has still to answer
   };
 
   // The server's thread.
-  void ask(Ask ask) override;
+  void handle(PageRequest request) override;
   void page_came(std::uint64_t page) override;
   void page_gone(std::uint64_t page) override;
   static Answer answer_to(std::string_view what);
-  void zero(const Ask& ask);
-  void choose_profile(const Ask& ask);
-  void next_profile(const Ask& ask);
-  void show_profile(const Ask& ask);
-  void try_profile(const Ask& ask);
-  void keep_profile(const Ask& ask);
-  void revert_profile(const Ask& ask);
-  void save_profile(const Ask& ask);
-  void start_recording(const Ask& ask);
-  void stop_recording(const Ask& ask);
-  void list_recordings(const Ask& ask);
-  void set_camera(const Ask& ask);
-  void set_led(const Ask& ask);
-  void tare(const Ask& ask);
-  void start_job(const Ask& ask);
-  void press_key(const Ask& ask);
-  void close_job(const Ask& ask);
-  void list_plans(const Ask& ask);
-  void retry(const Ask& ask);
+  void zero(const PageRequest& request);
+  void choose_profile(const PageRequest& request);
+  void next_profile(const PageRequest& request);
+  void show_profile(const PageRequest& request);
+  void try_profile(const PageRequest& request);
+  void keep_profile(const PageRequest& request);
+  void revert_profile(const PageRequest& request);
+  void save_profile(const PageRequest& request);
+  void start_recording(const PageRequest& request);
+  void stop_recording(const PageRequest& request);
+  void list_recordings(const PageRequest& request);
+  void set_camera(const PageRequest& request);
+  void set_led(const PageRequest& request);
+  void tare(const PageRequest& request);
+  void start_job(const PageRequest& request);
+  void press_key(const PageRequest& request);
+  void close_job(const PageRequest& request);
+  void list_plans(const PageRequest& request);
+  void retry(const PageRequest& request);
 
-  void answer(const Ask& ask, bool ok, std::string text, nlohmann::json data = nullptr);
-  void ask_desk(const Ask& ask, std::string wish, std::function<void(DeskAnswer)> then = {});
-  DeskLink& desk();
+  void answer(const PageRequest& request, bool ok, std::string text, nlohmann::json data = nullptr);
+  void ask_control(const PageRequest& request, std::string text,
+                   std::function<void(ControlAnswer)> then = {});
+  ControlLink& profiles();
   void read_profile();
   void keep_trial();
   void end_recording(std::function<void(RunRecording::Ending)> then);
@@ -117,12 +118,12 @@ class WebBridge::Impl final : private AskHandler {
   bool running_ = false;
   bool camera_free_ = false;  ///< there is no run, and none is being built
   std::string failure_;       ///< why there is no run
-  std::optional<DeskLink> desk_;
+  std::optional<ControlLink> profiles_;
   std::optional<CameraSettings> camera_;
   std::optional<PictureFigures> figures_;
   std::set<std::uint64_t> pages_;  ///< that are there
   std::optional<Trial> trial_;     ///< in force
-  std::optional<Trial> trying_;    ///< asked of the desk; other pages wait
+  std::optional<Trial> trying_;    ///< asked of the profiles; other pages wait
   nlohmann::json profile_ = nullptr;
   std::vector<std::string> programs_;  ///< that read the spnav socket
   std::vector<DeviceReader> readers_;

@@ -9,7 +9,7 @@ namespace tagwrench {
 WebOutput::WebOutput(Parts parts) : parts_(std::move(parts)) {}
 
 std::string_view WebOutput::service() noexcept {
-  parts_.control->run_wishes(*this);
+  parts_.control->run_requests(*this);
   return {};
 }
 
@@ -62,12 +62,12 @@ void WebOutput::look(const Track& track, const Sample& sample) noexcept {
   seen_.zero_state = sample.zero_state;
   seen_.corners = track.corners;
   seen_.corner_count = track.corner_count;
-  seen_.residual_part = track.residual_part;
+  seen_.residual_fraction = track.residual_fraction;
   if (skipped_ != nullptr) seen_.skipped = *skipped_;
   if (track.status == Status::ok) {
-    seen_.trouble = Hint::none;
-  } else if (is_trouble(track.hint)) {
-    seen_.trouble = track.hint;
+    seen_.trouble = Diagnostic::none;
+  } else if (is_trouble(track.diagnostic)) {
+    seen_.trouble = track.diagnostic;
     seen_.details = track.details;
   }
   parts_.views->seen.put(seen_);

@@ -1,5 +1,5 @@
 // The run's end of the pages: every sample to the live feed, a picture now and then, a recording
-// where a page has begun one; and what a page wishes of the loop itself. Waits for nobody.
+// where a page has begun one; and what a page requests of the loop itself. Waits for nobody.
 #pragma once
 
 #include <array>
@@ -25,11 +25,11 @@ namespace tagwrench {
 /// What is seen now, besides the sample.
 struct SeenNow {
   Status status = Status::acquiring;
-  Hint trouble = Hint::none;  ///< why the target is not held
-  HintDetails details;
+  Diagnostic trouble = Diagnostic::none;  ///< why the target is not held
+  DiagnosticDetails details;
   std::array<TagCorners, 8> corners{};
   std::uint8_t corner_count = 0;
-  double residual_part = 0;
+  double residual_fraction = 0;
   ZeroState zero_state = ZeroState::off;
   std::uint64_t skipped = 0;  ///< samples that slow readers lost
 };
@@ -57,7 +57,7 @@ class WebOutput final : public Output, public FrameLog {
   explicit WebOutput(Parts parts);
 
   // Output
-  int poll_fd() const noexcept override { return parts_.control->wishes_fd(); }
+  int poll_fd() const noexcept override { return parts_.control->requests_fd(); }
   std::string_view service() noexcept override;
   bool notice(std::string_view line) noexcept override;
 

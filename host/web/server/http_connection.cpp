@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/web/server/page_request.h"
+#include "host/web/server/page_upgrade.h"
 
 namespace tagwrench {
 namespace {
@@ -51,7 +51,7 @@ std::string_view telling_part(Refusal refusal, const WebRequest& request) {
 class BeastConnection final : public HttpConnection,
                               public std::enable_shared_from_this<BeastConnection> {
  public:
-  BeastConnection(asio::ip::tcp::socket socket, ConnectionKeeper& keeper, Duration patience);
+  BeastConnection(asio::ip::tcp::socket socket, ConnectionOwner& daemon, Duration patience);
 
   void serve() override;
   void turn_away(Refusal refusal) override;
@@ -74,7 +74,7 @@ class BeastConnection final : public HttpConnection,
   void end();
 
   asio::ip::tcp::socket socket_;
-  ConnectionKeeper& keeper_;
+  ConnectionOwner& daemon_;
   Duration patience_;
   boost::beast::flat_buffer incoming_;
   std::optional<Parser> parser_;
@@ -87,17 +87,17 @@ class BeastConnection final : public HttpConnection,
   TimePoint deadline_{};
 };
 
-BeastConnection::BeastConnection(asio::ip::tcp::socket socket, ConnectionKeeper& keeper,
+BeastConnection::BeastConnection(asio::ip::tcp::socket socket, ConnectionOwner& daemon,
                                  Duration patience)
     : socket_(std::move(socket)),
-      keeper_(keeper),
+      daemon_(daemon),
       patience_(patience),
-      incoming_(kLongestHeader + 1024) {}
+      incoming_(kMaxHeader + 1024) {}
 
 void BeastConnection::serve() {
   deadline_ = std::chrono::steady_clock::now() + patience_;
   parser_.emplace();
-  parser_->header_limit(kLongestHeader);
+  parser_->header_limit(kMaxHeader);
   http::async_read(socket_, incoming_, *parser_,
                    [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
                      self->handle(error);
@@ -135,18 +135,18 @@ void BeastConnection::handle_request() {
   const WebRequest request = request_of(parser_->get());
   keep_ = parser_->get().keep_alive();
   if (request.target != "/ws") {
-    WebAnswer answer = keeper_.answer(request);
+    WebAnswer answer = daemon_.answer(request);
     if (answer.refusal != Refusal::none)
-      keeper_.refused(answer.refusal, telling_part(answer.refusal, request));
+      daemon_.refused(answer.refusal, telling_part(answer.refusal, request));
     return respond(std::move(answer), request.method != "HEAD");
   }
   keep_ = false;
-  if (const Refusal refusal = keeper_.admits(request); refusal != Refusal::none) {
-    keeper_.refused(refusal, telling_part(refusal, request));
+  if (const Refusal refusal = daemon_.admits(request); refusal != Refusal::none) {
+    daemon_.refused(refusal, telling_part(refusal, request));
     return respond(plain_answer(refusal_status(refusal), refusal_text(refusal)), true);
   }
   if (!request.upgrade) return respond(plain_answer(426, "Only a WebSocket is here."), true);
-  keeper_.becomes_page({std::move(socket_), parser_->release()});
+  daemon_.becomes_page({std::move(socket_), parser_->release()});
   end();
 }
 
@@ -222,14 +222,14 @@ void BeastConnection::drop() noexcept {
 void BeastConnection::end() {
   if (std::exchange(ended_, true)) return;
   drop();
-  keeper_.closed(*this);
+  daemon_.closed(*this);
 }
 
 }  // namespace
 
 std::shared_ptr<HttpConnection> HttpConnection::make(asio::ip::tcp::socket socket,
-                                                     ConnectionKeeper& keeper, Duration patience) {
-  return std::make_shared<BeastConnection>(std::move(socket), keeper, patience);
+                                                     ConnectionOwner& daemon, Duration patience) {
+  return std::make_shared<BeastConnection>(std::move(socket), daemon, patience);
 }
 
 }  // namespace tagwrench

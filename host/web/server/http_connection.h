@@ -13,17 +13,17 @@
 namespace tagwrench {
 
 class HttpConnection;
-struct PageRequest;
+struct PageUpgrade;
 
 /// Whom a connection asks.
-class ConnectionKeeper {
+class ConnectionOwner {
  public:
-  virtual ~ConnectionKeeper() = default;
+  virtual ~ConnectionOwner() = default;
   virtual WebAnswer answer(const WebRequest& request) = 0;
   /// Whether the request may become a page's socket.
   virtual Refusal admits(const WebRequest& request) = 0;
   /// What `request` holds may be moved from.
-  virtual void becomes_page(PageRequest&& request) = 0;
+  virtual void becomes_page(PageUpgrade&& request) = 0;
   /// With what the stranger sent, if that helps.
   virtual void refused(Refusal refusal, std::string_view detail) = 0;
   /// The last call.
@@ -32,11 +32,11 @@ class ConnectionKeeper {
 
 class HttpConnection {
  public:
-  static constexpr std::uint32_t kLongestHeader = 8192;
+  static constexpr std::uint32_t kMaxHeader = 8192;
   static constexpr Duration kLinger = std::chrono::seconds(1);
 
   static std::shared_ptr<HttpConnection> make(boost::asio::ip::tcp::socket socket,
-                                              ConnectionKeeper& keeper, Duration patience);
+                                              ConnectionOwner& daemon, Duration patience);
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
   virtual ~HttpConnection() = default;

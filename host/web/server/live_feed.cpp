@@ -30,7 +30,7 @@ void copy_part(const LoggedFrame& logged, LivePicture& picture) noexcept {
   picture.stride = part.width;
   picture.part = part;
   picture.size = 0;
-  if (width * static_cast<std::size_t>(part.height) > LivePicture::kMostBytes) return;
+  if (width * static_cast<std::size_t>(part.height) > LivePicture::kMaxBytes) return;
   for (int row = 0; row < part.height; ++row) {
     const auto offset = static_cast<std::ptrdiff_t>(part.y + row) * image.stride + part.x;
     std::memcpy(picture.bytes.get() + picture.size, image.pixels + offset, width);
@@ -111,7 +111,7 @@ void LiveFeed::picture(const LoggedFrame& logged) noexcept {
   picture.tag_count = std::min<std::uint8_t>(track.corner_count, picture.tags.size());
   picture.tags = track.corners;
   const std::size_t raw_bytes = logged.raw.bytes.size();
-  if (raw_bytes > 0 && raw_bytes <= LivePicture::kMostBytes)
+  if (raw_bytes > 0 && raw_bytes <= LivePicture::kMaxBytes)
     copy_raw(logged, picture);
   else
     copy_part(logged, picture);
@@ -123,7 +123,7 @@ void LiveFeed::want_pictures(Duration interval) {
   if (!buffers_ && interval != Duration::max()) {
     buffers_ = std::make_unique<Buffer[]>(kBuffers);
     for (int i = 0; i < kBuffers; ++i)
-      buffers_[i].picture.bytes = std::make_unique<std::uint8_t[]>(LivePicture::kMostBytes);
+      buffers_[i].picture.bytes = std::make_unique<std::uint8_t[]>(LivePicture::kMaxBytes);
   }
   interval_.store(interval.count(), std::memory_order_release);
 }

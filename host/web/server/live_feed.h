@@ -26,7 +26,7 @@ struct LiveSample {
 
 /// A picture as the source delivered it, and what was seen in it.
 struct LivePicture {
-  static constexpr std::size_t kMostBytes = std::size_t{4} << 20;
+  static constexpr std::size_t kMaxBytes = std::size_t{4} << 20;
 
   std::uint64_t sequence = 0;
   TimePoint capture_time{};
@@ -58,7 +58,7 @@ class LiveFeed {
   void sample(const Sample& sample, const Track* track) noexcept;
   /// Somebody looks, and the last picture is long enough ago.
   bool wants_picture(TimePoint now) const noexcept;
-  /// Copies it, unless the reader still has both buffers. Never more than kMostBytes.
+  /// Copies it, unless the reader still has both buffers. Never more than kMaxBytes.
   void picture(const LoggedFrame& logged) noexcept;
 
   // The reader's side: one thread.
@@ -68,7 +68,7 @@ class LiveFeed {
   /// Nothing: not written yet, or overwritten already.
   std::optional<LiveSample> read(std::uint64_t position) const noexcept;
 
-  /// None while the interval is Duration::max(). The first wish makes the buffers.
+  /// None while the interval is Duration::max(). The first request makes the buffers.
   void want_pictures(Duration interval);
   /// The newest that has not been taken yet; null: none. Is given back with release().
   const LivePicture* take_picture() noexcept;

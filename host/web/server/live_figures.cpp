@@ -8,7 +8,7 @@ namespace tagwrench {
 
 void LiveWindow::add(TimePoint output_time, std::int64_t latency_us) {
   entries_.push_back({output_time, latency_us});
-  while (entries_.size() > kMost || output_time - entries_.front().output_time > kSpan)
+  while (entries_.size() > kMax || output_time - entries_.front().output_time > kSpan)
     entries_.pop_front();
 }
 

@@ -25,7 +25,7 @@ class LiveWindow {
 
  private:
   static constexpr Duration kSpan = std::chrono::seconds(1);
-  static constexpr std::size_t kMost = 2000;
+  static constexpr std::size_t kMax = 2000;
   struct Entry {
     TimePoint output_time;
     std::int64_t latency_us;

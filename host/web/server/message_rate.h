@@ -8,21 +8,21 @@
 
 namespace tagwrench {
 
-template <std::size_t kMost>
+template <std::size_t kMax>
 class MessageRate {
  public:
-  /// False: it is more than kMost in the last second.
+  /// False: it is more than kMax in the last second.
   bool count(TimePoint now) noexcept {
     TimePoint& oldest = times_[next_];
     const bool too_many = full_ && now - oldest < std::chrono::seconds(1);
     oldest = now;
-    next_ = (next_ + 1) % kMost;
+    next_ = (next_ + 1) % kMax;
     full_ = full_ || next_ == 0;
     return !too_many;
   }
 
  private:
-  std::array<TimePoint, kMost> times_{};
+  std::array<TimePoint, kMax> times_{};
   std::size_t next_ = 0;
   bool full_ = false;
 };

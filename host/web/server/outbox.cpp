@@ -5,7 +5,7 @@
 namespace tagwrench {
 
 bool Outbox::keep(std::shared_ptr<const std::string> text) {
-  if (kept_.size() == kMostKept) return false;
+  if (kept_.size() == kMaxKept) return false;
   kept_.push_back(std::move(text));
   return true;
 }
@@ -15,7 +15,7 @@ void Outbox::replace(std::string_view type, std::shared_ptr<const std::string> t
                                  [&](const auto& waiting) { return waiting.first == type; });
   if (same != latest_.end())
     same->second = std::move(text);
-  else if (latest_.size() < kMostTypes)
+  else if (latest_.size() < kMaxTypes)
     latest_.emplace_back(type, std::move(text));
 }
 

@@ -14,8 +14,8 @@ namespace tagwrench {
 
 class Outbox {
  public:
-  static constexpr std::size_t kMostKept = 64;
-  static constexpr std::size_t kMostTypes = 16;
+  static constexpr std::size_t kMaxKept = 64;
+  static constexpr std::size_t kMaxTypes = 16;
 
   /// Goes out, in its turn. False: 64 wait already.
   bool keep(std::shared_ptr<const std::string> text);

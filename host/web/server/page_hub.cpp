@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "host/core/json/json_text.h"
-#include "host/web/server/ask.h"
-#include "host/web/server/ask_message.h"
+#include "host/web/server/page_message.h"
+#include "host/web/server/page_request.h"
 
 namespace tagwrench {
 namespace {
@@ -35,7 +35,7 @@ void PageHub::each(Work work) {
   for (const auto& page : all) work(*page);
 }
 
-void PageHub::add(PageRequest&& request) {
+void PageHub::add(PageUpgrade&& request) {
   const std::uint64_t id = next_page_++;
   const auto page = PageSocket::make(std::move(request), id, *this, patience_);
   pages_.emplace(id, page);
@@ -63,7 +63,7 @@ void PageHub::gone(std::uint64_t page) {
 }
 
 void PageHub::said(PageSocket& page, std::string_view text) {
-  AskMessage message = parse_ask(text);
+  PageMessage message = parse_page_message(text);
   if (!message.id) {
     misbehaved(Refusal::nonsense);
     return page.close(kPolicyError, message.fault);
@@ -78,9 +78,10 @@ void PageHub::said(PageSocket& page, std::string_view text) {
   answer(page.id(), *message.id, valid, valid ? "" : "pictures: \"on\" is true or false");
 }
 
-void PageHub::pass_on(PageSocket& page, AskMessage message) {
+void PageHub::pass_on(PageSocket& page, PageMessage message) {
   try {
-    handler_->ask({page.id(), *message.id, std::move(message.what), std::move(message.arguments)});
+    handler_->handle(
+        {page.id(), *message.id, std::move(message.what), std::move(message.arguments)});
   } catch (const std::exception& error) {
     answer(page.id(), *message.id, false, error.what());
   }

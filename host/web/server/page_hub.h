@@ -21,9 +21,9 @@
 
 namespace tagwrench {
 
-struct AskMessage;
+struct PageMessage;
 
-class PageHub final : public PageKeeper {
+class PageHub final : public PageOwner {
  public:
   /// A little more than a thirtieth of a second: not more than 30 messages in one.
   static constexpr Duration kTick = std::chrono::milliseconds(34);
@@ -32,12 +32,12 @@ class PageHub final : public PageKeeper {
 
   PageHub(boost::asio::io_context& context, const WebPatience& patience);
 
-  void start(AskHandler& handler) noexcept { handler_ = &handler; }
+  void start(PageRequestHandler& handler) noexcept { handler_ = &handler; }
   LiveFeed& feed() noexcept { return feed_; }
-  bool has_room() const noexcept { return pages_.size() < WebServer::kMostPages; }
+  bool has_room() const noexcept { return pages_.size() < WebServer::kMaxPages; }
   std::size_t pages() const noexcept { return pages_.size(); }
   /// What `request` holds is moved from.
-  void add(PageRequest&& request);
+  void add(PageUpgrade&& request);
   void check(TimePoint now);
   void close_all();
 
@@ -67,7 +67,7 @@ class PageHub final : public PageKeeper {
   void tick();
   void take_picture();
   void want_pictures();
-  void pass_on(PageSocket& page, AskMessage message);
+  void pass_on(PageSocket& page, PageMessage message);
   static void deliver(PageSocket& page, std::string_view type, const Text& text);
   template <typename Work>
   void each(Work work);
@@ -78,7 +78,7 @@ class PageHub final : public PageKeeper {
   ServerTimer timer_;
   WebPatience patience_;
   bool ticking_ = false;
-  AskHandler* handler_ = nullptr;
+  PageRequestHandler* handler_ = nullptr;
   Text hello_;
   std::function<void(const ImageView&)> watcher_;
   std::atomic<bool> pictures_wanted_{false};

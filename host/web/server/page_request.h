@@ -1,17 +1,20 @@
-// A connection that is to become a page: what a connection hands over, and the others only pass on.
+// What a page requests.
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/beast/http/empty_body.hpp>
-#include <boost/beast/http/message.hpp>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
 
 namespace tagwrench {
 
-using WebSocketRequest = boost::beast::http::request<boost::beast::http::empty_body>;
-
+/// A page's request, as far as any page's request is checked: `what` is a word of lower-case
+/// letters and underscores, `arguments` an object without "id" and "ask", nested no deeper than
+/// eight.
 struct PageRequest {
-  boost::asio::ip::tcp::socket socket;
-  WebSocketRequest request;
+  std::uint64_t page = 0;
+  std::int64_t id = 0;
+  std::string what;
+  nlohmann::json arguments;
 };
 
 }  // namespace tagwrench

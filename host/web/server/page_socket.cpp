@@ -8,7 +8,7 @@
 
 #include "host/web/server/message_rate.h"
 #include "host/web/server/outbox.h"
-#include "host/web/server/page_request.h"
+#include "host/web/server/page_upgrade.h"
 #include "host/web/server/web_server.h"
 
 namespace tagwrench {
@@ -24,7 +24,7 @@ TimePoint page_clock() { return std::chrono::steady_clock::now(); }
 
 class WebSocketPage final : public PageSocket, public std::enable_shared_from_this<WebSocketPage> {
  public:
-  WebSocketPage(PageRequest&& request, std::uint64_t id, PageKeeper& keeper,
+  WebSocketPage(PageUpgrade&& request, std::uint64_t id, PageOwner& daemon,
                 const WebPatience& patience);
 
   void open() override;
@@ -51,12 +51,12 @@ class WebSocketPage final : public PageSocket, public std::enable_shared_from_th
 
   websocket::stream<asio::ip::tcp::socket, false> stream_;
   std::uint64_t id_;
-  PageKeeper& keeper_;
+  PageOwner& daemon_;
   WebPatience patience_;
   WebSocketRequest request_;
   boost::beast::flat_buffer incoming_;
   Outbox outbox_;
-  MessageRate<WebServer::kMostAsksASecond> rate_;
+  MessageRate<WebServer::kMaxPageRequestsPerSecond> rate_;
   bool open_ = false;
   bool closing_ = false;
   bool ended_ = false;
@@ -68,18 +68,18 @@ class WebSocketPage final : public PageSocket, public std::enable_shared_from_th
   TimePoint pinged_{};
 };
 
-WebSocketPage::WebSocketPage(PageRequest&& request, std::uint64_t id, PageKeeper& keeper,
+WebSocketPage::WebSocketPage(PageUpgrade&& request, std::uint64_t id, PageOwner& daemon,
                              const WebPatience& patience)
     : stream_(std::move(request.socket)),
       id_(id),
-      keeper_(keeper),
+      daemon_(daemon),
       patience_(patience),
       request_(std::move(request.request)),
-      incoming_(WebServer::kLongestAsk + 1) {
+      incoming_(WebServer::kMaxPageRequest + 1) {
   error_code ignored;
   stream_.next_layer().set_option(asio::ip::tcp::no_delay(true), ignored);
   stream_.next_layer().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
-  stream_.read_message_max(WebServer::kLongestAsk);
+  stream_.read_message_max(WebServer::kMaxPageRequest);
   stream_.auto_fragment(false);
   stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
     response.set(boost::beast::http::field::server, "tagwrench");
@@ -100,7 +100,7 @@ void WebSocketPage::open() {
     if (error || self->ended_) return self->end();
     self->open_ = true;
     self->heard_ = page_clock();
-    self->keeper_.opened(*self);
+    self->daemon_.opened(*self);
     self->read();
     self->pump();
   });
@@ -114,18 +114,18 @@ void WebSocketPage::read() {
 }
 
 void WebSocketPage::take(const error_code& error) {
-  if (error == websocket::error::message_too_big) keeper_.misbehaved(Refusal::flood);
+  if (error == websocket::error::message_too_big) daemon_.misbehaved(Refusal::flood);
   if (error) return end();
   heard_ = page_clock();
   if (!is_open()) return read();  // until its good-bye comes
   if (!rate_.count(heard_)) {
-    keeper_.misbehaved(Refusal::flood);
+    daemon_.misbehaved(Refusal::flood);
     close(websocket::close_code::policy_error, "more than 40 messages a second");
   } else if (!stream_.got_text()) {
     close(websocket::close_code::unknown_data, "text only");
   } else {
     const auto bytes = incoming_.cdata();
-    keeper_.said(*this, {static_cast<const char*>(bytes.data()), bytes.size()});
+    daemon_.said(*this, {static_cast<const char*>(bytes.data()), bytes.size()});
   }
   incoming_.consume(incoming_.size());
   read();
@@ -171,7 +171,7 @@ void WebSocketPage::pump() {
   if (ping_due_) return ping();
   if (auto text = outbox_.next_text()) return write(text, text->data(), text->size(), true);
   if (std::exchange(samples_due_, false))
-    if (auto text = keeper_.samples(*this)) return write(text, text->data(), text->size(), true);
+    if (auto text = daemon_.samples(*this)) return write(text, text->data(), text->size(), true);
   if (auto picture = outbox_.next_picture())
     write(picture, picture->data(), picture->size(), false);
 }
@@ -220,14 +220,14 @@ void WebSocketPage::end() {
   if (std::exchange(ended_, true)) return;
   closing_ = true;
   drop();
-  keeper_.gone(id_);
+  daemon_.gone(id_);
 }
 
 }  // namespace
 
-std::shared_ptr<PageSocket> PageSocket::make(PageRequest&& request, std::uint64_t id,
-                                             PageKeeper& keeper, const WebPatience& patience) {
-  return std::make_shared<WebSocketPage>(std::move(request), id, keeper, patience);
+std::shared_ptr<PageSocket> PageSocket::make(PageUpgrade&& request, std::uint64_t id,
+                                             PageOwner& daemon, const WebPatience& patience) {
+  return std::make_shared<WebSocketPage>(std::move(request), id, daemon, patience);
 }
 
 }  // namespace tagwrench

@@ -13,13 +13,13 @@
 
 namespace tagwrench {
 
-struct PageRequest;
+struct PageUpgrade;
 class PageSocket;
 
 /// Whom a page tells.
-class PageKeeper {
+class PageOwner {
  public:
-  virtual ~PageKeeper() = default;
+  virtual ~PageOwner() = default;
   virtual void opened(PageSocket& page) = 0;
   virtual void said(PageSocket& page, std::string_view text) = 0;
   /// What the page has not seen yet; null: nothing.
@@ -34,8 +34,8 @@ class PageSocket {
   static constexpr Duration kGoodBye = std::chrono::milliseconds(500);
 
   /// What `request` holds is moved from.
-  static std::shared_ptr<PageSocket> make(PageRequest&& request, std::uint64_t id,
-                                          PageKeeper& keeper, const WebPatience& patience);
+  static std::shared_ptr<PageSocket> make(PageUpgrade&& request, std::uint64_t id,
+                                          PageOwner& daemon, const WebPatience& patience);
   PageSocket(const PageSocket&) = delete;
   PageSocket& operator=(const PageSocket&) = delete;
   virtual ~PageSocket() = default;

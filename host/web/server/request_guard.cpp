@@ -6,8 +6,8 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::size_t kLongestHost = 261;  // a name of 255, and a port
-constexpr std::size_t kLongestToken = 512;
+constexpr std::size_t kMaxHost = 261;  // a name of 255, and a port
+constexpr std::size_t kMaxToken = 512;
 
 bool is_alphanumeric(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
@@ -42,7 +42,7 @@ bool is_loopback_number(std::string_view name) {
 
 /// "name", "name:port", "[number]" and "[number]:port" without the port; empty: none of these.
 std::string_view host_name(std::string_view host) {
-  if (host.empty() || host.size() > kLongestHost) return {};
+  if (host.empty() || host.size() > kMaxHost) return {};
   const std::size_t bracket = host.front() == '[' ? host.find(']') : 0;
   if (bracket == std::string_view::npos) return {};
   const std::size_t colon = host.find(':', bracket);
@@ -104,12 +104,12 @@ bool is_own_origin(std::string_view origin, std::string_view host) noexcept {
 
 bool is_token(std::string_view given, std::string_view token) noexcept {
   unsigned difference = given.size() == token.size() ? 0 : 1;
-  for (std::size_t i = 0; i < kLongestToken; ++i) {
+  for (std::size_t i = 0; i < kMaxToken; ++i) {
     const char mine = i < token.size() ? token[i] : '\0';
     const char his = i < given.size() ? given[i] : '\0';
     difference |= static_cast<unsigned char>(mine ^ his);
   }
-  return difference == 0 && given.size() <= kLongestToken;
+  return difference == 0 && given.size() <= kMaxToken;
 }
 
 std::string_view bearer_token(std::string_view authorization) noexcept {
@@ -127,7 +127,7 @@ std::optional<std::string> protocol_token(std::string_view protocols) {
   any_entry(protocols, [&](std::string_view entry) {
     if (entry.substr(0, RequestGuard::kTokenProtocol.size()) != RequestGuard::kTokenProtocol)
       return false;
-    token = from_base64url(entry.substr(RequestGuard::kTokenProtocol.size()), kLongestToken);
+    token = from_base64url(entry.substr(RequestGuard::kTokenProtocol.size()), kMaxToken);
     return true;
   });
   return token;

@@ -31,7 +31,7 @@ enum class Refusal : std::uint8_t {
   path,      ///< would leave the folder
   crowd,     ///< too many pages or connections
   flood,     ///< too much, too often or too large
-  nonsense,  ///< not HTTP, not WebSocket, not a wish
+  nonsense,  ///< not HTTP, not WebSocket, not a request
 };
 
 /// A name or a number with at most a port, and nothing else: safe to be repeated in a header.

@@ -28,7 +28,7 @@ std::string sample_text(const LiveSample& live) {
   std::string text(line.substr(0, line.rfind('}')));
   const bool numbers = carries_numbers(shown_status(live.sample));
   append_six(text, "zero", live.sample.zero);
-  append_six(text, "motion", numbers ? live.sample.motion : Vector6::Zero());
+  append_six(text, "motion", numbers ? live.sample.deflection : Vector6::Zero());
   fmt::format_to(std::back_inserter(text),
                  R"(,"zero_state":"{}","buttons":{},"residual_px":{:.4g},"tags_held":{}}})",
                  name(live.sample.zero_state), live.sample.buttons, finite(live.residual_px),
@@ -46,7 +46,7 @@ void SampleStream::pull() {
     frames_ = live->frames;
     dropped_ = live->dropped;
     entries_.push_back({next_, sample_text(*live)});
-    if (entries_.size() > kMost) entries_.pop_front();
+    if (entries_.size() > kMax) entries_.pop_front();
     made_ = nullptr;
   }
 }

@@ -16,7 +16,7 @@ std::string sample_text(const LiveSample& live);
 
 class SampleStream {
  public:
-  static constexpr std::size_t kMost = 64;  ///< in a message
+  static constexpr std::size_t kMax = 64;  ///< in a message
 
   explicit SampleStream(const LiveFeed& feed) : feed_(feed) {}
 
@@ -26,7 +26,7 @@ class SampleStream {
   void skip();
 
   std::uint64_t end() const noexcept { return next_; }
-  /// All from this position on, but at most the last kMost; the others count as lost. Null: there
+  /// All from this position on, but at most the last kMax; the others count as lost. Null: there
   /// is nothing new.
   std::shared_ptr<const std::string> message(std::uint64_t from);
   LiveFigures figures(TimePoint now) const;

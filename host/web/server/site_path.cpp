@@ -8,7 +8,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::size_t kLongestTarget = 1024;
+constexpr std::size_t kMaxTarget = 1024;
 constexpr std::size_t kDeepestFolder = 8;
 
 int hex_value(char c) {
@@ -54,7 +54,7 @@ bool is_file_name(std::string_view name) noexcept {
 }
 
 std::optional<SitePath> parse_target(std::string_view target) {
-  if (target.empty() || target.front() != '/' || target.size() > kLongestTarget) return {};
+  if (target.empty() || target.front() != '/' || target.size() > kMaxTarget) return {};
   std::string_view left = target.substr(1, std::min(target.find('?'), target.size()) - 1);
   SitePath path;
   path.folder = left.empty() || left.back() == '/';

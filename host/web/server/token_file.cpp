@@ -17,8 +17,8 @@
 namespace tagwrench {
 namespace {
 
-constexpr std::size_t kShortest = 16;
-constexpr std::size_t kLongest = 128;
+constexpr std::size_t kMin = 16;
+constexpr std::size_t kMax = 128;
 constexpr std::size_t kRandomCharacters = 43;  // 258 bits
 
 constexpr std::string_view kAlphabet =
@@ -30,7 +30,7 @@ static_assert(kAlphabet.size() == 64);
 }
 
 bool is_token_text(std::string_view text) {
-  return text.size() >= kShortest && text.size() <= kLongest &&
+  return text.size() >= kMin && text.size() <= kMax &&
          std::all_of(text.begin(), text.end(), [](char c) {
            return kAlphabet.find(c) != std::string_view::npos || c == '.' || c == '~';
          });
@@ -62,7 +62,7 @@ std::string read_token(const std::filesystem::path& file, int fd) {
   if (::fstat(fd, &facts) != 0 || !S_ISREG(facts.st_mode)) token_trouble(file, "is not a file");
   if ((facts.st_mode & 077) != 0)
     token_trouble(file, "others may read it; chmod 600, and better write a new one");
-  std::array<char, kLongest + 2> bytes;
+  std::array<char, kMax + 2> bytes;
   const ssize_t size = ::read(fd, bytes.data(), bytes.size());
   std::string_view text(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
   while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.remove_suffix(1);

@@ -17,7 +17,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
-#include "host/core/tell.h"
+#include "host/core/log.h"
 #include "host/web/server/http_connection.h"
 #include "host/web/server/page_hub.h"
 #include "host/web/server/refusal_log.h"
@@ -29,7 +29,7 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::size_t kMostTurnedAway = 16;  // at once; more are closed without a word
+constexpr std::size_t kMaxTurnedAway = 16;  // at once; more are closed without a word
 constexpr Duration kCheckEvery = std::chrono::milliseconds(250);
 constexpr Duration kFarewell = std::chrono::milliseconds(700);
 constexpr int kNice = 5;  // frames go before pages
@@ -80,7 +80,7 @@ tcp::acceptor listener(asio::io_context& context, const WebOptions& options) {
 
 }  // namespace
 
-class WebServer::Site final : public ConnectionKeeper {
+class WebServer::Site final : public ConnectionOwner {
  public:
   explicit Site(const WebOptions& options)
       : token(options.token),
@@ -102,7 +102,7 @@ class WebServer::Site final : public ConnectionKeeper {
     thread_.join();
   }
 
-  void start(AskHandler& handler) {
+  void start(PageRequestHandler& handler) {
     hub.start(handler);
     accept();
     check();
@@ -122,11 +122,11 @@ class WebServer::Site final : public ConnectionKeeper {
     return hub.has_room() ? Refusal::none : Refusal::crowd;
   }
 
-  void becomes_page(PageRequest&& request) override { hub.add(std::move(request)); }
+  void becomes_page(PageUpgrade&& request) override { hub.add(std::move(request)); }
 
   void refused(Refusal refusal, std::string_view detail) override {
     const std::string line = log_.line(refusal, detail, std::chrono::steady_clock::now());
-    if (!line.empty()) tell(line);
+    if (!line.empty()) log_info(line);
   }
 
   void closed(HttpConnection& connection) override { connections_.erase(&connection); }
@@ -146,7 +146,7 @@ class WebServer::Site final : public ConnectionKeeper {
       try {
         context.run();
       } catch (const std::exception& error) {  // one page's trouble is not the next one's
-        tell(std::string("web: ") + error.what());
+        log_info(std::string("web: ") + error.what());
         again = true;
       }
     }
@@ -173,9 +173,9 @@ class WebServer::Site final : public ConnectionKeeper {
     const auto away = std::count_if(connections_.begin(), connections_.end(),
                                     [](const auto& one) { return one.first->is_turned_away(); });
     const auto turned_away = static_cast<std::size_t>(away);
-    const bool room = connections_.size() - turned_away + hub.pages() < kMostConnections;
+    const bool room = connections_.size() - turned_away + hub.pages() < kMaxConnections;
     if (!room) refused(Refusal::crowd, {});
-    if (!room && turned_away >= kMostTurnedAway) return;
+    if (!room && turned_away >= kMaxTurnedAway) return;
     const auto connection = HttpConnection::make(std::move(socket), *this, patience_);
     connections_.emplace(connection.get(), connection);
     if (room)
@@ -224,7 +224,7 @@ class WebServer::Site final : public ConnectionKeeper {
 WebServer::WebServer(const WebOptions& options) : site_(std::make_unique<Site>(options)) {}
 WebServer::~WebServer() = default;
 
-void WebServer::start(AskHandler& handler) { site_->start(handler); }
+void WebServer::start(PageRequestHandler& handler) { site_->start(handler); }
 void WebServer::stop() { site_->stop(); }
 LiveFeed& WebServer::feed() noexcept { return site_->hub.feed(); }
 std::uint16_t WebServer::port() const noexcept { return site_->endpoint.port(); }

@@ -1,5 +1,6 @@
 // The bridge's pages: a small HTTP and WebSocket server with a thread of its own. It hands out the
-// built pages, what the live feed reads, and the bridge's messages; and it takes the pages' wishes.
+// built pages, what the live feed reads, and the bridge's messages; and it takes the pages'
+// requests.
 //
 // Everything that comes in is untrusted and bounded: see host/web/README.md.
 #pragma once
@@ -23,18 +24,18 @@ class io_context;
 namespace tagwrench {
 
 class LiveFeed;
-struct Ask;
+struct PageRequest;
 
 /// Called by the server's thread. Whoever is asked owes exactly one WebServer::answer(), now or
 /// later; an exception is answered with its text.
-class AskHandler {
+class PageRequestHandler {
  public:
-  AskHandler() = default;
-  AskHandler(const AskHandler&) = delete;
-  AskHandler& operator=(const AskHandler&) = delete;
-  virtual ~AskHandler() = default;
+  PageRequestHandler() = default;
+  PageRequestHandler(const PageRequestHandler&) = delete;
+  PageRequestHandler& operator=(const PageRequestHandler&) = delete;
+  virtual ~PageRequestHandler() = default;
 
-  virtual void ask(Ask ask) = 0;
+  virtual void handle(PageRequest request) = 0;
   /// Has got its hello and will hear send_all().
   virtual void page_came(std::uint64_t /*page*/) {}
   virtual void page_gone(std::uint64_t /*page*/) {}
@@ -42,10 +43,10 @@ class AskHandler {
 
 class WebServer {
  public:
-  static constexpr std::size_t kMostPages = 16;
-  static constexpr std::size_t kMostConnections = 64;
-  static constexpr std::size_t kLongestAsk = 20'000;
-  static constexpr std::size_t kMostAsksASecond = 40;
+  static constexpr std::size_t kMaxPages = 16;
+  static constexpr std::size_t kMaxConnections = 64;
+  static constexpr std::size_t kMaxPageRequest = 20'000;
+  static constexpr std::size_t kMaxPageRequestsPerSecond = 40;
 
   /// Binds and listens, in no thread yet. Throws ConfigError: the address cannot be used, or needs
   /// a token.
@@ -57,7 +58,7 @@ class WebServer {
 
   /// Starts the thread. No signal is ever delivered to it. Without this, nothing is served. The
   /// handler is borrowed until stop().
-  void start(AskHandler& handler);
+  void start(PageRequestHandler& handler);
   /// Says good-bye to all pages (1001), and waits for the thread: the handler is not called any
   /// more.
   void stop();

@@ -78,8 +78,8 @@ void tagwrench_zero(PageCore* core) {
   if (core->session) core->session->ask_zero();
 }
 
-const char* tagwrench_hint(PageCore* core) {
-  return core->session ? core->session->hint().c_str() : "";
+const char* tagwrench_diagnostic(PageCore* core) {
+  return core->session ? core->session->diagnostic().c_str() : "";
 }
 
 const char* tagwrench_learned(PageCore* core) {

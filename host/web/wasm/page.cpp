@@ -49,7 +49,7 @@ PageLook page_find_squares(const std::uint8_t* pixels, int width, int height, co
                            bool sharpen, PageSquares& squares) {
   std::int32_t counts[2] = {0, 0};
   const int look = tagwrench_page_find_squares(
-      pixels, width, height, family, sharpen ? 1 : 0, kMostPageSquares, counts, squares.id,
+      pixels, width, height, family, sharpen ? 1 : 0, kMaxPageSquares, counts, squares.id,
       &squares.tag_corners[0][0], &squares.other_corners[0][0]);
   squares.tags = counts[0];
   squares.others = counts[1];

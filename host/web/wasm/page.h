@@ -15,14 +15,14 @@ bool page_decode_png(const std::uint8_t* bytes, std::size_t count, int width, in
                      std::uint16_t* grey);
 
 /// Most squares of a kind that are taken from the page.
-constexpr int kMostPageSquares = 512;
+constexpr int kMaxPageSquares = 512;
 
 struct PageSquares {
   std::int32_t tags = 0;
   std::int32_t others = 0;
-  std::int32_t id[kMostPageSquares];
-  float tag_corners[kMostPageSquares][8];  ///< x, y of each, px
-  float other_corners[kMostPageSquares][8];
+  std::int32_t id[kMaxPageSquares];
+  float tag_corners[kMaxPageSquares][8];  ///< x, y of each, px
+  float other_corners[kMaxPageSquares][8];
 };
 
 enum class PageLook : std::int32_t { found = 0, no_finder = 1, refused = 2 };

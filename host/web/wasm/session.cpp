@@ -10,8 +10,8 @@
 #include "host/core/yaml/yaml_reader.h"
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/zero_options.h"
-#include "host/tracker/diagnosis.h"
-#include "host/tracker/hint_text.h"
+#include "host/tracker/diagnostic_text.h"
+#include "host/tracker/diagnostics.h"
 #include "host/tracker/rotation.h"
 #include "host/wrench/zero_text.h"
 
@@ -120,7 +120,7 @@ void Session::fill(const Track& track, const Sample& sample) noexcept {
   sample_.zero_state = static_cast<double>(sample.zero_state);
   sample_.tags_held = track.tags_held;
   sample_.residual_px = track.residual_px;
-  sample_.residual_part = track.residual_part;
+  sample_.residual_fraction = track.residual_fraction;
   sample_.blur_px2 = track.blur_px2;
   const Region& wanted = track.wanted;
   sample_.wanted = {static_cast<double>(wanted.x), static_cast<double>(wanted.y),
@@ -137,18 +137,19 @@ void Session::fill(const Track& track, const Sample& sample) noexcept {
 void Session::note(const Track& track) noexcept {
   try {
     if (const std::string_view line = zero_text(zero_.take_answer()); !line.empty()) {
-      hint_ = line;
+      diagnostic_ = line;
       sample_.news = 1;
     }
     if (track.status == Status::ok && trouble_shown_) {
       trouble_shown_ = false;
-      hint_.clear();
+      diagnostic_.clear();
       sample_.news = 1;
     }
-    const bool trouble = is_trouble(track.hint);
-    if (track.hint == Hint::none || (track.hint == last_hint_ && !trouble)) return;
-    last_hint_ = track.hint;
-    hint_ = hint_text(track.hint, track.details);
+    const bool trouble = is_trouble(track.diagnostic);
+    if (track.diagnostic == Diagnostic::none || (track.diagnostic == last_diagnostic_ && !trouble))
+      return;
+    last_diagnostic_ = track.diagnostic;
+    diagnostic_ = diagnostic_text(track.diagnostic, track.details);
     trouble_shown_ = trouble_shown_ || (trouble && track.status != Status::ok);
     sample_.news = 1;
   } catch (const std::exception&) {
@@ -178,7 +179,7 @@ std::string Session::description() const {
 }
 
 std::string Session::learned() const {
-  const KnownRest& rest = tracker_.rest();
+  const KnownReference& rest = tracker_.rest();
   if (!rest.known) return "null";
   json tags = json::array();
   for (std::size_t t = 0; t < sensor_.target.tags.size(); ++t) {

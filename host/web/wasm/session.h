@@ -16,20 +16,20 @@ namespace tagwrench {
 
 /// One sample as numbers, for whoever reads the core's memory: core.ts knows the places too.
 struct PageSample {
-  static constexpr std::size_t kMostTags = 8;
+  static constexpr std::size_t kMaxTags = 8;
 
   double status = 0;  ///< as Status counts
   std::array<double, 6> displacement{}, displacement_sigma{}, wrench{}, wrench_sigma{}, zero{};
   double zero_state = 0;  ///< as ZeroState counts
   double tags_held = 0;
   double residual_px = 0;
-  double residual_part = 0;
+  double residual_fraction = 0;
   double blur_px2 = 0;
   std::array<double, 4> wanted{};  ///< x, y, width, height; zeros: all
   double needs_whole_frame = 0;
-  double news = 0;  ///< 1: hint() has changed
+  double news = 0;  ///< 1: diagnostic() has changed
   double tags = 0;
-  std::array<std::array<double, 9>, kMostTags> tag{};  ///< id, then x, y of its corners
+  std::array<std::array<double, 9>, kMaxTags> tag{};  ///< id, then x, y of its corners
 };
 
 class Session {
@@ -47,7 +47,7 @@ class Session {
   void ask_zero() noexcept { zero_.ask(); }
 
   /// What the tracker noticed last, in words; empty when all is well.
-  const std::string& hint() const noexcept { return hint_; }
+  const std::string& diagnostic() const noexcept { return diagnostic_; }
   /// What there is to know about the sensor, as JSON.
   std::string description() const;
   /// The rest and the tags' places as they are known by now, as JSON; "null" before.
@@ -63,8 +63,8 @@ class Session {
   WrenchEstimator wrench_;
   ZeroTracking zero_;
   PageSample sample_;
-  std::string hint_;
-  Hint last_hint_ = Hint::none;
+  std::string diagnostic_;
+  Diagnostic last_diagnostic_ = Diagnostic::none;
   bool trouble_shown_ = false;
 };
 

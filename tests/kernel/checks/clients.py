@@ -60,7 +60,7 @@ def check_against_jsonl(reports):
     with open(JSONL, encoding="utf-8") as file:
         own = {(s["seq"], names.index(s["status"])): s for s in map(json.loads, file.read().splitlines())}
     compared, worst, late, sigmas, strangers = 0, 0.0, 0, 0, []
-    guardian = sum(report["capture_ns"] == 0 for report in reports)  # its neutral reports belong to no frame
+    watchdog = sum(report["capture_ns"] == 0 for report in reports)  # its neutral reports belong to no frame
     reports = [report for report in reports if report["capture_ns"] != 0]
     for report in reports:
         sample = own.get((report["seq"], report["status"]))
@@ -75,7 +75,7 @@ def check_against_jsonl(reports):
         late = max(late, abs(report["capture_ns"] - sample["t_ns"]))
     rig.check("every wrench report is in the bridge's own jsonl", compared > 100 and compared == len(reports),
               f"{compared} of {len(reports)}; not there: {strangers[:8]}")
-    print(f"     {compared} reports compared; {guardian} more came from the guardian, because frames came late")
+    print(f"     {compared} reports compared; {watchdog} more came from the watchdog, because frames came late")
     rig.check("newtons and sigmas from the descriptor alone equal the bridge's own to 1 uN, 1 uN m", worst <= 1.001e-6,
               f"{worst} off")
     rig.check("sigmas are there", sigmas > 100, f"{sigmas} reports with six sigmas")

@@ -62,7 +62,7 @@ def bridge_samples():
 
 def compare(what, readings, own):
     """Readings (sequence, status, six numbers) against the bridge's own; returns the largest force along z."""
-    readings = [reading for reading in readings if not (reading[0] == 0 and reading[1] == "lost")]  # of its guardian
+    readings = [reading for reading in readings if not (reading[0] == 0 and reading[1] == "lost")]  # of its watchdog
     strangers = []
     worst = numbers = 0
     for sequence, status, values in readings:

@@ -52,11 +52,11 @@ class BoardLinkTest : public ::testing::Test {
         if (const auto out = board.take_out(); !out.empty()) device.write(out);
       }
       if (fds[0].revents != 0) link.service();
-      for (News item; link.next(item);) news.push_back(item.kind);
+      for (BoardEvent item; link.next(item);) news.push_back(item.kind);
     }
     return true;
   }
-  bool told(News::Kind kind) const {
+  bool told(BoardEvent::Kind kind) const {
     return std::find(news.begin(), news.end(), kind) != news.end();
   }
 
@@ -65,13 +65,13 @@ class BoardLinkTest : public ::testing::Test {
   Pty device;
   fs::path folder;
   std::string port;
-  std::vector<News::Kind> news;
+  std::vector<BoardEvent::Kind> news;
 };
 
 TEST_F(BoardLinkTest, ABoardOnAPortBecomesReady) {
   BoardLink link(port, new_session());
   EXPECT_TRUE(serve(link, [&] { return link.session().state() == BoardState::ready; }));
-  EXPECT_TRUE(told(News::Kind::connected));
+  EXPECT_TRUE(told(BoardEvent::Kind::connected));
 }
 
 TEST_F(BoardLinkTest, UnpluggedAndPluggedInAgainItGoesOnByItself) {
@@ -90,8 +90,8 @@ TEST_F(BoardLinkTest, UnpluggedAndPluggedInAgainItGoesOnByItself) {
     board.leds.clear();
     ASSERT_TRUE(serve(link, [&] { return !board.leds.empty() && board.configured; })) << i;
   }
-  EXPECT_EQ(std::count(news.begin(), news.end(), News::Kind::unplugged), 3);
-  EXPECT_EQ(std::count(news.begin(), news.end(), News::Kind::plugged), 3);
+  EXPECT_EQ(std::count(news.begin(), news.end(), BoardEvent::Kind::unplugged), 3);
+  EXPECT_EQ(std::count(news.begin(), news.end(), BoardEvent::Kind::plugged), 3);
   EXPECT_EQ(link.session().counters().restarts, 3u);
 }
 

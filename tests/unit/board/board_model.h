@@ -62,8 +62,8 @@ class BoardModel {
 
   template <class Message>
   void send(const Message& message) {
-    std::uint8_t body[kMostBodyBytes];
-    std::uint8_t frame[kMostFrameBytes];
+    std::uint8_t body[kMaxBodyBytes];
+    std::uint8_t frame[kMaxFrameBytes];
     const std::uint8_t count = encode(message, sequence_++, body);
     out.insert(out.end(), frame, frame + write_frame(body, count, frame));
   }

@@ -32,7 +32,7 @@ class BoardSessionTest : public ::testing::Test {
   void run(double seconds) {
     const double until = now + seconds;
     while (now < until) {
-      std::uint8_t bytes[BoardSession::kMostBytesOut];
+      std::uint8_t bytes[BoardSession::kMaxBytesOut];
       const std::size_t count = session.poll(SyntheticLink::host(now), bytes);
       sent += count;
       const double arrived = now + static_cast<double>(count) * 20e-6;
@@ -43,7 +43,7 @@ class BoardSessionTest : public ::testing::Test {
         session.take(reply,
                      SyntheticLink::host(arrived + static_cast<double>(reply.size()) * 20e-6));
       }
-      for (News item; session.next(item);) news.push_back(item);
+      for (BoardEvent item; session.next(item);) news.push_back(item);
       now += 1e-3;
       if (session.state() == BoardState::ready && status_period > 0 && now > next_status) {
         Status status{};
@@ -54,14 +54,15 @@ class BoardSessionTest : public ::testing::Test {
       }
     }
   }
-  bool told(News::Kind kind) const {
-    return std::any_of(news.begin(), news.end(), [&](const News& n) { return n.kind == kind; });
+  bool told(BoardEvent::Kind kind) const {
+    return std::any_of(news.begin(), news.end(),
+                       [&](const BoardEvent& n) { return n.kind == kind; });
   }
 
   SyntheticLink clock;
   BoardModel board;
   BoardSession session;
-  std::vector<News> news;
+  std::vector<BoardEvent> news;
   double now = SyntheticLink::kStart + 1;
   double next_status = 0;
   double status_period = 1;

@@ -17,13 +17,14 @@ TEST_F(BoardSessionTest, ARestartedBoardIsConfiguredAndLitAgainAndSaid) {
   board.leds.clear();
   news.clear();
   run(3);
-  EXPECT_TRUE(told(News::Kind::restarted));
+  EXPECT_TRUE(told(BoardEvent::Kind::restarted));
   EXPECT_EQ(session.counters().restarts, 1u);
   EXPECT_TRUE(board.configured);
   ASSERT_FALSE(board.leds.empty());
   EXPECT_EQ(board.leds.back().level_permille, 200);
-  const auto restarted = std::find_if(
-      news.begin(), news.end(), [](const News& n) { return n.kind == News::Kind::restarted; });
+  const auto restarted = std::find_if(news.begin(), news.end(), [](const BoardEvent& n) {
+    return n.kind == BoardEvent::Kind::restarted;
+  });
   EXPECT_NE(text(*restarted).find("watchdog"), std::string::npos);
   const double error = SyntheticLink::seconds(session.clock().to_host(clock.board_us(now)).time -
                                               SyntheticLink::host(now));
@@ -49,9 +50,10 @@ TEST_F(BoardSessionTest, AnotherHostOnTheSameBoardIsSaidOnce) {
     board.hello.session = 0xBAD;
     run(1.2);
   }
-  EXPECT_EQ(std::count_if(news.begin(), news.end(),
-                          [](const News& n) { return n.kind == News::Kind::other_host; }),
-            1);
+  EXPECT_EQ(
+      std::count_if(news.begin(), news.end(),
+                    [](const BoardEvent& n) { return n.kind == BoardEvent::Kind::other_host; }),
+      1);
 }
 
 TEST_F(BoardSessionTest, LightIsRepeatedEverySecondAndOnceAtOnce) {
@@ -71,9 +73,10 @@ TEST_F(BoardSessionTest, ARefusedLightIsSaidOnce) {
   run(1);
   session.set_led(steady(2000));
   run(4);
-  EXPECT_EQ(std::count_if(news.begin(), news.end(),
-                          [](const News& n) { return n.kind == News::Kind::led_refused; }),
-            1);
+  EXPECT_EQ(
+      std::count_if(news.begin(), news.end(),
+                    [](const BoardEvent& n) { return n.kind == BoardEvent::Kind::led_refused; }),
+      1);
 }
 
 TEST_F(BoardSessionTest, AnOldStartOfAPatternIsMovedOnWithoutMovingItsBits) {

@@ -15,7 +15,7 @@ TEST_F(BoardSessionTest, HandshakeConfiguresTheBoardAndStartsItsClock) {
   EXPECT_EQ(board.configuration.cell_rate_sps, 80);
   EXPECT_EQ(board.configuration.host_timeout_ms, 5000);
   EXPECT_EQ(session.capabilities().led_levels, 256);
-  EXPECT_TRUE(told(News::Kind::connected));
+  EXPECT_TRUE(told(BoardEvent::Kind::connected));
   EXPECT_TRUE(session.clock().report().converged);
   EXPECT_NEAR(session.clock().report().skew_ppm, 1500, 50);
   EXPECT_EQ(session.counters().lost_frames, 0u);
@@ -28,7 +28,7 @@ TEST_F(BoardSessionTest, HelloIsRepeatedFourTimesASecondUntilAnswered) {
   board.answers = true;
   const std::size_t hello_bytes = sent;
   EXPECT_GE(hello_bytes, 7u * 8);
-  EXPECT_LE(hello_bytes, 9u * kMostFrameBytes);
+  EXPECT_LE(hello_bytes, 9u * kMaxFrameBytes);
   run(0.5);
   EXPECT_EQ(session.state(), BoardState::ready);
 }
@@ -46,7 +46,7 @@ TEST_F(BoardSessionTest, ABoardWithTooOldFirmwareIsToBeUpdated) {
   run(3);
   EXPECT_EQ(session.state(), BoardState::other_version);
   ASSERT_EQ(news.size(), 1u) << "said once";
-  EXPECT_EQ(news[0].kind, News::Kind::board_too_old);
+  EXPECT_EQ(news[0].kind, BoardEvent::Kind::board_too_old);
   EXPECT_NE(text(news[0]).find("update the board"), std::string::npos) << text(news[0]);
   EXPECT_FALSE(board.configured);
   board.hello.protocol_major = kProtocolMajor;  // flashed
@@ -59,7 +59,7 @@ TEST_F(BoardSessionTest, ABoardWithNewerFirmwareNeedsANewerHost) {
   board.hello.protocol_major = kProtocolMajor + 1;
   run(2);
   ASSERT_EQ(news.size(), 1u);
-  EXPECT_EQ(news[0].kind, News::Kind::host_too_old);
+  EXPECT_EQ(news[0].kind, BoardEvent::Kind::host_too_old);
   EXPECT_NE(text(news[0]).find("update tagwrench"), std::string::npos) << text(news[0]);
 }
 
@@ -71,14 +71,14 @@ TEST_F(BoardSessionTest, AHigherMinorVersionIsSpokenTo) {
 
 TEST_F(BoardSessionTest, ABoardWithAnIdKeepsIt) {
   run(1);
-  EXPECT_FALSE(told(News::Kind::id_given));
+  EXPECT_FALSE(told(BoardEvent::Kind::id_given));
   EXPECT_EQ(board.hello.unique_id.bytes[0], 1);
 }
 
 TEST_F(BoardSessionTest, ABoardWithoutIdIsGivenOne) {
   board.hello.unique_id = {};
   run(1);
-  EXPECT_TRUE(told(News::Kind::id_given));
+  EXPECT_TRUE(told(BoardEvent::Kind::id_given));
   EXPECT_EQ(board.hello.unique_id.count, 8);
   EXPECT_EQ(board.hello.unique_id.bytes[0], 9);
   EXPECT_EQ(session.hello().unique_id.bytes[0], 9);
@@ -87,7 +87,7 @@ TEST_F(BoardSessionTest, ABoardWithoutIdIsGivenOne) {
 TEST_F(BoardSessionTest, ARefusedConfigurationIsSaid) {
   board.configure_result = Result::out_of_range;
   run(1);
-  EXPECT_TRUE(told(News::Kind::configuration_refused));
+  EXPECT_TRUE(told(BoardEvent::Kind::configuration_refused));
 }
 
 TEST_F(BoardSessionTest, ReadingsCarryHostTimeAndItsSigma) {
@@ -204,7 +204,7 @@ TEST_F(BoardSessionTest, AnOrderOnTheWireDoesNotMakeARequestLate) {
     for (const double ahead : {0.1e-3, 0.0}) {  // an order right before each time request
       if (ahead > 0) session.set_led(steady(static_cast<std::uint16_t>(i)));
       now = SyntheticLink::seconds(due.time_since_epoch()) - ahead;
-      std::uint8_t bytes[BoardSession::kMostBytesOut];
+      std::uint8_t bytes[BoardSession::kMaxBytesOut];
       const std::size_t count = session.poll(SyntheticLink::host(now), bytes);
       line_free = std::max(line_free, now) + static_cast<double>(count) * 20e-6;
       board.take({bytes, count}, line_free);
@@ -229,7 +229,7 @@ TEST_F(BoardSessionTest, WhatCameBeforeTheFirstFrameIsKeptForTheMessage) {
 TEST_F(BoardSessionTest, AUselessFrameIsCountedAndChangesNothing) {
   run(1);
   std::uint8_t body[] = {0xE7, 0, 1, 2, 3};  // a kind of the future
-  std::uint8_t frame[kMostFrameBytes];
+  std::uint8_t frame[kMaxFrameBytes];
   const std::uint8_t count = write_frame(body, sizeof body, frame);
   session.take({frame, count}, SyntheticLink::host(now));
   std::uint8_t broken[] = {static_cast<std::uint8_t>(Kind::cell_sample), 1, 0xFF, 0xFF, 0xFF};

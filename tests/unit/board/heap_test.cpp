@@ -46,7 +46,7 @@ TEST(LinkHeapTest, ServingABoardAllocatesNothingEvenWhenItIsUnplugged) {
       for (CellReading reading; link.session().next(reading); ++taken)
         history.add(reading.time.time, reading.time.sigma, reading.counts);
       history.at(std::chrono::steady_clock::now());
-      for (News news; link.next(news);) {
+      for (BoardEvent news; link.next(news);) {
       }
     });
   }

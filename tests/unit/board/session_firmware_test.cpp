@@ -55,13 +55,13 @@ class SessionFirmwareTest : public ::testing::Test {
           session.take(to_host.front().bytes, SyntheticLink::host(to_host.front().arrival));
         to_host.pop_front();
       }
-      std::uint8_t out[BoardSession::kMostBytesOut];
+      std::uint8_t out[BoardSession::kMaxBytesOut];
       const std::size_t count = session.poll(SyntheticLink::host(now), out);
       for (std::size_t i = 0; i < count && plugged; ++i) {
         const double complete = now + kDelay + kByte * static_cast<double>(i + 1);
         hardware.incoming.push_back({out[i], board_us(complete)});
       }
-      for (News item; session.next(item);) news.push_back(item);
+      for (BoardEvent item; session.next(item);) news.push_back(item);
     }
   }
 
@@ -70,14 +70,15 @@ class SessionFirmwareTest : public ::testing::Test {
     board::FakeBoard& hardware = board::fake_board();
     if (now < next_conversion) return;
     next_conversion = std::max(next_conversion + 1 / 80.0, now);
-    for (std::uint8_t i = 0; i < kMostCells; ++i) {
+    for (std::uint8_t i = 0; i < kMaxCells; ++i) {
       if (hardware.inputs[i] == CellInput::off || i == unwired) continue;
       hardware.conversions.push_back(
           {i, static_cast<std::int32_t>((now - kStart) * 1000), hardware.now_us, 0, false});
     }
   }
-  bool told(News::Kind kind) const {
-    return std::any_of(news.begin(), news.end(), [&](const News& n) { return n.kind == kind; });
+  bool told(BoardEvent::Kind kind) const {
+    return std::any_of(news.begin(), news.end(),
+                       [&](const BoardEvent& n) { return n.kind == kind; });
   }
 
   struct Batch {
@@ -95,7 +96,7 @@ class SessionFirmwareTest : public ::testing::Test {
   firmware::App app{0};
   BoardSession session;
   std::deque<Batch> to_host;
-  std::vector<News> news;
+  std::vector<BoardEvent> news;
 };
 
 TEST_F(SessionFirmwareTest, TheyUnderstandEachOther) {
@@ -106,7 +107,7 @@ TEST_F(SessionFirmwareTest, TheyUnderstandEachOther) {
   EXPECT_TRUE(session.has_status());
   EXPECT_EQ(session.status().session, options().session);
   EXPECT_EQ(board::fake_board().id.count, 8) << "it had none and was given one";
-  EXPECT_TRUE(told(News::Kind::id_given));
+  EXPECT_TRUE(told(BoardEvent::Kind::id_given));
   const SessionCounters counters = session.counters();
   EXPECT_EQ(counters.damaged_frames + counters.unknown_frames + counters.lost_frames, 0u);
 }
@@ -131,8 +132,8 @@ TEST_F(SessionFirmwareTest, SamplesHaveTheHostTimeOfTheirConversion) {
 TEST_F(SessionFirmwareTest, ACellThatIsNotWiredIsAFaultAndNoSamples) {
   unwired = 2;
   run(4);
-  EXPECT_TRUE(std::any_of(news.begin(), news.end(), [](const News& n) {
-    return n.kind == News::Kind::fault &&
+  EXPECT_TRUE(std::any_of(news.begin(), news.end(), [](const BoardEvent& n) {
+    return n.kind == BoardEvent::Kind::fault &&
            n.value == static_cast<std::uint32_t>(FaultCode::cell_silent) && n.other == 2;
   }));
   for (CellReading reading; session.next(reading);) EXPECT_NE(reading.channel, 2);
@@ -165,7 +166,7 @@ TEST_F(SessionFirmwareTest, ABoardThatWasResetIsSetUpAgain) {
   start(8, ResetCause::watchdog);
   EXPECT_TRUE(board::fake_board().dark());
   run(4);
-  EXPECT_TRUE(told(News::Kind::restarted));
+  EXPECT_TRUE(told(BoardEvent::Kind::restarted));
   EXPECT_EQ(board::fake_board().steady_permille, 100);
   EXPECT_EQ(session.counters().restarts, 1u);
   const double error = SyntheticLink::seconds(session.clock().to_host(board_us(now)).time -
@@ -214,7 +215,7 @@ TEST_F(SessionFirmwareTest, ALightBeyondTheLimitsIsRefusedByTheBoard) {
   led.width_us = 5;
   session.set_led(led);
   run(1);
-  EXPECT_TRUE(told(News::Kind::led_refused));
+  EXPECT_TRUE(told(BoardEvent::Kind::led_refused));
   EXPECT_TRUE(board::fake_board().dark());
 }
 

@@ -39,7 +39,7 @@ struct FakeBoard {
   std::int32_t heat = 0;    ///< that was kept; outlives a new App
   unsigned late_edges = 0;  ///< that were in the past when they were queued
 
-  link::CellInput inputs[link::kMostCells] = {};
+  link::CellInput inputs[link::kMaxCells] = {};
   std::uint8_t cell_rate_sps = 0;
   std::deque<Conversion> conversions;
 

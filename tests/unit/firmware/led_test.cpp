@@ -273,7 +273,7 @@ TEST_P(FirmwareLed, HeatOutlivesAReset) {
 TEST_P(FirmwareLed, AnEchoOfReportsIsNoHost) {
   greet();
   ASSERT_EQ(ask(steady(200)), link::Result::ok);
-  std::uint8_t body[link::kMostBodyBytes];
+  std::uint8_t body[link::kMaxBodyBytes];
   for (int i = 0; i < 60; ++i) {
     send_body(body, link::encode(link::Status{}, 0, body));
     run(100000);

@@ -92,15 +92,15 @@ TEST_P(FirmwareLink, ADepartureThatHasNotBeenYetIsNotTold) {
 
 TEST_P(FirmwareLink, TheRoomThatIsAskedForIsThatOfTheLongestReports) {
   const auto frame_bytes = [](const auto& message) {
-    std::uint8_t frame[link::kMostFrameBytes];
+    std::uint8_t frame[link::kMaxFrameBytes];
     return link::write_frame(frame + 1, link::encode(message, 255, frame + 1), frame);
   };
   const std::uint32_t most = 0xFFFFFFFF;
   EXPECT_EQ(frame_bytes(link::CellSample{3, -0x800000, most, 0xFFFF, 0xFFFF, true}),
-            Link::kMostSampleBytes);
-  EXPECT_LE(frame_bytes(link::AdcSample{1, 0xFFFF, most, 0xFFFF}), Link::kMostSampleBytes);
-  EXPECT_EQ(frame_bytes(link::TimeReply{255, most, 255, most, true}), Link::kMostAnswerBytes);
-  EXPECT_LE(frame_bytes(link::Answer{255, 255, link::Result::already_set}), Link::kMostAnswerBytes);
+            Link::kMaxSampleBytes);
+  EXPECT_LE(frame_bytes(link::AdcSample{1, 0xFFFF, most, 0xFFFF}), Link::kMaxSampleBytes);
+  EXPECT_EQ(frame_bytes(link::TimeReply{255, most, 255, most, true}), Link::kMaxAnswerBytes);
+  EXPECT_LE(frame_bytes(link::Answer{255, 255, link::Result::already_set}), Link::kMaxAnswerBytes);
 }
 
 TEST_P(FirmwareLink, ARequestWaitsUntilThereIsRoomForItsAnswer) {

@@ -21,13 +21,13 @@ class Rig : public testing::Test {
 
   template <class Message>
   std::uint8_t send(const Message& message) {
-    std::uint8_t body[link::kMostBodyBytes];
+    std::uint8_t body[link::kMaxBodyBytes];
     const std::uint8_t sequence = sequence_++;
     send_body(body, link::encode(message, sequence, body));
     return sequence;
   }
   void send_body(const std::uint8_t* body, std::uint8_t count) {
-    std::uint8_t frame[link::kMostFrameBytes];
+    std::uint8_t frame[link::kMaxFrameBytes];
     const std::uint8_t bytes = link::write_frame(body, count, frame);
     for (std::uint8_t i = 0; i < bytes; ++i) board.incoming.push_back({frame[i], board.now_us});
   }

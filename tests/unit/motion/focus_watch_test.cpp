@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "host/core/os/unique_fd.h"
-#include "host/motion/desk.h"
+#include "host/motion/profile_manager.h"
 #include "host/sensor/default_profile.h"
 #include "host/source/simulator/folder_export.h"
 
@@ -107,15 +107,16 @@ TEST_F(Focus, ChoosesTheProfileThatNamesTheProgramElseTheFirst) {
   using std::string_literals::operator""s;
   const SensorConfig sensor = parse_sensor(sim::sensor_yaml(sim::Scenario{}), "the test's sensor");
   focus(window("freecad\0FreeCAD\0"s));
-  Desk desk(ProfileFiles({"game", "cad"}, default_profile(sensor)), {}, FocusWatch::open());
+  ProfileManager profiles(ProfileFiles({"game", "cad"}, default_profile(sensor)), {},
+                          FocusWatch::open());
   const auto in_force_is = [&](const std::string& name) {
-    for (pollfd waiting{desk.poll_fd(), POLLIN, 0};
-         desk.profile().name != name && ::poll(&waiting, 1, 10'000) == 1;)
-      desk.service();
-    return desk.profile().name == name;
+    for (pollfd waiting{profiles.poll_fd(), POLLIN, 0};
+         profiles.profile().name != name && ::poll(&waiting, 1, 10'000) == 1;)
+      profiles.service();
+    return profiles.profile().name == name;
   };
   EXPECT_TRUE(in_force_is("cad"));
-  EXPECT_EQ(desk.take_news(), "profile: cad (freecad)");
+  EXPECT_EQ(profiles.take_status_line(), "profile: cad (freecad)");
   focus(window("mail\0Mail\0"s));
   EXPECT_TRUE(in_force_is("game")) << "the first, for a program that none names";
 }
@@ -147,14 +148,15 @@ TEST_F(Focus, BesideWaylandNoWindowOfX11MeansOneOfWayland) {
 
 TEST_F(Focus, AnXServerThatEndsDoesNotKeepTheDeskAwake) {
   const SensorConfig sensor = parse_sensor(sim::sensor_yaml(sim::Scenario{}), "the test's sensor");
-  Desk desk(ProfileFiles({"game", "cad"}, default_profile(sensor)), {}, FocusWatch::open());
+  ProfileManager profiles(ProfileFiles({"game", "cad"}, default_profile(sensor)), {},
+                          FocusWatch::open());
   xcb_disconnect(std::exchange(x_, nullptr));
   ::kill(server_, SIGKILL);
   ::waitpid(std::exchange(server_, -1), nullptr, 0);
-  pollfd waiting{desk.poll_fd(), POLLIN, 0};
+  pollfd waiting{profiles.poll_fd(), POLLIN, 0};
   ASSERT_EQ(::poll(&waiting, 1, 10'000), 1);
-  desk.service();
-  desk.service();  // the first has taken what was said before the end
+  profiles.service();
+  profiles.service();  // the first has taken what was said before the end
   EXPECT_EQ(::poll(&waiting, 1, 0), 0) << "it would spin";
 }
 

@@ -10,9 +10,9 @@
 #include <cstring>
 
 #include "host/core/os/unique_fd.h"
-#include "host/motion/desk.h"
+#include "host/motion/profile_manager.h"
 #include "host/sensor/default_profile.h"
-#include "tests/unit/motion/desk_folder.h"
+#include "tests/unit/motion/profile_folder.h"
 
 namespace tagwrench {
 namespace {
@@ -50,7 +50,7 @@ TEST(I3Stream, CutsMessagesHoweverTheyCome) {
 TEST(I3Stream, PassesOverWhatIsTooLongAndKeepsNothingOfIt) {
   I3Stream stream;
   std::string head = i3_message(I3Type::tree, "");
-  const std::uint32_t size = I3Stream::kLongest + 1;
+  const std::uint32_t size = I3Stream::kMax + 1;
   std::memcpy(head.data() + 6, &size, sizeof size);
   ASSERT_TRUE(stream.put(head));
   const auto empty = stream.next();
@@ -110,7 +110,7 @@ TEST(I3Focus, IsNotInOtherEventsNorInNonsense) {
 }
 
 /// A compositor's place, and what it hears and says there.
-class I3Desktop : public test::DeskFolder {
+class I3Desktop : public test::ProfileFolder {
  protected:
   I3Desktop() : listener_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     sockaddr_un address{};
@@ -129,11 +129,11 @@ class I3Desktop : public test::DeskFolder {
               static_cast<ssize_t>(bytes.size()));
   }
   /// Lets the desk do what it is woken for until it has that profile.
-  static bool comes_to(Desk& desk, const std::string& name) {
-    for (pollfd waiting{desk.poll_fd(), POLLIN, 0};
-         desk.profile().name != name && ::poll(&waiting, 1, 10'000) == 1;)
-      desk.service();
-    return desk.profile().name == name;
+  static bool comes_to(ProfileManager& profiles, const std::string& name) {
+    for (pollfd waiting{profiles.poll_fd(), POLLIN, 0};
+         profiles.profile().name != name && ::poll(&waiting, 1, 10'000) == 1;)
+      profiles.service();
+    return profiles.profile().name == name;
   }
 
   UniqueFd listener_;
@@ -141,7 +141,8 @@ class I3Desktop : public test::DeskFolder {
 };
 
 TEST_F(I3Desktop, IsAskedForItsWindowsAndFollowed) {
-  Desk desk(ProfileFiles({"game", "cad"}, default_profile(sensor_)), {}, FocusWatch::open());
+  ProfileManager profiles(ProfileFiles({"game", "cad"}, default_profile(sensor_)), {},
+                          FocusWatch::open());
   meet();
   const std::string expected =
       i3_message(I3Type::subscribe, R"(["window"])") + i3_message(I3Type::tree, "");
@@ -151,36 +152,38 @@ TEST_F(I3Desktop, IsAskedForItsWindowsAndFollowed) {
   EXPECT_EQ(asked, expected);
   say(i3_message(I3Type::subscribe, R"({"success": true})"));
   say(i3_message(I3Type::tree, R"({"nodes":[{"focused":true,"app_id":"Blender"}]})"));
-  EXPECT_TRUE(comes_to(desk, "cad"));
-  EXPECT_EQ(desk.take_news(), "profile: cad (blender)");
+  EXPECT_TRUE(comes_to(profiles, "cad"));
+  EXPECT_EQ(profiles.take_status_line(), "profile: cad (blender)");
   say(window_event(R"({"change":"focus","container":{"app_id":"mail"}})"));
-  EXPECT_TRUE(comes_to(desk, "game")) << "the first, for a program that none names";
+  EXPECT_TRUE(comes_to(profiles, "game")) << "the first, for a program that none names";
   const std::string cad = window_event(kCadEvent);
   say(cad.substr(0, 20));
   say(cad.substr(20));
-  EXPECT_TRUE(comes_to(desk, "cad"));
+  EXPECT_TRUE(comes_to(profiles, "cad"));
 }
 
 TEST_F(I3Desktop, OneThatEndsDoesNotKeepTheDeskAwake) {
-  Desk desk(ProfileFiles({"game", "cad"}, default_profile(sensor_)), {}, FocusWatch::open());
+  ProfileManager profiles(ProfileFiles({"game", "cad"}, default_profile(sensor_)), {},
+                          FocusWatch::open());
   meet();
   say(window_event(kCadEvent));
-  ASSERT_TRUE(comes_to(desk, "cad"));
+  ASSERT_TRUE(comes_to(profiles, "cad"));
   peer_.reset();
-  pollfd waiting{desk.poll_fd(), POLLIN, 0};
+  pollfd waiting{profiles.poll_fd(), POLLIN, 0};
   ASSERT_EQ(::poll(&waiting, 1, 10'000), 1);
-  desk.service();
+  profiles.service();
   EXPECT_EQ(::poll(&waiting, 1, 0), 0) << "it would spin";
-  EXPECT_EQ(desk.profile().name, "cad");
+  EXPECT_EQ(profiles.profile().name, "cad");
 }
 
 TEST_F(I3Desktop, OneThatTalksNonsenseIsLeft) {
-  Desk desk(ProfileFiles({"game", "cad"}, default_profile(sensor_)), {}, FocusWatch::open());
+  ProfileManager profiles(ProfileFiles({"game", "cad"}, default_profile(sensor_)), {},
+                          FocusWatch::open());
   meet();
   say("\x16\x03\x01 is not i3");
-  pollfd waiting{desk.poll_fd(), POLLIN, 0};
+  pollfd waiting{profiles.poll_fd(), POLLIN, 0};
   ASSERT_EQ(::poll(&waiting, 1, 10'000), 1);
-  desk.service();
+  profiles.service();
   char byte = 0;
   ssize_t size = 0;
   do size = ::recv(peer_.get(), &byte, 1, MSG_DONTWAIT);  // what it had asked

@@ -267,7 +267,7 @@ TEST(ProfileConfig, AnyMutationIsEitherAProfileOrOneLine) {
       s.status = Status::ok;
       s.wrench.setConstant(0.4);
       shaping.shape(s);
-      ASSERT_TRUE((s.motion.array().abs() <= 1).all()) << text;
+      ASSERT_TRUE((s.deflection.array().abs() <= 1).all()) << text;
     } catch (const ConfigError& e) {
       const std::string line = e.what();
       ASSERT_EQ(line.rfind("p.yaml", 0), 0u) << line << "\n" << text;

@@ -5,12 +5,12 @@
 
 #include "host/core/config_error.h"
 #include "host/sensor/default_profile.h"
-#include "tests/unit/motion/desk_folder.h"
+#include "tests/unit/motion/profile_folder.h"
 
 namespace tagwrench {
 namespace {
 
-class ProfileFilesTest : public test::DeskFolder {
+class ProfileFilesTest : public test::ProfileFolder {
  protected:
   static std::vector<std::string> names(const ProfileFiles& files) {
     std::vector<std::string> all;

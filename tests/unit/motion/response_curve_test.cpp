@@ -51,7 +51,7 @@ TEST(ResponseCurve, PassesThroughItsPointsNeverFallsAndNeverOvershoots) {
   for (int round = 0; round < 500; ++round) {
     CurveOptions o;
     o.kind = CurveKind::points;
-    o.count = 2 + random() % (kMostCurvePoints - 1);
+    o.count = 2 + random() % (kMaxCurvePoints - 1);
     for (std::size_t i = 1; i < o.count; ++i) {
       // Steps of very different sizes, some of them flat: where plain cubics overshoot.
       o.points[i].in = o.points[i - 1].in + 0.001 + std::pow(unit(random), 4);

@@ -51,7 +51,7 @@ int frames_in_motion(Shaping shaping, int frames, const Vector6& noise) {
   for (int i = 0; i < frames; ++i) {
     Sample s = sensor.sample(Vector6::Zero(), noise);
     shaping.shape(s);
-    moved += !s.motion.isZero(0);
+    moved += !s.deflection.isZero(0);
   }
   return moved;
 }
@@ -75,7 +75,7 @@ TEST(ShapingRest, NoiseThatIsLargerThanStatedIsLearnt) {
   for (int i = 0; i < 60 * 60; ++i) {
     Sample s = sensor.sample(Vector6::Zero(), 4 * kNoise);
     shaping.shape(s);
-    if (i >= 10 * 60) moved += !s.motion.isZero(0);
+    if (i >= 10 * 60) moved += !s.deflection.isZero(0);
   }
   EXPECT_EQ(moved, 0) << "frames in motion after 10 s";
 }
@@ -90,7 +90,7 @@ TEST(ShapingRest, TheCentreIsNotNumb) {
   }
   Sample s = sensor.sample(12 * kNoise, kNoise);
   shaping.shape(s);
-  EXPECT_TRUE((s.motion.array() != 0).all()) << s.motion.transpose();
+  EXPECT_TRUE((s.deflection.array() != 0).all()) << s.deflection.transpose();
 }
 
 TEST(ShapingRest, AMinuteOfATremblingHandDoesNotWidenIt) {
@@ -100,7 +100,7 @@ TEST(ShapingRest, AMinuteOfATremblingHandDoesNotWidenIt) {
     Sample s = sensor.sample(Vector6::Zero(), Vector6::Zero());
     s.wrench[0] = 11 * kNoise[0];
     shaping.shape(s);
-    return s.motion[0];
+    return s.deflection[0];
   };
   for (int i = 0; i < 600; ++i) {
     Sample s = sensor.sample(Vector6::Zero(), kNoise);
@@ -129,7 +129,7 @@ TEST(ShapingRest, RestIsLeftBeyondTheDeadZoneAndReachedBelowAPartOfIt) {
   const auto at = [&](double newtons) {
     Sample s = pushed(0, newtons, std::chrono::milliseconds(16 * frame++));
     shaping.shape(s);
-    return s.motion[0];
+    return s.deflection[0];
   };
   EXPECT_EQ(at(0.08), 0) << "on the way out";
   EXPECT_GT(at(0.30), 0);
@@ -151,11 +151,11 @@ TEST(ShapingRest, TheWayOutAndBackHasNoJump) {
     const double newtons = kPeak - std::abs(kPeak - i * kStep);
     Sample s = pushed(0, newtons, std::chrono::milliseconds(4 * i));
     shaping.shape(s);
-    EXPECT_LE(std::abs(s.motion[0] - last), 1.02 * kStep * kSteepest) << newtons << " N";
+    EXPECT_LE(std::abs(s.deflection[0] - last), 1.02 * kStep * kSteepest) << newtons << " N";
     if (2 * i < kSteps) {
-      EXPECT_GE(s.motion[0], last) << newtons << " N, on the way out";
+      EXPECT_GE(s.deflection[0], last) << newtons << " N, on the way out";
     }
-    last = s.motion[0];
+    last = s.deflection[0];
   }
   EXPECT_EQ(last, 0);
 }
@@ -168,7 +168,7 @@ TEST(ShapingRest, NoiseAtItsEdgeMovesByNoMoreThanItself) {
   for (int i = 0; i < 5000; ++i) {
     Sample s = pushed(0, 0.1 + noise(random), std::chrono::milliseconds(16 * i));
     shaping.shape(s);
-    EXPECT_LE(std::abs(s.motion[0]), 0.008) << "of full scale: 4 to 5 sigmas of 0.001";
+    EXPECT_LE(std::abs(s.deflection[0]), 0.008) << "of full scale: 4 to 5 sigmas of 0.001";
   }
 }
 
@@ -182,7 +182,7 @@ double stop_to_zero(FilterKind filter, const std::function<double(double)>& push
     const double t = i / kFps;
     Sample s = pushed(0, push(t), seconds_as_duration(t));
     shaping.shape(s);
-    if (!s.motion.isZero(0)) moving_until = t;
+    if (!s.deflection.isZero(0)) moving_until = t;
   }
   return std::max(0.0, moving_until + 1 / kFps - end);
 }
@@ -211,7 +211,7 @@ TEST(ShapingRest, ATapTheOtherWayRightAfterLettingGoNeverMovesTheOldWay) {
       Sample s = pushed(0, newtons, seconds_as_duration(i / kFps));
       shaping.shape(s);
       if (i >= 60) {
-        EXPECT_LE(s.motion[0], 0) << i;
+        EXPECT_LE(s.deflection[0], 0) << i;
       }
     }
   }
@@ -236,7 +236,7 @@ double motion_after_release(const ShapingOptions& options, double fps, double si
       Sample s = pushed(0, let_go(t, size), seconds_as_duration(t));
       s.wrench[4] = 0.01 * s.wrench[0];  // it swings on another axis too
       shaping.shape(s);
-      if (!s.motion.isZero(0)) longest = std::max(longest, t - 1);
+      if (!s.deflection.isZero(0)) longest = std::max(longest, t - 1);
     }
   }
   return longest;
@@ -271,7 +271,7 @@ TEST(ShapingRest, NeitherIsThatAfterATapWhichWasSuppressed) {
     } else {
       shaping.shape(s);
     }
-    EXPECT_EQ(s.motion, Vector6::Zero().eval()) << t << " s";
+    EXPECT_EQ(s.deflection, Vector6::Zero().eval()) << t << " s";
   }
 }
 
@@ -287,7 +287,7 @@ TEST(ShapingRest, WhatWasSuppressedDoesNotLinger) {
     } else {
       shaping.shape(s);
     }
-    EXPECT_LE(s.motion[0], 0) << i;
+    EXPECT_LE(s.deflection[0], 0) << i;
   }
 }
 
@@ -305,7 +305,7 @@ TEST(ShapingRest, AHandThatTurnsRoundIsSoonFollowed) {
         Sample b = a;
         guarded.shape(a);
         bare.shape(b);
-        if (a.motion.isZero(0) && b.motion[0] < 0) late += 1 / fps;
+        if (a.deflection.isZero(0) && b.deflection[0] < 0) late += 1 / fps;
       }
       std::printf("%.0f fps, turned round within %.0f ms: %.0f ms late\n", fps, 1e3 * seconds,
                   1e3 * late);

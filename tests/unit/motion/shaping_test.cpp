@@ -19,19 +19,19 @@ using std::chrono::milliseconds;
 TEST(Shaping, RestIsExactlyZeroInsideTheDeadZone) {
   Sample s = pushed(0, 0.0999);
   Shaping(plain_shaping()).shape(s);
-  EXPECT_EQ(s.motion, Vector6::Zero().eval());
+  EXPECT_EQ(s.deflection, Vector6::Zero().eval());
 }
 
 TEST(Shaping, IsContinuousAtTheEdgeOfTheDeadZoneAndReachesFullScale) {
   Sample s = pushed(0, 0.1 + 1e-9);
   Shaping(plain_shaping()).shape(s);
-  EXPECT_NEAR(s.motion[0], 0, 1e-8);
+  EXPECT_NEAR(s.deflection[0], 0, 1e-8);
   s = pushed(0, 1.0);
   Shaping(plain_shaping()).shape(s);
-  EXPECT_DOUBLE_EQ(s.motion[0], 1.0);
+  EXPECT_DOUBLE_EQ(s.deflection[0], 1.0);
   s = pushed(0, -7.0);
   Shaping(plain_shaping()).shape(s);
-  EXPECT_DOUBLE_EQ(s.motion[0], -1.0);
+  EXPECT_DOUBLE_EQ(s.deflection[0], -1.0);
 }
 
 TEST(Shaping, WithoutADeadZoneTheSlightestPushMoves) {
@@ -40,10 +40,10 @@ TEST(Shaping, WithoutADeadZoneTheSlightestPushMoves) {
   Shaping shaping(o);
   Sample s = pushed(0, 1e-6);
   shaping.shape(s);
-  EXPECT_NEAR(s.motion[0], 1e-6, 1e-11);
+  EXPECT_NEAR(s.deflection[0], 1e-6, 1e-11);
   s = pushed(0, 0, milliseconds(16));
   shaping.shape(s);
-  EXPECT_EQ(s.motion, Vector6::Zero().eval());
+  EXPECT_EQ(s.deflection, Vector6::Zero().eval());
 }
 
 TEST(Shaping, DefaultMountingTurnsCameraAxesIntoHidAxes) {
@@ -54,7 +54,7 @@ TEST(Shaping, DefaultMountingTurnsCameraAxesIntoHidAxes) {
     Sample s = pushed(axis, 5.0);
     Shaping(plain_shaping()).shape(s);
     for (int i = 0; i < 6; ++i)
-      EXPECT_EQ(s.motion[i], i == axis ? expected_sign[axis] : 0.0) << axis << " " << i;
+      EXPECT_EQ(s.deflection[i], i == axis ? expected_sign[axis] : 0.0) << axis << " " << i;
   }
 }
 
@@ -63,12 +63,12 @@ TEST(Shaping, AStatusWithoutNumbersIsNeutral) {
     Shaping shaping(plain_shaping());
     Sample s = pushed(2, 1.5);
     shaping.shape(s);
-    ASSERT_NE(s.motion[2], 0);
+    ASSERT_NE(s.deflection[2], 0);
     s = pushed(2, 1.5, milliseconds(16));
     s.status = status;
-    s.motion.setOnes();
+    s.deflection.setOnes();
     shaping.shape(s);
-    EXPECT_EQ(s.motion, Vector6::Zero().eval());
+    EXPECT_EQ(s.deflection, Vector6::Zero().eval());
     EXPECT_EQ(shaping.motion_at(s.capture_time + milliseconds(8)), Vector6::Zero().eval());
   }
 }
@@ -77,7 +77,7 @@ TEST(Shaping, SaturatedStillMoves) {
   Sample s = pushed(0, 3);
   s.status = Status::saturated;
   Shaping(plain_shaping()).shape(s);
-  EXPECT_EQ(s.motion[0], 1.0);
+  EXPECT_EQ(s.deflection[0], 1.0);
 }
 
 TEST(Shaping, AnAxisTakesWhatItIsToldToTakeAndTurnsIt) {
@@ -91,10 +91,10 @@ TEST(Shaping, AnAxisTakesWhatItIsToldToTakeAndTurnsIt) {
   o.dead_zone[0] = 0.001;
   Sample s = pushed(0, 5);
   Shaping(o).shape(s);
-  EXPECT_EQ(s.motion, (Vector6() << 0, 0, 0, 0, 0, -1).finished());
+  EXPECT_EQ(s.deflection, (Vector6() << 0, 0, 0, 0, 0, -1).finished());
   s = pushed(3, 5);
   Shaping(o).shape(s);
-  EXPECT_EQ(s.motion, (Vector6() << 1, 0, 0, 1, 0, 0).finished());
+  EXPECT_EQ(s.deflection, (Vector6() << 1, 0, 0, 1, 0, 0).finished());
 }
 
 TEST(Shaping, CurveThenBalanceThenLimit) {
@@ -104,14 +104,14 @@ TEST(Shaping, CurveThenBalanceThenLimit) {
   o.translation = 1.5;
   Sample s = pushed(0, 0.5);
   Shaping(o).shape(s);
-  EXPECT_NEAR(s.motion[0], 1.5 * 0.25, 1e-6);
+  EXPECT_NEAR(s.deflection[0], 1.5 * 0.25, 1e-6);
   o.axes[0].limit = 0.3;
   Shaping(o).shape(s);
-  EXPECT_EQ(s.motion[0], 0.3);
+  EXPECT_EQ(s.deflection[0], 0.3);
   o.rotation = 0.5;
   s = pushed(3, -0.01);
   Shaping(o).shape(s);
-  EXPECT_DOUBLE_EQ(s.motion[3], -0.5);
+  EXPECT_DOUBLE_EQ(s.deflection[3], -0.5);
 }
 
 TEST(Shaping, ALockedHalfStaysZeroAndTheOtherMoves) {
@@ -122,8 +122,8 @@ TEST(Shaping, ALockedHalfStaysZeroAndTheOtherMoves) {
     Sample s = pushed(0, 5);
     s.wrench[3] = 5;
     shaping.shape(s);
-    EXPECT_EQ(s.motion[0], lock == Lock::translation ? 0 : 1);
-    EXPECT_EQ(s.motion[3], lock == Lock::rotation ? 0 : 1);
+    EXPECT_EQ(s.deflection[0], lock == Lock::translation ? 0 : 1);
+    EXPECT_EQ(s.deflection[3], lock == Lock::rotation ? 0 : 1);
   }
 }
 
@@ -133,12 +133,12 @@ TEST(Shaping, InDominantModeOnlyTheStrongestMovesAndALockedOneNeverWins) {
   Sample s = pushed(0, 0.6);
   s.wrench[3] = 0.009;
   Shaping(o).shape(s);
-  EXPECT_EQ(s.motion[0], 0);
-  EXPECT_GT(s.motion[3], 0.8);
+  EXPECT_EQ(s.deflection[0], 0);
+  EXPECT_GT(s.deflection[3], 0.8);
   o.lock = Lock::rotation;
   Shaping(o).shape(s);
-  EXPECT_GT(s.motion[0], 0.5);
-  EXPECT_EQ(s.motion[3], 0);
+  EXPECT_GT(s.deflection[0], 0.5);
+  EXPECT_EQ(s.deflection[3], 0);
 }
 
 TEST(Shaping, TheStrongestAxisDoesNotFlickerBetweenTwoThatAreAboutEqual) {
@@ -153,8 +153,8 @@ TEST(Shaping, TheStrongestAxisDoesNotFlickerBetweenTwoThatAreAboutEqual) {
     Sample s = pushed(0, about(random), milliseconds(16 * i));
     s.wrench[1] = -about(random);
     shaping.shape(s);
-    EXPECT_EQ((s.motion.array() != 0).count(), 1);
-    const int now = s.motion[0] != 0 ? 0 : 1;
+    EXPECT_EQ((s.deflection.array() != 0).count(), 1);
+    const int now = s.deflection[0] != 0 ? 0 : 1;
     changes += winner >= 0 && now != winner;
     winner = now;
   }
@@ -162,7 +162,7 @@ TEST(Shaping, TheStrongestAxisDoesNotFlickerBetweenTwoThatAreAboutEqual) {
   Sample s = pushed(winner, 0.5, milliseconds(16'000));
   s.wrench[1 - winner] = winner == 0 ? -0.7 : 0.7;
   shaping.shape(s);
-  EXPECT_NE(s.motion[1 - winner], 0) << "clearly stronger, it takes over";
+  EXPECT_NE(s.deflection[1 - winner], 0) << "clearly stronger, it takes over";
 }
 
 TEST(Shaping, AWrenchThatIsNotFiniteIsZeroAndForgotten) {
@@ -175,10 +175,10 @@ TEST(Shaping, AWrenchThatIsNotFiniteIsZeroAndForgotten) {
     shaping.shape(s);
     s = pushed(4, bad, milliseconds(16));
     shaping.shape(s);
-    EXPECT_EQ(s.motion, Vector6::Zero().eval());
+    EXPECT_EQ(s.deflection, Vector6::Zero().eval());
     s = pushed(0, 0.55, milliseconds(32));
     shaping.shape(s);
-    EXPECT_NEAR(s.motion[0], 0.5, 0.04) << "as if nothing had been before";
+    EXPECT_NEAR(s.deflection[0], 0.5, 0.04) << "as if nothing had been before";
   }
 }
 
@@ -191,24 +191,24 @@ TEST(Shaping, APushBeyondAllMeasureIsAFullOneAndNoLonger) {
   s = pushed(0, 1.7e308, milliseconds(16));
   s.wrench_sigma.setConstant(1.7e308);
   shaping.shape(s);
-  EXPECT_GT(s.motion[0], 0.9);
+  EXPECT_GT(s.deflection[0], 0.9);
   for (int i = 2; i < 40; ++i) {
     s = pushed(0, 0.55, milliseconds(16 * i));
     shaping.shape(s);
   }
-  EXPECT_NEAR(s.motion[0], 0.5, 0.04) << "0.6 s later";
+  EXPECT_NEAR(s.deflection[0], 0.5, 0.04) << "0.6 s later";
 }
 
 TEST(Shaping, AnOlderFrameChangesNothing) {
   Shaping shaping(plain_shaping());
   Sample s = pushed(0, 0.55, milliseconds(100));
   shaping.shape(s);
-  const Vector6 motion = s.motion;
+  const Vector6 motion = s.deflection;
   ASSERT_NE(motion[0], 0);
   for (const milliseconds time : {milliseconds(99), milliseconds(100)}) {
     s = pushed(0, -1, time);
     shaping.shape(s);
-    EXPECT_EQ(s.motion, motion);
+    EXPECT_EQ(s.deflection, motion);
   }
 }
 
@@ -221,7 +221,7 @@ TEST(Shaping, AfterALongGapTheFilterDoesNotRemember) {
     shaping.shape(s);
     s = pushed(0, -1, time);
     shaping.shape(s);
-    EXPECT_EQ(s.motion[0], -1) << "a clock that begins again counts as a gap";
+    EXPECT_EQ(s.deflection[0], -1) << "a clock that begins again counts as a gap";
   }
 }
 
@@ -235,7 +235,7 @@ TEST(Shaping, OtherOptionsCountFromTheNextFrameAndNoMotionIsLostBetween) {
   EXPECT_EQ(shaping.motion_at(s.capture_time + milliseconds(10))[0], 1);
   s = pushed(0, 1, milliseconds(16));
   shaping.shape(s);
-  EXPECT_EQ(s.motion[0], 0.5);
+  EXPECT_EQ(s.deflection[0], 0.5);
 }
 
 TEST(Shaping, WhatIsSuppressedDoesNotMove) {
@@ -243,7 +243,7 @@ TEST(Shaping, WhatIsSuppressedDoesNotMove) {
   Sample s = pushed(0, 1);
   shaping.shape(s);
   shaping.suppress(s);
-  EXPECT_EQ(s.motion, Vector6::Zero().eval());
+  EXPECT_EQ(s.deflection, Vector6::Zero().eval());
   EXPECT_EQ(shaping.motion_at(s.capture_time), Vector6::Zero().eval());
 }
 
@@ -275,7 +275,8 @@ TEST(Shaping, WhateverComesMotionIsFiniteAndWithinItsLimits) {
       time += Duration(static_cast<std::int64_t>(random() % 40'000'000) - 5'000'000);
       s.capture_time = time;
       shaping.shape(s);
-      ASSERT_TRUE((s.motion.array().abs() <= 0.8).all()) << i << ": " << s.motion.transpose();
+      ASSERT_TRUE((s.deflection.array().abs() <= 0.8).all())
+          << i << ": " << s.deflection.transpose();
       const Vector6 between = shaping.motion_at(time + Duration(random() % 100'000'000));
       ASSERT_TRUE((between.array().abs() <= 0.8).all()) << i << ": " << between.transpose();
     }

@@ -91,7 +91,7 @@ TEST_F(SpacemouseDevice, IsCreatedWithTheIdentityThatClientsLookFor) {
 
 TEST_F(SpacemouseDevice, SendsHidAxesWithoutSignChanges) {
   Sample s = test::ok_sample();
-  s.motion << 0.1, 0.2, 0.3, -0.1, -0.2, -0.3;
+  s.deflection << 0.1, 0.2, 0.3, -0.1, -0.2, -0.3;
   EXPECT_EQ(out_->move(s), SendStatus::ok);
   EXPECT_EQ(kernel_.next_input(), axes({35, 70, 105, -35, -70, -105}));
 }
@@ -239,8 +239,8 @@ TEST_F(SpacemouseDevice, ButtonsAreSentWhenTheyChangeAndOnlyThoseThatItHas) {
   EXPECT_EQ(kernel_.next_input(), (Bytes{3, 0, 0}));
 }
 
-TEST_F(SpacemouseDevice, GuardianBytesAreNeutralThenDestroy) {
-  std::vector<DeadManDevice> devices;
+TEST_F(SpacemouseDevice, WatchdogBytesAreNeutralThenDestroy) {
+  std::vector<WatchdogDevice> devices;
   out_->add_to(devices);
   ASSERT_EQ(devices.size(), 1u);
   EXPECT_EQ(devices[0].fd, out_->poll_fd());
@@ -264,7 +264,7 @@ TEST(Spacemouse, OwnIdSendsSpnavOrderAndSaysTheLineToAdd) {
   EXPECT_NE(out.spacenavd_advice().find("device-id = 1209:0001"), std::string::npos);
   kernel.next_input();
   Sample s = test::ok_sample();
-  s.motion << 0, 0, 1, 0, 0, 0;  // down
+  s.deflection << 0, 0, 1, 0, 0, 0;  // down
   out.move(s);
   EXPECT_EQ(kernel.next_input(), axes({0, -350, 0, 0, 0, 0}));  // spnav y is up
 }

@@ -122,7 +122,7 @@ class OtherComputer {
     port.program = TAGWRENCH_PROGRAM;
     return port;
   }
-  /// For a keeper in this program.
+  /// For a daemon in this program.
   OpenedNode node(const std::string& path) { return {std::move(node_), path}; }
 
   /// The next report; empty once everybody at the other end has gone.
@@ -172,7 +172,7 @@ TEST(GadgetSpacemouse, BeginsAtRestAndMovesWithSigns) {
   EXPECT_EQ(other.take(), motion_report({}));
   EXPECT_EQ(news_of(output), "gadget: the other computer takes reports");
   Sample s = test::ok_sample();
-  s.motion << 0.1, 0.2, 0.3, -0.1, -0.2, -0.3;
+  s.deflection << 0.1, 0.2, 0.3, -0.1, -0.2, -0.3;
   s.buttons = 2;
   EXPECT_EQ(output.move(s), SendStatus::ok);
   EXPECT_EQ(other.take(), button_report(2));
@@ -188,7 +188,7 @@ TEST(GadgetSpacemouse, OfAnotherVendorHasSpnavsAxes) {
   OtherComputer other;
   GadgetOutput output(other.port(GadgetFace::spacemouse, true));
   Sample s = test::ok_sample();
-  s.motion << 0, 0, 1, 0, 0, 0;  // down
+  s.deflection << 0, 0, 1, 0, 0, 0;  // down
   output.move(s);
   EXPECT_TRUE(other.take_until(motion_report({0, -350, 0, 0, 0, 0})));
 }
@@ -243,10 +243,10 @@ TEST(GadgetSpacemouse, TheEndOfTheBridgeIsRestForAComputerThatWasNotAsking) {
   EXPECT_EQ(buttons, button_report(0));
 }
 
-TEST(GadgetSpacemouse, TheGuardiansBytesAreRest) {
+TEST(GadgetSpacemouse, TheWatchdogsBytesAreRest) {
   OtherComputer other;
   GadgetOutput output(other.port(GadgetFace::spacemouse));
-  std::vector<DeadManDevice> devices;
+  std::vector<WatchdogDevice> devices;
   output.add_to(devices);
   ASSERT_EQ(devices.size(), 1u);
   output.move(test::moving(1));
@@ -282,7 +282,7 @@ class SecondNode {
   }
   ~SecondNode() { ::unlink(address_.sun_path); }
 
-  GadgetKeeper::OpenNode opener() const {
+  GadgetDaemon::OpenNode opener() const {
     return [address = address_] {
       OpenedNode node;
       node.path = "hidg1";
@@ -318,20 +318,20 @@ class SecondNode {
   UniqueFd server_;
 };
 
-/// A keeper in a thread, with a bridge by hand: what it opens by itself is no real node.
-class KeeperByHand {
+/// A daemon in a thread, with a bridge by hand: what it opens by itself is no real node.
+class DaemonByHand {
  public:
-  KeeperByHand(const std::string& folder, OpenedNode node, GadgetKeeper::OpenNode open) {
+  DaemonByHand(const std::string& folder, OpenedNode node, GadgetDaemon::OpenNode open) {
     int ends[2];
     EXPECT_EQ(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends), 0);
     bridge_.reset(ends[0]);
     thread_ = std::thread([link = ends[1], folder, node = std::move(node), open]() mutable {
-      GadgetKeeper(GadgetFace::spacemouse, UniqueFd(link), watch_nodes(folder), std::move(node),
+      GadgetDaemon(GadgetFace::spacemouse, UniqueFd(link), watch_nodes(folder), std::move(node),
                    open)
           .run();
     });
   }
-  ~KeeperByHand() {
+  ~DaemonByHand() {
     bridge_.reset();
     thread_.join();
   }
@@ -339,12 +339,12 @@ class KeeperByHand {
     EXPECT_EQ(send(bridge_.get(), report.data(), report.size(), 0),
               static_cast<ssize_t>(report.size()));
   }
-  GadgetNews news() {
-    GadgetNews news{};
+  GadgetEvent status_line() {
+    GadgetEvent status_line{};
     pollfd waiting{bridge_.get(), POLLIN, 0};
     if (poll(&waiting, 1, kGadgetPatience_ms) != 1) return {};
-    EXPECT_EQ(recv(bridge_.get(), &news, sizeof news, 0), 1);
-    return news;
+    EXPECT_EQ(recv(bridge_.get(), &status_line, sizeof status_line, 0), 1);
+    return status_line;
   }
 
  private:
@@ -352,22 +352,22 @@ class KeeperByHand {
   std::thread thread_;
 };
 
-TEST(GadgetKeeper, ANodeThatGoesIsLeftAtRestAndTheNextOneIsToldHowThingsAre) {
+TEST(GadgetDaemon, ANodeThatGoesIsLeftAtRestAndTheNextOneIsToldHowThingsAre) {
   const test::TemporaryTree folder;
   const SecondNode second(folder / "socket");
   OtherComputer first;
   std::ofstream(folder / "hidg0") << "";
-  KeeperByHand keeper(folder.path(), first.node(folder / "hidg0"), second.opener());
-  EXPECT_EQ(keeper.news(), GadgetNews::ready);
-  EXPECT_EQ(keeper.news(), GadgetNews::taken);
-  keeper.put(both({350}, 1));
+  DaemonByHand daemon(folder.path(), first.node(folder / "hidg0"), second.opener());
+  EXPECT_EQ(daemon.status_line(), GadgetEvent::ready);
+  EXPECT_EQ(daemon.status_line(), GadgetEvent::taken);
+  daemon.put(both({350}, 1));
   EXPECT_TRUE(first.take_until(button_report(1)));
   ::unlink((folder / "hidg0").c_str());
   EXPECT_TRUE(first.take_until(button_report(0)));
-  EXPECT_EQ(keeper.news(), GadgetNews::gone);
+  EXPECT_EQ(daemon.status_line(), GadgetEvent::gone);
   std::ofstream(folder / "hidg1") << "";
   EXPECT_EQ(second.take_buttons(), button_report(1));  // told to the first one only, until now
-  EXPECT_EQ(keeper.news(), GadgetNews::taken);
+  EXPECT_EQ(daemon.status_line(), GadgetEvent::taken);
 }
 
 /// Of this process, by its name.
@@ -381,26 +381,26 @@ pid_t child_named(const std::string& name) {
   return 0;
 }
 
-TEST(GadgetSpacemouse, NoSignalEndsItsKeeperInAnyThread) {
+TEST(GadgetSpacemouse, NoSignalEndsItsDaemonInAnyThread) {
 #ifdef TAGWRENCH_FOREIGN_THREAD
   ::setenv("LD_PRELOAD", TAGWRENCH_FOREIGN_THREAD, 1);  // a library's thread that takes them
 #endif
   OtherComputer other;
   GadgetOutput output(other.port(GadgetFace::spacemouse));
-  const pid_t keeper = child_named("tw-gadget");
-  ASSERT_GT(keeper, 0);
-  EXPECT_EQ(::getsid(keeper), keeper);
+  const pid_t daemon = child_named("tw-gadget");
+  ASSERT_GT(daemon, 0);
+  EXPECT_EQ(::getsid(daemon), daemon);
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGALRM, SIGPIPE}) {
-    EXPECT_EQ(::kill(keeper, number), 0);
-    const std::string tasks = "/proc/" + std::to_string(keeper) + "/task";
+    EXPECT_EQ(::kill(daemon, number), 0);
+    const std::string tasks = "/proc/" + std::to_string(daemon) + "/task";
     for (const auto& task : std::filesystem::directory_iterator(tasks))
-      EXPECT_EQ(::tgkill(keeper, std::stoi(task.path().filename()), number), 0);
+      EXPECT_EQ(::tgkill(daemon, std::stoi(task.path().filename()), number), 0);
   }
   output.move(test::moving(1));
   EXPECT_TRUE(other.take_until(motion_report({350})));
 }
 
-TEST(GadgetSpacemouse, AKeeperThatCannotBeStartedSaysSo) {
+TEST(GadgetSpacemouse, ADaemonThatCannotBeStartedSaysSo) {
   for (const char* program : {"/no/such/program", "/bin/true"}) {
     OtherComputer other;
     GadgetPort port = other.port(GadgetFace::spacemouse);

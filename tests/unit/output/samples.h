@@ -24,7 +24,7 @@ inline tagwrench::Sample ok_sample() {
 
 inline tagwrench::Sample moving(double x) {
   tagwrench::Sample s = ok_sample();
-  s.motion[0] = x;
+  s.deflection[0] = x;
   return s;
 }
 

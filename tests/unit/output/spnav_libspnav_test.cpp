@@ -13,13 +13,13 @@ namespace tagwrench {
 namespace {
 
 using test::BridgeByHand;
-using test::KeeperThread;
+using test::DaemonThread;
 using test::SpnavFolder;
 
 /// It has one connection a process.
 class Libspnav : public ::testing::Test {
  protected:
-  Libspnav() : keeper_(folder_.socket()), bridge_(folder_.socket()) {
+  Libspnav() : daemon_(folder_.socket()), bridge_(folder_.socket()) {
     ::setenv("SPNAV_SOCKET", folder_.socket().c_str(), 1);
     open_ = ::spnav_open() == 0;
   }
@@ -43,12 +43,12 @@ class Libspnav : public ::testing::Test {
   }
 
   SpnavFolder folder_;
-  KeeperThread keeper_;
+  DaemonThread daemon_;
   BridgeByHand bridge_;
   bool open_ = false;
 };
 
-TEST_F(Libspnav, SpeaksVersion1WithTheKeeper) { EXPECT_EQ(::spnav_protocol(), 1); }
+TEST_F(Libspnav, SpeaksVersion1WithTheDaemon) { EXPECT_EQ(::spnav_protocol(), 1); }
 
 TEST_F(Libspnav, SeesEveryAxisInItsPlaceAndWithItsSign) {
   for (std::size_t axis = 0; axis < 6; ++axis) {

@@ -1,4 +1,4 @@
-// The output and the keeper that it starts: the real program, killed and stopped.
+// The output and the daemon that it starts: the real program, killed and stopped.
 #include "host/output/spnav_output.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using test::SpnavProgramByHand;
 Sample pushed(double x, std::uint32_t buttons = 0) {
   Sample sample;
   sample.status = Status::ok;
-  sample.motion[0] = x;
+  sample.deflection[0] = x;
   sample.buttons = buttons;
   return sample;
 }
@@ -33,15 +33,15 @@ SpnavOptions options_at(const std::string& socket) {
   return options;
 }
 
-pid_t keeper_of(const std::string& socket) {
+pid_t daemon_of(const std::string& socket) {
   const UniqueFd link = connect_spnav_bridge(socket);
   std::array<std::uint8_t, kSpnavLongestMessage> buffer;
   if (!link || !test::readable(link.get())) return 0;
   const auto greeting = spnav_message<SpnavGreeting>(receive_spnav(link.get(), buffer).bytes);
-  return greeting ? greeting->keeper_pid : 0;
+  return greeting ? greeting->daemon_pid : 0;
 }
 
-/// Ends the keeper that a test has had started, and waits until it has taken its sockets away.
+/// Ends the daemon that a test has had started, and waits until it has taken its sockets away.
 class SpnavOutputTest : public ::testing::Test {
  protected:
   ~SpnavOutputTest() override {
@@ -51,7 +51,7 @@ class SpnavOutputTest : public ::testing::Test {
       const SpnavReceived received = receive_spnav(link.get(), buffer);
       if (!received.open) return;
       const auto greeting = spnav_message<SpnavGreeting>(received.bytes);
-      if (greeting) ::kill(greeting->keeper_pid, SIGTERM);
+      if (greeting) ::kill(greeting->daemon_pid, SIGTERM);
     }
   }
   SpnavFolder folder_;
@@ -96,7 +96,7 @@ std::unique_ptr<SpnavProgramByHand> connect_when_served(const std::string& socke
   throw std::runtime_error("nobody serves " + socket);
 }
 
-TEST_F(SpnavOutputTest, StartsAKeeperAndFeedsIt) {
+TEST_F(SpnavOutputTest, StartsADaemonAndFeedsIt) {
   SpnavOutput output(options_at(folder_.socket()));
   SpnavProgramByHand program(folder_.socket());
   EXPECT_EQ(output.move(pushed(0.5)), SendStatus::ok);
@@ -170,17 +170,17 @@ TEST_F(SpnavOutputTest, AStoppedBridgeIsNeutralUntilItGoesOn) {
   EXPECT_TRUE(program->wait_for_motion({500, 0, 0, 0, 0, 0}));
 }
 
-TEST_F(SpnavOutputTest, AKilledKeeperIsReplaced) {
+TEST_F(SpnavOutputTest, AKilledDaemonIsReplaced) {
   SpnavOutput output(options_at(folder_.socket()));
-  const pid_t first = keeper_of(folder_.socket());
+  const pid_t first = daemon_of(folder_.socket());
   ASSERT_GT(first, 0);
   SpnavProgramByHand program(folder_.socket());
   ::kill(first, SIGKILL);
   ASSERT_TRUE(program.closed());
-  std::string news;
-  while (news.find("has ended") == std::string::npos) {
+  std::string status_line;
+  while (status_line.find("has ended") == std::string::npos) {
     ASSERT_TRUE(test::readable(output.poll_fd()));
-    news = output.service();
+    status_line = output.service();
   }
   // As the loop does it: moves, and answers when there is something to answer.
   SendStatus status = SendStatus::skipped;
@@ -190,13 +190,13 @@ TEST_F(SpnavOutputTest, AKilledKeeperIsReplaced) {
     if (::poll(&entry, 1, 10) > 0) output.service();
   }
   ASSERT_EQ(status, SendStatus::ok);
-  EXPECT_NE(keeper_of(folder_.socket()), first);
+  EXPECT_NE(daemon_of(folder_.socket()), first);
   SpnavProgramByHand again(folder_.socket());
   output.move(pushed(0.5));
   EXPECT_TRUE(again.wait_for_motion({250, 0, 0, 0, 0, 0}));
 }
 
-TEST_F(SpnavOutputTest, AKeeperThatCannotBeStartedIsSaidAtOnce) {
+TEST_F(SpnavOutputTest, ADaemonThatCannotBeStartedIsSaidAtOnce) {
   SpnavOptions options = options_at(folder_.socket());
   options.program = "/no/such/program";
   EXPECT_THROW(SpnavOutput{options}, ConfigError);
@@ -204,8 +204,8 @@ TEST_F(SpnavOutputTest, AKeeperThatCannotBeStartedIsSaidAtOnce) {
 }
 
 TEST_F(SpnavOutputTest, TheVerbServesUntilASignalAndLeavesNothing) {
-  test::Bridge keeper({"spnav", "--socket", folder_.socket()});
-  ASSERT_TRUE(keeper.wait_for_message("serving " + folder_.socket()));
+  test::Bridge daemon({"spnav", "--socket", folder_.socket()});
+  ASSERT_TRUE(daemon.wait_for_message("serving " + folder_.socket()));
   SpnavProgramByHand program(folder_.socket());
   {
     SpnavOutput output(options_at(folder_.socket()));
@@ -213,14 +213,14 @@ TEST_F(SpnavOutputTest, TheVerbServesUntilASignalAndLeavesNothing) {
     EXPECT_TRUE(program.wait_for_motion({500, 0, 0, 0, 0, 0}));
   }
   EXPECT_TRUE(program.wait_for_zero());
-  keeper.signal(SIGTERM);
-  EXPECT_EQ(keeper.finish().status, 0);
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.finish().status, 0);
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
 TEST_F(SpnavOutputTest, TheVerbIsRefusedWhereOneServesAlready) {
-  test::Bridge keeper({"spnav", "--socket", folder_.socket()});
-  ASSERT_TRUE(keeper.wait_for_message("serving"));
+  test::Bridge daemon({"spnav", "--socket", folder_.socket()});
+  ASSERT_TRUE(daemon.wait_for_message("serving"));
   const test::Outcome second = test::run_bridge({"spnav", "--socket", folder_.socket()});
   EXPECT_EQ(second.status, 2);
   EXPECT_EQ(test::lines_in(second.err), 1U) << second.err;

@@ -83,12 +83,12 @@ TEST(SpnavAxes, AreRoundedClampedAndNeverMadeUp) {
 }
 
 TEST(SpnavDialogue, EchoesTheVersionThatItCanSpeak) {
-  for (const auto& [wish, answer] : {std::pair{0x7faa5500U, 0x7faa5500U},
-                                     {0x7faa5501U, 0x7faa5501U},
-                                     {0x7faa55ffU, 0x7faa5501U}}) {
+  for (const auto& [request, answer] : {std::pair{0x7faa5500U, 0x7faa5500U},
+                                        {0x7faa5501U, 0x7faa5501U},
+                                        {0x7faa55ffU, 0x7faa5501U}}) {
     SpnavDialogue dialogue;
     EXPECT_FALSE(dialogue.has_spoken());
-    EXPECT_EQ(converse(dialogue, as_bytes(wish), 1, nullptr), as_bytes(answer));
+    EXPECT_EQ(converse(dialogue, as_bytes(request), 1, nullptr), as_bytes(answer));
     EXPECT_EQ(dialogue.version(), static_cast<int>(answer & 1));
     EXPECT_TRUE(dialogue.has_spoken());
     EXPECT_EQ(dialogue.wants(SpnavDialogue::kDevice), dialogue.version() == 1);

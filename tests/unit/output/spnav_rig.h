@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "host/core/os/unique_fd.h"
-#include "host/output/spnav_keeper.h"
+#include "host/output/spnav_daemon.h"
 #include "host/output/spnav_link.h"
 
 namespace tagwrench::test {
@@ -67,11 +67,11 @@ class SpnavProgramByHand {
     if (::connect(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
       throw std::runtime_error("connect " + path + ": " + std::strerror(errno));
     if (version == 0) return;
-    const std::uint32_t wish = 0x7faa5501;
-    say(&wish, sizeof wish);
+    const std::uint32_t request = 0x7faa5501;
+    say(&request, sizeof request);
     std::uint32_t answer = 0;
     EXPECT_TRUE(hear(&answer, sizeof answer));
-    EXPECT_EQ(answer, wish);
+    EXPECT_EQ(answer, request);
   }
 
   void say(const void* bytes, std::size_t count) {
@@ -132,28 +132,28 @@ class SpnavProgramByHand {
   UniqueFd fd_;
 };
 
-/// A keeper in a thread of the test.
-class KeeperThread {
+/// A daemon in a thread of the test.
+class DaemonThread {
  public:
-  explicit KeeperThread(const std::string& path, SpnavKeeperOptions options = {}) {
+  explicit DaemonThread(const std::string& path, SpnavDaemonOptions options = {}) {
     int ends[2];
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
       throw std::runtime_error("socketpair");
     stop_.reset(ends[0]);
     stopped_.reset(ends[1]);
     std::optional<SpnavSockets> sockets = listen_spnav(path);
-    if (!sockets) throw std::runtime_error("a keeper is there already");
-    keeper_.emplace(std::move(*sockets), options, stopped_.get());
-    thread_ = std::thread([this] { keeper_->run(); });
+    if (!sockets) throw std::runtime_error("a daemon is there already");
+    daemon_.emplace(std::move(*sockets), options, stopped_.get());
+    thread_ = std::thread([this] { daemon_->run(); });
   }
-  KeeperThread(const KeeperThread&) = delete;
-  KeeperThread& operator=(const KeeperThread&) = delete;
-  ~KeeperThread() { stop(); }
+  DaemonThread(const DaemonThread&) = delete;
+  DaemonThread& operator=(const DaemonThread&) = delete;
+  ~DaemonThread() { stop(); }
 
   void stop() {
     stop_.reset();
     wait();
-    keeper_.reset();
+    daemon_.reset();
   }
   void wait() {
     if (thread_.joinable()) thread_.join();
@@ -162,7 +162,7 @@ class KeeperThread {
  private:
   UniqueFd stop_;
   UniqueFd stopped_;
-  std::optional<SpnavKeeper> keeper_;
+  std::optional<SpnavDaemon> daemon_;
   std::thread thread_;
 };
 
@@ -170,7 +170,7 @@ class KeeperThread {
 class BridgeByHand {
  public:
   explicit BridgeByHand(const std::string& path) : link_(connect_spnav_bridge(path)) {
-    if (!link_) throw std::runtime_error("no keeper at " + path);
+    if (!link_) throw std::runtime_error("no daemon at " + path);
     greeting_ = hear<SpnavGreeting>();
     if (greeting_.refused != 0) return;
     SpnavHello hello;
@@ -189,7 +189,7 @@ class BridgeByHand {
     update.state.motion = motion;
     update.state.buttons = buttons;
     update.valid_ms = valid_ms;
-    while (!send_spnav(link_.get(), update)) {  // the keeper has the same two processors
+    while (!send_spnav(link_.get(), update)) {  // the daemon has the same two processors
       ASSERT_EQ(errno, EAGAIN);
       pollfd entry{link_.get(), POLLOUT, 0};
       ASSERT_EQ(::poll(&entry, 1, kSpnavPatience_ms), 1);

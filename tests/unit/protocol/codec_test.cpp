@@ -43,9 +43,9 @@ TEST(Codec, EveryKindComesBackFromTheEndsOfItsRange) {
     RandomMessages random{4};
     for (int n = 0; n < 3000; ++n) {
       const Message message = random.make<Message>();
-      GuardedBytes body{Bytes(kMostBodyBytes)};
+      GuardedBytes body{Bytes(kMaxBodyBytes)};
       const std::uint8_t count = encode(message, 0, body.data());
-      ASSERT_LE(count, kMostBodyBytes) << name;
+      ASSERT_LE(count, kMaxBodyBytes) << name;
       Message back;
       ASSERT_TRUE(decode(body.data() + kHeaderBytes, static_cast<std::uint8_t>(count - 2), back))
           << name;
@@ -254,13 +254,13 @@ TEST(Codec, CountsStringsAndIdsThatAreTooLongAreCut) {
   configure.cell_count = 200;
   Configure configure_back;
   ASSERT_TRUE(decode_bytes(message_of(body_of(configure, 0)), configure_back));
-  EXPECT_EQ(configure_back.cell_count, kMostCells);
+  EXPECT_EQ(configure_back.cell_count, kMaxCells);
 
   Status status{};
   status.cell_count = 200;
   Status status_back;
   ASSERT_TRUE(decode_bytes(message_of(body_of(status, 0)), status_back));
-  EXPECT_EQ(status_back.cell_count, kMostCells);
+  EXPECT_EQ(status_back.cell_count, kMaxCells);
 
   Hello hello{};
   std::fill(std::begin(hello.board), std::end(hello.board), 'b');

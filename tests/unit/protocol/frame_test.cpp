@@ -114,7 +114,7 @@ TEST(Frame, OfEveryLengthIsReadBackAndHasNoZeroBeforeItsEnd) {
   FrameReader reader;
   for (int n = 0; n < 5000; ++n) {
     const Bytes body =
-        random_body(random, kHeaderBytes + random() % (kMostBodyBytes - kHeaderBytes + 1u));
+        random_body(random, kHeaderBytes + random() % (kMaxBodyBytes - kHeaderBytes + 1u));
     const Bytes frame = frame_of(body);
     ASSERT_EQ(frame.size(), 1 + body.size() + kCrcBytes + 1);
     ASSERT_EQ(std::ranges::find(frame, 0), frame.end() - 1);
@@ -125,19 +125,19 @@ TEST(Frame, OfEveryLengthIsReadBackAndHasNoZeroBeforeItsEnd) {
 }
 
 TEST(Frame, IsNotWrittenOfABodyWithoutHeaderOrTooLong) {
-  const Bytes body(kMostBodyBytes + 1, 1);
-  Bytes frame(kMostFrameBytes, 0xEE);
-  for (const int count : {0, 1, kMostBodyBytes + 1, 255}) {
+  const Bytes body(kMaxBodyBytes + 1, 1);
+  Bytes frame(kMaxFrameBytes, 0xEE);
+  for (const int count : {0, 1, kMaxBodyBytes + 1, 255}) {
     EXPECT_EQ(write_frame(body.data(), static_cast<std::uint8_t>(count), frame.data()), 0);
   }
-  EXPECT_EQ(frame, Bytes(kMostFrameBytes, 0xEE));
+  EXPECT_EQ(frame, Bytes(kMaxFrameBytes, 0xEE));
 }
 
 TEST(Frame, TheLongestOneFillsItsRoomAndNoMore) {
   for (const int byte : {0, 1, 255}) {
-    GuardedBytes body{Bytes(kMostBodyBytes, static_cast<std::uint8_t>(byte))};
-    GuardedBytes frame{Bytes(kMostFrameBytes)};
-    EXPECT_EQ(write_frame(body.data(), kMostBodyBytes, frame.data()), kMostFrameBytes);
+    GuardedBytes body{Bytes(kMaxBodyBytes, static_cast<std::uint8_t>(byte))};
+    GuardedBytes frame{Bytes(kMaxFrameBytes)};
+    EXPECT_EQ(write_frame(body.data(), kMaxBodyBytes, frame.data()), kMaxFrameBytes);
   }
 }
 
@@ -145,8 +145,8 @@ TEST(Frame, CanBeWrittenInPlaceOfABodyOneByteFurtherOn) {
   std::mt19937 random{6};
   for (int n = 0; n < 1000; ++n) {
     const Bytes body =
-        random_body(random, kHeaderBytes + random() % (kMostBodyBytes - kHeaderBytes + 1u));
-    Bytes frame(kMostFrameBytes);
+        random_body(random, kHeaderBytes + random() % (kMaxBodyBytes - kHeaderBytes + 1u));
+    Bytes frame(kMaxFrameBytes);
     std::ranges::copy(body, frame.begin() + 1);
     frame.resize(
         write_frame(frame.data() + 1, static_cast<std::uint8_t>(body.size()), frame.data()));
@@ -272,9 +272,9 @@ TEST(FrameReader, AWrongLengthIsDamagedAlthoughTheCrcIsRight) {
   EXPECT_TRUE(damaged(and_crc({})));
   EXPECT_TRUE(damaged(and_crc({0x04})));
   EXPECT_FALSE(damaged(and_crc({0x04, 0x00})));
-  const Bytes longest(kMostBodyBytes, 0x11);
+  const Bytes longest(kMaxBodyBytes, 0x11);
   EXPECT_FALSE(damaged(and_crc(longest)));
-  EXPECT_TRUE(damaged(and_crc(Bytes(kMostBodyBytes + 1, 0x11))));
+  EXPECT_TRUE(damaged(and_crc(Bytes(kMaxBodyBytes + 1, 0x11))));
   Bytes and_more = and_crc(longest);
   and_more.push_back(0x22);
   EXPECT_TRUE(damaged(and_more));

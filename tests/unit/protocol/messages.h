@@ -180,13 +180,13 @@ struct Examples {
 
 template <class Message>
 Bytes body_of(const Message& message, std::uint8_t sequence) {
-  Bytes body(kMostBodyBytes);
+  Bytes body(kMaxBodyBytes);
   body.resize(encode(message, sequence, body.data()));
   return body;
 }
 
 inline Bytes frame_of(const Bytes& body) {
-  Bytes frame(kMostFrameBytes);
+  Bytes frame(kMaxFrameBytes);
   frame.resize(write_frame(body.data(), static_cast<std::uint8_t>(body.size()), frame.data()));
   return frame;
 }

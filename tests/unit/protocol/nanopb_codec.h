@@ -17,8 +17,8 @@ namespace tagwrench::link {
 inline Bytes nanopb_encoded(Kind kind, std::uint8_t sequence, const pb_msgdesc_t& type,
                             const void* wire) {
   Bytes body{static_cast<std::uint8_t>(kind), sequence};
-  body.resize(kMostBodyBytes);
-  pb_ostream_t stream = pb_ostream_from_buffer(body.data() + kHeaderBytes, kMostMessageBytes);
+  body.resize(kMaxBodyBytes);
+  pb_ostream_t stream = pb_ostream_from_buffer(body.data() + kHeaderBytes, kMaxMessageBytes);
   if (!pb_encode(&stream, &type, wire)) throw std::logic_error("nanopb could not encode");
   body.resize(kHeaderBytes + stream.bytes_written);
   return body;
@@ -91,7 +91,7 @@ inline Bytes nanopb_body(const Status& m, std::uint8_t sequence) {
   wire.unknown_kinds = m.unknown_kinds;
   wire.overruns = m.overruns;
   wire.dropped_reports = m.dropped_reports;
-  wire.cell_rate_centihertz_count = std::min(m.cell_count, kMostCells);
+  wire.cell_rate_centihertz_count = std::min(m.cell_count, kMaxCells);
   std::copy_n(m.cell_rate_centihertz, wire.cell_rate_centihertz_count, wire.cell_rate_centihertz);
   wire.stack_free_bytes = m.stack_free_bytes;
   wire.longest_loop_us = m.longest_loop_us;

@@ -66,12 +66,12 @@ class RandomMessages {
   template <class Message>
   void settle(Message&) {}
   void settle(Configure& m) {
-    m.cell_count = static_cast<std::uint8_t>(m.cell_count % (kMostCells + 1));
-    std::fill(m.cells + m.cell_count, m.cells + kMostCells, CellInput::off);
+    m.cell_count = static_cast<std::uint8_t>(m.cell_count % (kMaxCells + 1));
+    std::fill(m.cells + m.cell_count, m.cells + kMaxCells, CellInput::off);
   }
   void settle(Status& m) {
-    m.cell_count = static_cast<std::uint8_t>(m.cell_count % (kMostCells + 1));
-    std::fill(m.cell_rate_centihertz + m.cell_count, m.cell_rate_centihertz + kMostCells, 0);
+    m.cell_count = static_cast<std::uint8_t>(m.cell_count % (kMaxCells + 1));
+    std::fill(m.cell_rate_centihertz + m.cell_count, m.cell_rate_centihertz + kMaxCells, 0);
   }
 
   std::mt19937 random_;

@@ -29,7 +29,7 @@ class CalibrationFile : public testing::Test {
   WrenchModel load(const std::string& text) {
     std::ofstream(path_) << text;
     WrenchModel model;
-    load_calibration(path_, CameraModel{}, TargetDescription{}, RestOptions{}, model);
+    load_calibration(path_, CameraModel{}, TargetDescription{}, ReferenceOptions{}, model);
     return model;
   }
   std::string complaint(const std::string& from, const std::string& to) {

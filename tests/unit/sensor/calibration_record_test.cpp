@@ -25,7 +25,7 @@ class CalibrationRecordFile : public testing::Test {
     pose.translation() = Eigen::Vector3d(1e-3, -2e-3, 3e-3);
     for (Tag& tag : target_.tags) tag.platform_T_tag = pose;
     rest_.camera_T_platform = pose;
-    rest_.appearance = RestImage{4, 2, 25, {0, 1, 2, 3, 4, 5, 6, 255}};
+    rest_.appearance = ReferenceImage{4, 2, 25, {0, 1, 2, 3, 4, 5, 6, 255}};
   }
   void TearDown() override { std::filesystem::remove(path_); }
 
@@ -83,7 +83,7 @@ class CalibrationRecordFile : public testing::Test {
   std::filesystem::path path_;
   CameraModel camera_;
   TargetDescription target_;
-  RestOptions rest_;
+  ReferenceOptions rest_;
 };
 
 TEST_F(CalibrationRecordFile, EveryNumberComesBackToTheBit) {

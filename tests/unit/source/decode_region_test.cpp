@@ -95,10 +95,10 @@ TEST(Region, EmptyOrOutsideMeansTheWholeImage) {
 }
 
 TEST(Region, OfAbsurdNumbersIsClippedToo) {
-  constexpr int kMost = std::numeric_limits<int>::max();
-  constexpr int kLeast = std::numeric_limits<int>::min();
-  EXPECT_EQ((Region{5, 6, kMost, kMost}.clipped(64, 48)), (Region{5, 6, 59, 42}));
-  EXPECT_EQ((Region{kLeast, kMost, kMost, kMost}.clipped(64, 48)), (Region{0, 0, 64, 48}));
+  constexpr int kMax = std::numeric_limits<int>::max();
+  constexpr int kMin = std::numeric_limits<int>::min();
+  EXPECT_EQ((Region{5, 6, kMax, kMax}.clipped(64, 48)), (Region{5, 6, 59, 42}));
+  EXPECT_EQ((Region{kMin, kMax, kMax, kMax}.clipped(64, 48)), (Region{0, 0, 64, 48}));
 }
 
 TEST(Region, ContainsWhatLiesWithinIt) {
@@ -158,7 +158,7 @@ TEST(DecodeRegion, WholeJpegsOfEveryKindAreThoseOfTheSimpleInterface) {
 }
 
 TEST(DecodeRegion, OfEveryKindOfJpegIsThatOfTheWholeAndTouchesNothingElse) {
-  constexpr int kMostSurplusColumns = 31;
+  constexpr int kMaxSurplusColumns = 31;
   for (const auto& [width, height] : kSizes) {
     const Bytes luma = pattern(width, height);
     for (const JpegKind& kind : jpeg_kinds()) {
@@ -176,7 +176,7 @@ TEST(DecodeRegion, OfEveryKindOfJpegIsThatOfTheWholeAndTouchesNothingElse) {
         ASSERT_TRUE(decoder.decode(second, second.size(), wanted, image, decoded)) << what;
         EXPECT_TRUE(decoded.contains(asked)) << what << " got " << text(decoded);
         EXPECT_EQ(decoded.height, asked.height) << what;
-        EXPECT_LE(decoded.width, asked.width + kMostSurplusColumns) << what;
+        EXPECT_LE(decoded.width, asked.width + kMaxSurplusColumns) << what;
         EXPECT_EQ(differences(image, decoded, now, before), 0) << what;
       }
     }

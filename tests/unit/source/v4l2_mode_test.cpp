@@ -27,7 +27,7 @@ std::string chosen(const std::vector<V4l2Mode>& modes, const V4l2Options& option
   return describe(shown);
 }
 
-V4l2Options wish(const char* spec, int width = 640, int height = 480) {
+V4l2Options request(const char* spec, int width = 640, int height = 480) {
   V4l2Options options = parse_v4l2_spec(spec);
   options.preferred_width = width;
   options.preferred_height = height;
@@ -35,50 +35,52 @@ V4l2Options wish(const char* spec, int width = 640, int height = 480) {
 }
 
 TEST(ChooseMode, PreferredSizeThenRateThenUncompressed) {
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0")), "640x480 YUYV 30 fps");
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0", 1280, 720)), "1280x720 MJPG 60 fps");
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0", 1920, 1080)), "1920x1080 MJPG 30 fps");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0")), "640x480 YUYV 30 fps");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0", 1280, 720)), "1280x720 MJPG 60 fps");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0", 1920, 1080)), "1920x1080 MJPG 30 fps");
 }
 
 TEST(ChooseMode, WhatIsAskedIsWhatIsGiven) {
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0,1280x720")), "1280x720 MJPG 60 fps");
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0,1280x720@10")), "1280x720 YUYV 10 fps");
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0,640x480@15")), "640x480 YUYV 15 fps");
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0,640x480,MJPG")), "640x480 MJPG 30 fps");
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0,640x480@60")), "none");
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0,640x481")), "none");
-  EXPECT_EQ(chosen(kWebcam, wish("/dev/video0,640x480,NV12")), "none");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0,1280x720")), "1280x720 MJPG 60 fps");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0,1280x720@10")), "1280x720 YUYV 10 fps");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0,640x480@15")), "640x480 YUYV 15 fps");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0,640x480,MJPG")), "640x480 MJPG 30 fps");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0,640x480@60")), "none");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0,640x481")), "none");
+  EXPECT_EQ(chosen(kWebcam, request("/dev/video0,640x480,NV12")), "none");
 }
 
 TEST(ChooseMode, NearlyEqualRatesDoNotOutvoteUncompressed) {
   EXPECT_EQ(
       chosen({mode(PixelFormat::mjpg, 640, 480, 30), mode(PixelFormat::yuyv, 640, 480, 29.97)},
-             wish("/dev/video0")),
+             request("/dev/video0")),
       "640x480 YUYV 29.97 fps");
 }
 
 TEST(ChooseMode, OfEqualsTheCheapestToDecode) {
   EXPECT_EQ(chosen({mode(PixelFormat::yuyv, 640, 480, 30), mode(PixelFormat::nv12, 640, 480, 30),
                     mode(PixelFormat::grey, 640, 480, 30)},
-                   wish("/dev/video0")),
+                   request("/dev/video0")),
             "640x480 GREY 30 fps");
 }
 
 TEST(ChooseMode, WithoutThePreferredSizeTheNearest) {
   EXPECT_EQ(chosen({mode(PixelFormat::grey, 320, 240, 120), mode(PixelFormat::grey, 800, 600, 30),
                     mode(PixelFormat::grey, 1920, 1080, 60)},
-                   wish("/dev/video0")),
+                   request("/dev/video0")),
             "800x600 GREY 30 fps");
 }
 
 TEST(ChooseMode, ARangeOfRatesGivesAnyRateWithin) {
   const std::vector<V4l2Mode> range = {{PixelFormat::grey, 0, 640, 480, 1, 90}};
-  EXPECT_EQ(chosen(range, wish("/dev/video0")), "640x480 GREY 90 fps");
-  EXPECT_EQ(chosen(range, wish("/dev/video0,640x480@42")), "640x480 GREY 42 fps");
-  EXPECT_EQ(chosen(range, wish("/dev/video0,640x480@120")), "none");
+  EXPECT_EQ(chosen(range, request("/dev/video0")), "640x480 GREY 90 fps");
+  EXPECT_EQ(chosen(range, request("/dev/video0,640x480@42")), "640x480 GREY 42 fps");
+  EXPECT_EQ(chosen(range, request("/dev/video0,640x480@120")), "none");
 }
 
-TEST(ChooseMode, ACameraWithoutModesHasNone) { EXPECT_EQ(chosen({}, wish("/dev/video0")), "none"); }
+TEST(ChooseMode, ACameraWithoutModesHasNone) {
+  EXPECT_EQ(chosen({}, request("/dev/video0")), "none");
+}
 
 TEST(DescribeModes, ListsEachOnceAtItsBestRateAndStaysShort) {
   EXPECT_EQ(describe(kWebcam, 3),

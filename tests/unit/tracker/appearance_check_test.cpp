@@ -14,7 +14,7 @@ namespace {
 struct Loaded {
   CameraModel camera;
   TargetDescription target;
-  RestOptions rest;
+  ReferenceOptions rest;
 };
 
 Loaded loaded(const render::Scene& scene) {
@@ -23,7 +23,7 @@ Loaded loaded(const render::Scene& scene) {
     all.target.tags[t].platform_T_tag =
         render::rest_pose(scene).inverse() * scene.tags[t].camera_T_tag;
   all.rest.camera_T_platform = render::rest_pose(scene);
-  all.rest.appearance = RestImage{scene.width, scene.height, 25, render::rest_picture(scene)};
+  all.rest.appearance = ReferenceImage{scene.width, scene.height, 25, render::rest_picture(scene)};
   return all;
 }
 

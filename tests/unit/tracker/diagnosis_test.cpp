@@ -1,6 +1,4 @@
 // Why the target is not held: each cause on pictures that have it, and none on those that do not.
-#include "host/tracker/diagnosis.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "host/tracker/diagnostics.h"
 #include "host/tracker/tracker.h"
 #include "tests/unit/tracker/template_scene.h"
 
@@ -40,8 +39,8 @@ TargetDescription placed_target(const Scene& scene) {
   return target;
 }
 
-HintDetails::Ids ids(const std::vector<int>& list) {
-  HintDetails::Ids out;
+DiagnosticDetails::Ids ids(const std::vector<int>& list) {
+  DiagnosticDetails::Ids out;
   for (const int id : list) out.add(id);
   return out;
 }
@@ -55,7 +54,7 @@ struct Watch {
   std::vector<Track> said;
 
   explicit Watch(const Scene& scene, const TargetDescription& target = roof_target(),
-                 const RestOptions& rest = {5, {}, {}})
+                 const ReferenceOptions& rest = {5, {}, {}})
       : tracker(render::camera_of(scene), target, rest) {}
 
   void show(const Picture& picture, int frames = 1) {
@@ -64,7 +63,7 @@ struct Watch {
       frame.image = picture.view();
       frame.capture_time = TimePoint{} + kPeriod * shown++;
       last = tracker.track(frame);
-      if (last.hint != Hint::none) said.push_back(last);
+      if (last.diagnostic != Diagnostic::none) said.push_back(last);
     }
   }
   Picture take(const Scene& scene, const Vector6& displacement = Vector6::Zero()) {
@@ -77,23 +76,25 @@ struct Watch {
     said.clear();
   }
   /// That, and nothing else.
-  HintDetails only(Hint hint) const {
+  DiagnosticDetails only(Diagnostic diagnostic) const {
     EXPECT_EQ(said.size(), 1U);
     if (said.size() != 1) {
-      for (const Track& track : said) ADD_FAILURE() << "said " << static_cast<int>(track.hint);
+      for (const Track& track : said)
+        ADD_FAILURE() << "said " << static_cast<int>(track.diagnostic);
       return {};
     }
-    EXPECT_EQ(static_cast<int>(said.front().hint), static_cast<int>(hint));
+    EXPECT_EQ(static_cast<int>(said.front().diagnostic), static_cast<int>(diagnostic));
     return said.front().details;
   }
 };
 
-HintDetails look(const Picture& picture, Hint hint, const Scene& scene = render::roof(),
-                 const TargetDescription& target = roof_target(),
-                 const RestOptions& rest = {5, {}, {}}) {
+DiagnosticDetails look(const Picture& picture, Diagnostic diagnostic,
+                       const Scene& scene = render::roof(),
+                       const TargetDescription& target = roof_target(),
+                       const ReferenceOptions& rest = {5, {}, {}}) {
   Watch watch(scene, target, rest);
   watch.show(picture, kLook);
-  return watch.only(hint);
+  return watch.only(diagnostic);
 }
 
 Picture roof_picture(const Scene& scene = render::roof()) {
@@ -145,43 +146,44 @@ double workshop(int x, int y) {
 }
 
 TEST(Diagnosis, LensCapOrNoLight) {
-  EXPECT_LT(look(paint([](int, int) { return 6; }, 3), Hint::image_black).amount, 40);
+  EXPECT_LT(look(paint([](int, int) { return 6; }, 3), Diagnostic::image_black).amount, 40);
 }
 
 TEST(Diagnosis, TooMuchLight) {
   const Picture washed_out = repaint(roof_picture(), [](double level) { return level + 220; });
-  EXPECT_GT(look(washed_out, Hint::image_saturated).amount, 0.4);
+  EXPECT_GT(look(washed_out, Diagnostic::image_saturated).amount, 0.4);
 }
 
 TEST(Diagnosis, SomethingRightBeforeTheLens) {
-  look(paint([](int, int) { return 120; }), Hint::image_empty);
-  look(paint([](int x, int y) { return 60 + 0.1 * x + 0.1 * y; }), Hint::image_empty);
+  look(paint([](int, int) { return 120; }), Diagnostic::image_empty);
+  look(paint([](int x, int y) { return 60 + 0.1 * x + 0.1 * y; }), Diagnostic::image_empty);
 }
 
 TEST(Diagnosis, FocusLost) {
   for (const double sigma_px : {9.0, 11.0}) {
-    const double blur_px = look(blurred(roof_picture(), sigma_px), Hint::image_unsharp).amount;
+    const double blur_px =
+        look(blurred(roof_picture(), sigma_px), Diagnostic::image_unsharp).amount;
     EXPECT_NEAR(blur_px, sigma_px, 0.5 * sigma_px);
   }
 }
 
 TEST(Diagnosis, NoTagInAPictureThatIsFine) {
-  const HintDetails details = look(paint(workshop), Hint::no_tag);
+  const DiagnosticDetails details = look(paint(workshop), Diagnostic::no_tag);
   EXPECT_EQ(details.expected, ids({5, 2}));
   EXPECT_EQ(details.expected_family, "aruco_original");
 }
 
 TEST(Diagnosis, TagsOfAnotherFamilyAreNamed) {
   const Scene april = render::alone(render::april_seven());
-  const HintDetails one = look(roof_picture(april), Hint::wrong_family, april);
+  const DiagnosticDetails one = look(roof_picture(april), Diagnostic::wrong_family, april);
   EXPECT_EQ(one.family, "apriltag_36h11");
   EXPECT_EQ(one.seen, ids({7}));
   EXPECT_EQ(one.expected_family, "aruco_original");
   for (const bool mirrored : {false, true}) {
     Scene roof = render::roof();
     roof.mirrored = mirrored;
-    HintDetails two = look(roof_picture(roof), Hint::wrong_family, roof,
-                           target_of(TagFamily::apriltag_36h11, {5, 2}));
+    DiagnosticDetails two = look(roof_picture(roof), Diagnostic::wrong_family, roof,
+                                 target_of(TagFamily::apriltag_36h11, {5, 2}));
     EXPECT_EQ(two.family, "aruco_original");
     std::sort(two.seen.id.begin(), two.seen.id.begin() + two.seen.count);
     EXPECT_EQ(two.seen, ids({2, 5}));
@@ -189,18 +191,18 @@ TEST(Diagnosis, TagsOfAnotherFamilyAreNamed) {
 }
 
 TEST(Diagnosis, OtherIdsThanDescribed) {
-  const HintDetails all = look(roof_picture(), Hint::wrong_ids, render::roof(),
-                               target_of(TagFamily::aruco_original, {17, 18}));
+  const DiagnosticDetails all = look(roof_picture(), Diagnostic::wrong_ids, render::roof(),
+                                     target_of(TagFamily::aruco_original, {17, 18}));
   EXPECT_EQ(all.seen.count, 2);
   EXPECT_EQ(all.expected, ids({17, 18}));
-  const HintDetails half = look(roof_picture(), Hint::wrong_ids, render::roof(),
-                                target_of(TagFamily::aruco_original, {5, 18}));
+  const DiagnosticDetails half = look(roof_picture(), Diagnostic::wrong_ids, render::roof(),
+                                      target_of(TagFamily::aruco_original, {5, 18}));
   EXPECT_EQ(half.seen, ids({5, 2}));
   EXPECT_EQ(half.concerned, ids({18}));
 }
 
 TEST(Diagnosis, OneOfTwoTags) {
-  const HintDetails details = look(covered(roof_picture(), 245), Hint::tag_missing);
+  const DiagnosticDetails details = look(covered(roof_picture(), 245), Diagnostic::tag_missing);
   EXPECT_EQ(details.seen, ids({5}));
   EXPECT_EQ(details.concerned, ids({2}));
 }
@@ -208,13 +210,13 @@ TEST(Diagnosis, OneOfTwoTags) {
 TEST(Diagnosis, OneIdTwice) {
   Scene scene = render::roof();
   scene.tags[1].rows = scene.tags[0].rows;
-  EXPECT_EQ(look(roof_picture(scene), Hint::tag_twice).concerned, ids({5}));
+  EXPECT_EQ(look(roof_picture(scene), Diagnostic::tag_twice).concerned, ids({5}));
 }
 
 TEST(Diagnosis, OneTagPrintedMirrored) {
   Scene scene = render::roof();
   for (std::string& row : scene.tags[1].rows) std::reverse(row.begin(), row.end());
-  const HintDetails details = look(roof_picture(scene), Hint::tag_printed_mirrored);
+  const DiagnosticDetails details = look(roof_picture(scene), Diagnostic::tag_printed_mirrored);
   EXPECT_EQ(details.concerned, ids({2}));
   EXPECT_EQ(details.seen, ids({5}));
 }
@@ -225,7 +227,8 @@ TEST(Diagnosis, AMirroredImageIsLeftToTheHintThatSaysSo) {
   Watch watch(render::roof());
   watch.show(roof_picture(flipped), kLook);
   ASSERT_FALSE(watch.said.empty());
-  for (const Track& track : watch.said) EXPECT_EQ(track.hint, Hint::image_looks_mirrored);
+  for (const Track& track : watch.said)
+    EXPECT_EQ(track.diagnostic, Diagnostic::image_looks_mirrored);
 }
 
 /// Tags printed at another scale and glued at the same centres.
@@ -239,15 +242,15 @@ TEST(Diagnosis, TagsPrintedAtAnotherScale) {
   const Scene described = render::roof();
   for (const double scale : {0.9, 0.94, 1.06, 1.1}) {
     for (const bool rest_given : {false, true}) {
-      RestOptions rest{5, {}, {}};
+      ReferenceOptions rest{5, {}, {}};
       if (rest_given) rest.camera_T_platform = render::rest_pose(described);
       const Picture picture = roof_picture(printed_at(scale));
-      const HintDetails details =
-          look(picture, Hint::other_scale, described, placed_target(described), rest);
+      const DiagnosticDetails details =
+          look(picture, Diagnostic::other_scale, described, placed_target(described), rest);
       EXPECT_NEAR(details.amount, scale, 0.01) << rest_given;
     }
   }
-  RestOptions rest{5, render::rest_pose(described), {}};
+  ReferenceOptions rest{5, render::rest_pose(described), {}};
   Watch watch(described, placed_target(described), rest);
   watch.show(roof_picture(printed_at(1.01)), kLook);
   EXPECT_TRUE(watch.said.empty()) << "a printer's tolerance";
@@ -257,16 +260,16 @@ TEST(Diagnosis, TagsInEachOthersPlaces) {
   const Scene described = render::roof();
   Scene swapped = described;
   std::swap(swapped.tags[0].camera_T_tag, swapped.tags[1].camera_T_tag);
-  RestOptions rest{5, render::rest_pose(described), {}};
-  look(roof_picture(swapped), Hint::other_places, described, placed_target(described), rest);
+  ReferenceOptions rest{5, render::rest_pose(described), {}};
+  look(roof_picture(swapped), Diagnostic::other_places, described, placed_target(described), rest);
 }
 
 TEST(Diagnosis, RestPoseElsewhere) {
   const Scene scene = render::roof();
-  RestOptions rest{5, render::rest_pose(scene), {}};
+  ReferenceOptions rest{5, render::rest_pose(scene), {}};
   rest.camera_T_platform->translation() += Eigen::Vector3d(-16e-3, 0, 3e-3);
-  const HintDetails details =
-      look(roof_picture(), Hint::rest_elsewhere, scene, placed_target(scene), rest);
+  const DiagnosticDetails details =
+      look(roof_picture(), Diagnostic::rest_elsewhere, scene, placed_target(scene), rest);
   EXPECT_NEAR(details.offset[0], 16e-3, 0.3e-3);
   EXPECT_NEAR(details.offset[1], 0, 0.3e-3);
   EXPECT_NEAR(details.offset[2], -3e-3, 0.3e-3);
@@ -275,18 +278,18 @@ TEST(Diagnosis, RestPoseElsewhere) {
 
 TEST(Diagnosis, HeldButFarFromTheGivenRest) {
   const Scene scene = render::roof();
-  RestOptions rest{5, render::rest_pose(scene), {}};
+  ReferenceOptions rest{5, render::rest_pose(scene), {}};
   rest.camera_T_platform->translation().x() -= 0.8e-3;
   Watch watch(scene, placed_target(scene), rest);
   const std::vector<float> light = render::expose(scene, Vector6::Zero());
   for (int i = 0; i < 2 * kLook; ++i) watch.show(render::develop(scene, light, watch.random));
-  EXPECT_NEAR(watch.only(Hint::far_from_rest).offset[0], 0.8e-3, 0.05e-3);
+  EXPECT_NEAR(watch.only(Diagnostic::far_from_rest).offset[0], 0.8e-3, 0.05e-3);
   EXPECT_EQ(watch.last.status, Status::ok);
 }
 
 TEST(Diagnosis, HeldButFarFromTheGivenRestAfterAPushAndAHandBeforeTheLens) {
   const Scene scene = render::roof();
-  RestOptions rest{5, render::rest_pose(scene), {}};
+  ReferenceOptions rest{5, render::rest_pose(scene), {}};
   rest.camera_T_platform->translation().x() -= 0.8e-3;
   Watch watch(scene, placed_target(scene), rest);
   const std::vector<float> light = render::expose(scene, Vector6::Zero());
@@ -298,12 +301,12 @@ TEST(Diagnosis, HeldButFarFromTheGivenRestAfterAPushAndAHandBeforeTheLens) {
   }
   EXPECT_TRUE(watch.said.empty());  // it has not stood still for long
   for (int i = 0; i < 2 * kLook; ++i) watch.show(render::develop(scene, light, watch.random));
-  EXPECT_NEAR(watch.only(Hint::far_from_rest).offset[0], 0.8e-3, 0.05e-3);
+  EXPECT_NEAR(watch.only(Diagnostic::far_from_rest).offset[0], 0.8e-3, 0.05e-3);
 }
 
 TEST(Diagnosis, NearTheGivenRestNothingIsSaid) {
   const Scene scene = render::roof();
-  RestOptions rest{5, render::rest_pose(scene), {}};
+  ReferenceOptions rest{5, render::rest_pose(scene), {}};
   rest.camera_T_platform->translation().x() -= 0.1e-3;
   Watch watch(scene, placed_target(scene), rest);
   const std::vector<float> light = render::expose(scene, Vector6::Zero());
@@ -341,10 +344,10 @@ TEST(Diagnosis, SaidOnceAndAgainWhenItComesBackAfterTheTargetWasHeld) {
   EXPECT_EQ(watch.last.status, Status::ok);
   watch.show(none, kLook);
   ASSERT_EQ(watch.said.size(), 2U);
-  for (const Track& track : watch.said) EXPECT_EQ(track.hint, Hint::no_tag);
+  for (const Track& track : watch.said) EXPECT_EQ(track.diagnostic, Diagnostic::no_tag);
   watch.show(paint([](int, int) { return 4; }), kLook);
   ASSERT_EQ(watch.said.size(), 3U);
-  EXPECT_EQ(watch.said.back().hint, Hint::image_black);
+  EXPECT_EQ(watch.said.back().diagnostic, Diagnostic::image_black);
 }
 
 TEST(Diagnosis, ALongRestIsNotATrouble) {

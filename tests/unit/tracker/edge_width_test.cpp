@@ -49,7 +49,7 @@ TEST(EdgeWidth, IsTheBlurOfThePicture) {
     ASSERT_EQ(found.size(), 2u) << blur << " px";
     for (const EdgeWidth& width : found) {
       EXPECT_NEAR(width.blur_px / blur, 1, kTolerance) << blur << " px";
-      EXPECT_LT(width.residual_part, 0.1);
+      EXPECT_LT(width.residual_fraction, 0.1);
     }
   }
 }
@@ -89,7 +89,7 @@ TEST(EdgeWidth, LightThatIsCutOffDoesNotSharpen) {
   const std::vector<EdgeWidth> found = widths(taken);
   ASSERT_EQ(found.size(), 2u);
   for (const EdgeWidth& width : found) {
-    EXPECT_GT(width.white_part, 0.1);
+    EXPECT_GT(width.white_fraction, 0.1);
     EXPECT_NEAR(width.blur_px / scene.blur_px, 1, 0.15);
   }
 }

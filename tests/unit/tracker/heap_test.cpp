@@ -14,7 +14,7 @@ namespace {
 TEST(TrackerHeap, HeldTargetAllocatesNothing) {
   const render::Scene scene = render::roof();
   CameraModel camera;
-  Tracker tracker(camera, TargetDescription{}, RestOptions{3, {}, {}});
+  Tracker tracker(camera, TargetDescription{}, ReferenceOptions{3, {}, {}});
   std::mt19937 random(5);
   const std::vector<float> light = render::expose(scene, Vector6::Zero());
   std::vector<render::Picture> pictures;

@@ -14,9 +14,9 @@ namespace {
 
 constexpr int kAveraged = 25;
 
-RestImage averaged(const render::Scene& scene, std::mt19937& random) {
-  RestImage image{scene.width, scene.height, kAveraged,
-                  std::vector<float>(static_cast<std::size_t>(scene.width * scene.height))};
+ReferenceImage averaged(const render::Scene& scene, std::mt19937& random) {
+  ReferenceImage image{scene.width, scene.height, kAveraged,
+                       std::vector<float>(static_cast<std::size_t>(scene.width * scene.height))};
   const std::vector<float> light = render::expose(scene, Vector6::Zero());
   for (int i = 0; i < kAveraged; ++i) {
     const render::Picture picture = render::develop(scene, light, random);
@@ -42,7 +42,7 @@ struct Loaded {
           render::rest_pose(scene).inverse() * scene.tags[t].camera_T_tag;
     return target;
   }
-  RestOptions options(const render::Scene& pictured) {
+  ReferenceOptions options(const render::Scene& pictured) {
     return {kAveraged, render::rest_pose(scene), averaged(pictured, random)};
   }
   Track show(const Vector6& displacement) {
@@ -67,13 +67,13 @@ TEST(LoadedAppearance, IsOkFromTheFirstFrameAndZeroAtRest) {
   Loaded bench(render::roof());
   const Track first = bench.show(Vector6::Zero());
   expect_at(Vector6::Zero(), first);
-  EXPECT_EQ(first.hint, Hint::none);
+  EXPECT_EQ(first.diagnostic, Diagnostic::none);
   Vector6 displacement;
   displacement << 0.1e-3, -0.05e-3, 0.2e-3, 0.01, 0, -0.02;
   for (int i = 0; i < 20; ++i) {
     const Track track = bench.show(i % 2 == 0 ? displacement : Vector6(Vector6::Zero()));
     expect_at(i % 2 == 0 ? displacement : Vector6(Vector6::Zero()), track);
-    EXPECT_EQ(track.hint, Hint::none);
+    EXPECT_EQ(track.diagnostic, Diagnostic::none);
   }
 }
 
@@ -93,14 +93,14 @@ TEST(LoadedAppearance, PictureOfAnotherTargetIsSaidToBeWrongAndGivesNoNumbers) {
     for (std::string& row : tag.rows) std::reverse(row.begin(), row.end());
   }
   Loaded bench(other);
-  int hints = 0;
+  int diagnostics = 0;
   for (int i = 0; i < kFrames; ++i) {
     const Track track = bench.show(Vector6::Zero());
-    hints += track.hint == Hint::appearance_does_not_fit ? 1 : 0;
+    diagnostics += track.diagnostic == Diagnostic::appearance_does_not_fit ? 1 : 0;
     EXPECT_NE(track.status, Status::ok) << i;
     EXPECT_TRUE(track.displacement.isZero(0)) << i;
   }
-  EXPECT_GE(hints, 1);
+  EXPECT_GE(diagnostics, 1);
 }
 
 TEST(LoadedAppearance, PictureOfTagsGluedOtherwiseIsNotBelieved) {
@@ -113,7 +113,7 @@ TEST(LoadedAppearance, PictureOfTagsGluedOtherwiseIsNotBelieved) {
   for (int i = 0; i < 40; ++i) {
     const Track track = bench.show(Vector6::Zero());
     EXPECT_NE(track.status, Status::ok) << i;
-    said = said || track.hint == Hint::appearance_does_not_fit;
+    said = said || track.diagnostic == Diagnostic::appearance_does_not_fit;
   }
   EXPECT_TRUE(said);
 }

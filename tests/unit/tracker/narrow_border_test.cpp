@@ -16,7 +16,7 @@ TEST_P(NarrowBorder, IsTrackedByTheEdgesInside) {
   const render::Scene scene = render::roof();
   TargetDescription target;
   target.border = GetParam();  // m
-  Tracker tracker(render::camera_of(scene), target, RestOptions{});
+  Tracker tracker(render::camera_of(scene), target, ReferenceOptions{});
   std::mt19937 random(4);
   Vector6 displacement = Vector6::Zero();
   int ok = 0;

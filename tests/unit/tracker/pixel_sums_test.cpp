@@ -154,8 +154,8 @@ class PixelSums : public testing::TestWithParam<Case> {
   }
   ~PixelSums() override { hwy::SetSupportedTargetsForTest(0); }
 
-  std::vector<PatchSums> run(bool keep, PixelPairs& pairs) const {
-    std::vector<PatchSums> sums(t_.patches.size());
+  std::vector<NormalEquations> run(bool keep, PixelPairs& pairs) const {
+    std::vector<NormalEquations> sums(t_.patches.size());
     sum_patches(t_, window_, views_, GetParam().inverse_cut, keep, pairs, sums);
     return sums;
   }
@@ -171,7 +171,7 @@ class PixelSums : public testing::TestWithParam<Case> {
 /// for a pixel's place is rounded to 3e-5 px.
 constexpr double kRelative = 1e-4;
 
-void expect_equal(const std::vector<PatchSums>& is, const std::vector<Sums>& should) {
+void expect_equal(const std::vector<NormalEquations>& is, const std::vector<Sums>& should) {
   Right total{}, size{};
   double rounding = 0;
   for (const Sums& s : should) {
@@ -202,7 +202,7 @@ TEST_P(PixelSums, AreThoseOfPlainCodeOnEveryVectorUnit) {
     SCOPED_TRACE(hwy::TargetName(target));
     hwy::SetSupportedTargetsForTest(target);
     PixelPairs pairs(t_.size());
-    const std::vector<PatchSums> sums = run(false, pairs);
+    const std::vector<NormalEquations> sums = run(false, pairs);
     if (targets++ == 0) first = pairs;
     std::vector<Sums> should, should_kept;
     for (std::size_t n = 0; n < t_.patches.size(); ++n) {
@@ -283,11 +283,11 @@ TEST(PixelSumsOfNothing, BehindTheLensOrWithoutAnImageAreZero) {
   Eigen::Isometry3d behind = t.camera_T_platform;
   behind.translation().z() = -0.02;
   PixelPairs pairs(t.size());
-  std::vector<PatchSums> sums(t.patches.size());
+  std::vector<NormalEquations> sums(t.patches.size());
   const auto expect_nothing = [&](const PixelWindow& image, const Eigen::Isometry3d& pose) {
     sums.assign(t.patches.size(), {.right = {1}, .squares = 1, .weights = 1, .inside = 1});
     sum_patches(t, image, views_of(t, pose), 0, false, pairs, sums);
-    for (const PatchSums& s : sums) {
+    for (const NormalEquations& s : sums) {
       for (const float right : s.right) ASSERT_EQ(right, 0);
       ASSERT_EQ(s.squares, 0);
       ASSERT_EQ(s.weights, 0);
@@ -319,10 +319,10 @@ TEST(PixelSumsGradient, RightHandSideIsTheSlopeOfTheSquaredResiduals) {
       v.blur = {};
     }
     PixelPairs pairs(t.size());
-    std::vector<PatchSums> sums(t.patches.size());
+    std::vector<NormalEquations> sums(t.patches.size());
     sum_patches(t, render::window(picture), views, 0, false, pairs, sums);
     double right = 0;
-    for (const PatchSums& s : sums) right += s.right[static_cast<std::size_t>(axis)];
+    for (const NormalEquations& s : sums) right += s.right[static_cast<std::size_t>(axis)];
 
     const auto squares = [&](double step) {
       Vector6 more = Vector6::Zero();

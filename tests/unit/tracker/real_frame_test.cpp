@@ -38,12 +38,12 @@ class RealFrame : public testing::Test {
 TEST_F(RealFrame, IsTrackedWithBothTags) {
   CameraModel camera;
   camera.mirrored = true;
-  Tracker tracker(camera, TargetDescription{}, RestOptions{});
+  Tracker tracker(camera, TargetDescription{}, ReferenceOptions{});
   for (int i = 0; i < 60; ++i) {
     const Track track = tracker.track(frame(i));
     if (i < 24) continue;
     if (i == 24) {
-      EXPECT_EQ(track.hint, Hint::rest_learned);
+      EXPECT_EQ(track.diagnostic, Diagnostic::rest_learned);
       continue;
     }
     ASSERT_EQ(track.status, Status::ok) << i;
@@ -56,14 +56,14 @@ TEST_F(RealFrame, IsTrackedWithBothTags) {
 }
 
 TEST_F(RealFrame, UnflippedIsSaidToLookMirrored) {
-  Tracker tracker(CameraModel{}, TargetDescription{}, RestOptions{});
-  int hints = 0;
+  Tracker tracker(CameraModel{}, TargetDescription{}, ReferenceOptions{});
+  int diagnostics = 0;
   for (int i = 0; i < 8; ++i) {
     const Track track = tracker.track(frame(i));
     EXPECT_EQ(track.status, Status::acquiring);
-    hints += track.hint == Hint::image_looks_mirrored ? 1 : 0;
+    diagnostics += track.diagnostic == Diagnostic::image_looks_mirrored ? 1 : 0;
   }
-  EXPECT_GE(hints, 1);
+  EXPECT_GE(diagnostics, 1);
 }
 
 }  // namespace

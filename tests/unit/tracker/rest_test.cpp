@@ -1,12 +1,11 @@
 // What the learner says about the frames at rest and how well it knows what it has learned.
-#include "host/tracker/rest.h"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <cmath>
 
 #include "host/tracker/acquire.h"
+#include "host/tracker/reference.h"
 #include "host/tracker/tracker.h"
 #include "tests/unit/tracker/template_scene.h"
 
@@ -24,10 +23,10 @@ TEST(Rest, NoiseIsMeasuredWithItsGrowthWithLight) {
   const CameraModel camera = render::camera_of(scene);
   const TargetDescription target;
   Acquirer acquirer(camera, target);
-  RestLearner learner(camera, target, {kFrames, {}, {}}, acquirer.patterns());
+  ReferenceEstimator learner(camera, target, {kFrames, {}, {}}, acquirer.patterns());
   std::mt19937 random(9);
   std::normal_distribution<double> normal;
-  RestLearner::Progress progress = RestLearner::Progress::waiting;
+  ReferenceEstimator::Progress progress = ReferenceEstimator::Progress::waiting;
   for (int i = 0; i < kFrames; ++i) {
     std::vector<float> noisy = light;
     for (float& level : noisy)
@@ -36,7 +35,7 @@ TEST(Rest, NoiseIsMeasuredWithItsGrowthWithLight) {
     const Finding finding = learner.wants_finding() ? acquirer.find(picture.view()) : Finding{};
     progress = learner.add(picture.view(), finding);
   }
-  ASSERT_EQ(progress, RestLearner::Progress::done);
+  ASSERT_EQ(progress, ReferenceEstimator::Progress::done);
   const PixelNoise& noise = learner.learned().noise;
   EXPECT_NEAR(noise.slope, kSlope, 0.1 * kSlope);
   for (const double level : {30.0, 120.0, 200.0}) {
@@ -53,7 +52,7 @@ struct Watched {
   int shown = 0;
 
   explicit Watched(const TargetDescription& target = {},
-                   const RestOptions& rest = {kFrames, {}, {}})
+                   const ReferenceOptions& rest = {kFrames, {}, {}})
       : tracker(render::camera_of(scene), target, rest) {}
 
   Track show(const std::vector<float>& light) {
@@ -95,7 +94,7 @@ TEST(Rest, TagsWhoseDistanceIsDoubtfulMakeDisplacementsAndNotRestDoubtful) {
     target.tags[t].sigma[2] = kSigma;
   }
   const std::vector<float> light = render::expose(scene, Vector6::Zero());
-  Watched bench(target, {kFrames, rest, RestImage{scene.width, scene.height, kFrames, light}});
+  Watched bench(target, {kFrames, rest, ReferenceImage{scene.width, scene.height, kFrames, light}});
   Vector6 away = Vector6::Zero();
   away[0] = kAway;
   const Track at_rest = bench.show(light);

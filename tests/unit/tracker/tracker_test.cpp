@@ -49,7 +49,8 @@ struct Bench {
   std::mt19937 random{7};
   std::uint64_t sequence = 0;
 
-  Bench(Scene the_scene, const TargetDescription& target, RestOptions rest = {kRestFrames, {}, {}})
+  Bench(Scene the_scene, const TargetDescription& target,
+        ReferenceOptions rest = {kRestFrames, {}, {}})
       : scene(std::move(the_scene)), tracker(camera_of(scene), target, rest) {}
 
   Track show(const Picture& picture) {
@@ -118,7 +119,7 @@ void expect_accurate(const Errors& errors, int frames, double xy_um, double z_um
 TEST(Tracker, FollowsTheRoofInSixAxes) {
   Bench bench(render::roof(), roof_target());
   const Track last = bench.rest();
-  EXPECT_EQ(last.hint, Hint::rest_learned);
+  EXPECT_EQ(last.diagnostic, Diagnostic::rest_learned);
   expect_accurate(follow(bench, 40), 40, 1.0, 3.0, 0.3);
 }
 
@@ -212,31 +213,33 @@ TEST(Tracker, StaysAcquiringWithZeroNumbersUntilRestIsLearned) {
     const Track track = bench.show(render::develop(bench.scene, light, bench.random));
     EXPECT_EQ(track.status, Status::acquiring);
     EXPECT_TRUE(track.displacement.isZero(0));
-    EXPECT_EQ(track.hint, i + 1 == kRestFrames ? Hint::rest_learned : Hint::none) << i;
+    EXPECT_EQ(track.diagnostic, i + 1 == kRestFrames ? Diagnostic::rest_learned : Diagnostic::none)
+        << i;
   }
   EXPECT_EQ(bench.show(Vector6::Zero()).status, Status::ok);
 }
 
 TEST(Tracker, MovingWhileLearningStartsAgain) {
   Bench bench(render::roof(), roof_target());
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.show(Vector6::Zero()).hint, Hint::none);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.show(Vector6::Zero()).diagnostic, Diagnostic::none);
   const Vector6 elsewhere = pose6(0.1, 0, 0, 0, 0, 0);
-  EXPECT_EQ(bench.show(elsewhere).hint, Hint::moved_while_learning);
-  for (int i = 0; i + 1 < kRestFrames; ++i) EXPECT_EQ(bench.show(elsewhere).hint, Hint::none) << i;
-  EXPECT_EQ(bench.show(elsewhere).hint, Hint::rest_learned);
+  EXPECT_EQ(bench.show(elsewhere).diagnostic, Diagnostic::moved_while_learning);
+  for (int i = 0; i + 1 < kRestFrames; ++i)
+    EXPECT_EQ(bench.show(elsewhere).diagnostic, Diagnostic::none) << i;
+  EXPECT_EQ(bench.show(elsewhere).diagnostic, Diagnostic::rest_learned);
 }
 
 TEST(Tracker, MirroredImageIsRecognised) {
   Bench bench(render::roof(), roof_target());
   Scene flipped = bench.scene;
   flipped.mirrored = true;
-  int hints = 0;
+  int diagnostics = 0;
   for (int i = 0; i < 8; ++i) {
     const Track track = bench.show(render::take(flipped, Vector6::Zero(), bench.random));
     EXPECT_EQ(track.status, Status::acquiring);
-    hints += track.hint == Hint::image_looks_mirrored ? 1 : 0;
+    diagnostics += track.diagnostic == Diagnostic::image_looks_mirrored ? 1 : 0;
   }
-  EXPECT_GE(hints, 1);
+  EXPECT_GE(diagnostics, 1);
 }
 
 TEST(Tracker, UnmirroredImageIsRecognised) {
@@ -244,12 +247,12 @@ TEST(Tracker, UnmirroredImageIsRecognised) {
   scene.mirrored = true;
   Bench bench(scene, roof_target());
   scene.mirrored = false;
-  int hints = 0;
+  int diagnostics = 0;
   for (int i = 0; i < 8; ++i) {
-    hints += bench.show(render::take(scene, Vector6::Zero(), bench.random)).hint ==
-             Hint::image_looks_unmirrored;
+    diagnostics += bench.show(render::take(scene, Vector6::Zero(), bench.random)).diagnostic ==
+                   Diagnostic::image_looks_unmirrored;
   }
-  EXPECT_GE(hints, 1);
+  EXPECT_GE(diagnostics, 1);
 }
 
 /// Covers the rows from `top` to `bottom` with one grey.

@@ -6,34 +6,34 @@
 #include <filesystem>
 
 #include "host/motion/control_socket.h"
-#include "host/web/bridge/desk_link.h"
+#include "host/web/bridge/control_link.h"
 
 namespace tagwrench {
 namespace {
 
-TEST(DeskLinks, GetOneAnswerAWishInOrder) {
+TEST(ControlLinks, GetOneAnswerARequestInOrder) {
   const std::string path =
       (std::filesystem::temp_directory_path() / ("desk-" + std::to_string(::getpid()))).string();
   boost::asio::io_context context;
-  DeskLink link(context, path);
-  std::vector<DeskAnswer> answers;
-  const auto take = [&](DeskAnswer answer) { answers.push_back(std::move(answer)); };
+  ControlLink link(context, path);
+  std::vector<ControlAnswer> answers;
+  const auto take = [&](ControlAnswer answer) { answers.push_back(std::move(answer)); };
   link.ask("zero", take);
   context.run();
   ASSERT_EQ(answers.size(), 1U);
   EXPECT_FALSE(answers[0].ok);
   EXPECT_NE(answers[0].text.find("does not run"), std::string::npos);
 
-  ControlSocket desk(path);
+  ControlSocket profiles(path);
   link.ask("next", take);
   link.ask("show cad", take);
   context.restart();
   while (answers.size() < 3) {
     context.poll();
     context.restart();
-    const ControlWish wish = desk.next();
-    if (wish.kind == ControlWish::Kind::next_profile) desk.answer("ok: game\n");
-    if (wish.kind == ControlWish::Kind::show) desk.answer("error: no profile 'cad'\n");
+    const ControlRequest request = profiles.next();
+    if (request.kind == ControlRequest::Kind::next_profile) profiles.answer("ok: game\n");
+    if (request.kind == ControlRequest::Kind::show) profiles.answer("error: no profile 'cad'\n");
   }
   EXPECT_TRUE(answers[1].ok);
   EXPECT_EQ(answers[1].text, "game");
@@ -41,12 +41,12 @@ TEST(DeskLinks, GetOneAnswerAWishInOrder) {
   EXPECT_EQ(answers[2].text, "no profile 'cad'");
 }
 
-TEST(DeskLinks, ThatAreGoneAnswerNobody) {
+TEST(ControlLinks, ThatAreGoneAnswerNobody) {
   boost::asio::io_context context;
   bool answered = false;
   {
-    DeskLink link(context, "/nonexistent/desk");
-    link.ask("zero", [&](const DeskAnswer&) { answered = true; });
+    ControlLink link(context, "/nonexistent/desk");
+    link.ask("zero", [&](const ControlAnswer&) { answered = true; });
   }
   context.run();
   EXPECT_FALSE(answered);

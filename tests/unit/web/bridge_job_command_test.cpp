@@ -1,4 +1,4 @@
-// From a page's wish to a command line: names from lists, numbers in their range, never a path.
+// From a page's request to a command line: names from lists, numbers in their range, never a path.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -22,7 +22,7 @@ JobPlace bench_place() {
 std::string refusal_of(const std::string& verb, const json& options, const JobPlace& place) {
   try {
     job_command(verb, options, place);
-  } catch (const WishRefused& e) {
+  } catch (const RequestRefused& e) {
     return e.what();
   }
   return {};

@@ -24,7 +24,7 @@ TEST(JobReports, KeepTheLastLinesByTheirKind) {
   EXPECT_EQ(job["progress"], 0.25);
   EXPECT_EQ(job["keys"].size(), 3U);
   for (int i = 0; i < 300; ++i) report.said("tagwrench: more");
-  EXPECT_EQ(report.to_json()["lines"].size(), JobReport::kMostLines);
+  EXPECT_EQ(report.to_json()["lines"].size(), JobReport::kMaxLines);
 }
 
 TEST(JobReports, TakeNoHarmFromDamagedEvents) {

@@ -44,9 +44,9 @@ TEST_F(BridgeFolder, ANewRecordingReplacesNothing) {
   const fs::path file = recordings.new_file("push");
   EXPECT_EQ(file, folder_ / "deep/er/push.twr");
   std::ofstream(file) << "12345";
-  EXPECT_THROW(recordings.new_file("push"), WishRefused);
-  EXPECT_THROW(recordings.new_file("push.twr"), WishRefused);
-  EXPECT_THROW(recordings.new_file("../push"), WishRefused);
+  EXPECT_THROW(recordings.new_file("push"), RequestRefused);
+  EXPECT_THROW(recordings.new_file("push.twr"), RequestRefused);
+  EXPECT_THROW(recordings.new_file("../push"), RequestRefused);
   fs::create_symlink("/etc/passwd", folder_ / "deep/er/linked.twr");
   const nlohmann::json list = recordings.list();
   ASSERT_EQ(list.size(), 1U) << list;
@@ -56,7 +56,7 @@ TEST_F(BridgeFolder, ANewRecordingReplacesNothing) {
 
 TEST_F(BridgeFolder, TheLongestNameIsListedToo) {
   const RecordingFolder recordings(folder_);
-  const std::string longest(RecordingFolder::kLongestName, 'a');
+  const std::string longest(RecordingFolder::kMaxName, 'a');
   std::ofstream(recordings.new_file(longest)) << "1";
   std::ofstream(folder_ / (longest + "a.twr")) << "of somebody else";
   const nlohmann::json list = recordings.list();
@@ -80,7 +80,7 @@ TEST_F(BridgeFolder, ReadersOfOurDevicesAreFoundByTheirOpenFiles) {
   open("12", "other", "/dev/hidraw4");
   open("13", "game", "/dev/input/event7");
   open("14", "typing", "/dev/input/event8");
-  open("15", "tw-guardian", "/dev/hidraw3");
+  open("15", "tw-watchdog", "/dev/hidraw3");
   open(std::to_string(::getpid()).c_str(), "us", "/dev/hidraw3");
   const std::vector<DeviceReader> expected = {{"game", "evdev"}, {"spacenavd", "hidraw"}};
   EXPECT_EQ(device_readers("tagwrench-left", kernel), expected);

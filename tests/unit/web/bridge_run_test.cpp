@@ -37,11 +37,11 @@ class BridgePage {
     socket_.handshake(host, "/ws");
   }
 
-  void send(const json& wish) { socket_.write(boost::asio::buffer(wish.dump())); }
+  void send(const json& request) { socket_.write(boost::asio::buffer(request.dump())); }
   /// The answer.
-  json ask(json wish) {
-    wish["id"] = ++id_;
-    send(wish);
+  json ask(json request) {
+    request["id"] = ++id_;
+    send(request);
     while (true) {
       const json message = next();
       if (message["type"] == "answer" && message["id"] == id_) return message;
@@ -159,16 +159,16 @@ TEST_F(BridgeRuns, AJobIsDoneAllTheSameWhenTheRunThatItWaitedForFails) {
 
 /// Whoever it was cannot keep it, nor end it.
 TEST_F(BridgeRuns, ATrialOfAPageThatIsGoneByThenIsTakenBack) {
-  facts_.desk = true;
-  ControlSocket desk(control_path(facts_.name));
-  using Kind = ControlWish::Kind;
-  const auto next = [&desk] {  // that is no mere look at what there is
+  facts_.profiles = true;
+  ControlSocket profiles(control_path(facts_.name));
+  using Kind = ControlRequest::Kind;
+  const auto next = [&profiles] {  // that is no mere look at what there is
     while (true) {
-      pollfd wish{desk.fd(), POLLIN, 0};
-      ::poll(&wish, 1, -1);
-      const Kind kind = desk.next().kind;
+      pollfd request{profiles.fd(), POLLIN, 0};
+      ::poll(&request, 1, -1);
+      const Kind kind = profiles.next().kind;
       if (kind != Kind::none && kind != Kind::status && kind != Kind::show) return kind;
-      desk.answer("error: not now\n");
+      profiles.answer("error: not now\n");
     }
   };
   const auto run = begin();
@@ -178,7 +178,7 @@ TEST_F(BridgeRuns, ATrialOfAPageThatIsGoneByThenIsTakenBack) {
   EXPECT_EQ(next(), Kind::attempt);
   goes.leave();
   stays.ask({{"ask", "recordings"}});
-  desk.answer("ok: on trial\n");
+  profiles.answer("ok: on trial\n");
   EXPECT_EQ(next(), Kind::revert);
 }
 

@@ -29,7 +29,7 @@
 #include "host/sensor/zero_options.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
-#include "host/tracker/hint_text.h"
+#include "host/tracker/diagnostic_text.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
 #include "tests/support/semi_real.h"
@@ -56,7 +56,7 @@ json as_json(const Sample& sample, const Track& track, const Vector6& truth, dou
           {"w_sigma", numbers(sample.wrench_sigma)},
           {"zero", numbers(sample.zero)},
           {"tags_held", track.tags_held},
-          {"hint", hint_text(track.hint, track.details)},
+          {"hint", diagnostic_text(track.diagnostic, track.details)},
           {"truth", numbers(truth)},
           {"track_us", track_us}};
 }

@@ -34,7 +34,7 @@ inline Sample numbered_sample(std::uint64_t number) {
   sample.sequence = number;
   sample.status = Status::ok;
   sample.wrench.setConstant(static_cast<double>(number));
-  sample.motion.setConstant(static_cast<double>(number));
+  sample.deflection.setConstant(static_cast<double>(number));
   sample.latency_origin = TimePoint(std::chrono::milliseconds(10) * number);
   sample.output_time = sample.latency_origin + std::chrono::microseconds(700);
   return sample;

@@ -1,5 +1,5 @@
-// `tagwrench bandwidth --screen web` with a camera that others hold: its pictures at 50 Hz are as
-// bright as the last line of standard input says (0 to 255). Prints the page's address, then the
+// `tagwrench camera-timing --screen web` with a camera that others hold: its pictures at 50 Hz are
+// as bright as the last line of standard input says (0 to 255). Prints the page's address, then the
 // report.
 #include <poll.h>
 #include <sys/timerfd.h>

@@ -65,7 +65,7 @@ TEST(WebFeed, AReaderNeverSeesHalfASample) {
     if (!live) continue;
     const auto value = static_cast<double>(position);
     const bool whole = (live->sample.wrench.array() == value).all() &&
-                       (live->sample.motion.array() == value).all() &&
+                       (live->sample.deflection.array() == value).all() &&
                        live->sample.sequence == position;
     if (!whole) ++torn;
   }
@@ -132,7 +132,7 @@ TEST(WebFeed, ARawPictureIsTakenAsItIsUnlessItIsTooLarge) {
   EXPECT_EQ(taken->size, 96U);
   EXPECT_TRUE(taken->part.empty());
   feed.release(taken);
-  const std::vector<std::uint8_t> giant(LivePicture::kMostBytes + 1);
+  const std::vector<std::uint8_t> giant(LivePicture::kMaxBytes + 1);
   feed.picture(picture.logged({fourcc("YUYV"), giant, 16}));
   taken = feed.take_picture();
   ASSERT_NE(taken, nullptr);

@@ -41,7 +41,7 @@ TEST(WebOutbox, WhatIsKeptGoesFirstAndInOrder) {
 
 TEST(WebOutbox, NoMoreThan64AreKept) {
   Outbox box;
-  for (std::size_t i = 0; i < Outbox::kMostKept; ++i) EXPECT_TRUE(box.keep(shared("x")));
+  for (std::size_t i = 0; i < Outbox::kMaxKept; ++i) EXPECT_TRUE(box.keep(shared("x")));
   EXPECT_FALSE(box.keep(shared("x")));
   taken(box);
   EXPECT_TRUE(box.keep(shared("x")));
@@ -52,7 +52,7 @@ TEST(WebOutbox, TypesAreBoundedToo) {
   for (int i = 0; i < 1000; ++i) box.replace("type " + std::to_string(i), shared("x"));
   std::size_t count = 0;
   while (box.next_text()) ++count;
-  EXPECT_EQ(count, Outbox::kMostTypes);
+  EXPECT_EQ(count, Outbox::kMaxTypes);
 }
 
 TEST(WebOutbox, OnlyTheNewestPictureWaits) {

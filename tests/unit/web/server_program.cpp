@@ -10,8 +10,8 @@
 #include <thread>
 #include <vector>
 
-#include "host/web/server/ask.h"
 #include "host/web/server/live_feed.h"
+#include "host/web/server/page_request.h"
 #include "host/web/server/web_server.h"
 
 namespace {
@@ -20,24 +20,24 @@ using namespace tagwrench;
 using nlohmann::json;
 
 /// Answers what tests ask: echo, say, quiet (never answers), fail (throws).
-class EchoHandler final : public AskHandler {
+class EchoHandler final : public PageRequestHandler {
  public:
   explicit EchoHandler(WebServer& server) : server_(server) {}
 
-  void ask(Ask ask) override {
-    if (ask.what == "fail") throw std::runtime_error("it fails");
-    if (ask.what == "say") {
-      const int lines = ask.arguments.value("lines", 1);
+  void handle(PageRequest request) override {
+    if (request.what == "fail") throw std::runtime_error("it fails");
+    if (request.what == "say") {
+      const int lines = request.arguments.value("lines", 1);
       for (int i = 0; i < lines; ++i)
         server_.send_all({{"type", "say"}, {"line", std::string(1000, 'x')}});
     }
-    if (ask.what == "memory") ask.arguments["resident_kb"] = resident_kb();
-    if (ask.what == "quiet") return;
-    ask.arguments["pages"] = server_.pages();
+    if (request.what == "memory") request.arguments["resident_kb"] = resident_kb();
+    if (request.what == "quiet") return;
+    request.arguments["pages"] = server_.pages();
     const LiveFigures figures = server_.figures();
-    ask.arguments["rate_hz"] = figures.rate_hz;
-    ask.arguments["latency_p99_us"] = figures.latency_p99_us;
-    server_.answer(ask.page, ask.id, true, ask.what, std::move(ask.arguments));
+    request.arguments["rate_hz"] = figures.rate_hz;
+    request.arguments["latency_p99_us"] = figures.latency_p99_us;
+    server_.answer(request.page, request.id, true, request.what, std::move(request.arguments));
   }
 
   void page_came(std::uint64_t page) override {

@@ -73,7 +73,7 @@ TEST(WebStream, ASlowPageLosesTheOldestAndIsTold) {
   for (std::uint64_t i = 0; i < 100; ++i) feed.sample(numbered_sample(i), nullptr);
   stream.pull();
   const json message = message_of(stream, 0);
-  EXPECT_EQ(message["samples"].size(), SampleStream::kMost);
+  EXPECT_EQ(message["samples"].size(), SampleStream::kMax);
   EXPECT_EQ(message["lost"], 36);
   EXPECT_EQ(message["samples"].back()["seq"], 99);
 }
@@ -83,7 +83,7 @@ TEST(WebStream, WhatTheReaderMissedCountsAsLostToo) {
   SampleStream stream(feed);
   for (std::uint64_t i = 0; i < 3 * LiveFeed::kKept; ++i) feed.sample(numbered_sample(i), nullptr);
   stream.pull();
-  EXPECT_EQ(message_of(stream, 0)["lost"], 3 * LiveFeed::kKept - SampleStream::kMost);
+  EXPECT_EQ(message_of(stream, 0)["lost"], 3 * LiveFeed::kKept - SampleStream::kMax);
 }
 
 TEST(WebStream, PagesAtTheSamePlaceShareAMessage) {

@@ -215,7 +215,7 @@ TEST(WrenchFit, TheErrorOfOneMassDoesNotAverageAway) {
   EXPECT_NEAR(found.axis[0].gain_sigma, 0.01, 0.001);
   EXPECT_NEAR(found.axis[2].gain_sigma, 0.01, 0.001);
   bool named = false;
-  for (const CommonEstimate& common : found.common) {
+  for (const CorrelatedEstimate& common : found.common) {
     if (common.name != "mass 0") continue;
     named = true;
     EXPECT_GT(common.sigma, 0.95) << "forty hangs say nothing about the mass itself";
@@ -231,7 +231,7 @@ TEST(WrenchFit, AMassThatIsNotWhatItSaysIsNamed) {
   for (Observation& o : seen) {
     if (o.common.empty() || o.common[0].name != "mass 2") continue;
     o.wrench *= 1.008;  // eight times what is stated
-    for (CommonError& error : o.common) error.effect *= 1.008;
+    for (CorrelatedError& error : o.common) error.effect *= 1.008;
   }
   const WrenchFit found = fit(seen);
   bool named = false;

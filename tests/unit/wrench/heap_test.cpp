@@ -56,12 +56,12 @@ TEST(WrenchHeap, ShapingDoesWithoutItAlsoWhenItIsChanged) {
     sample.wrench.setConstant(1e-3 * (i % 700));
     sample.capture_time += std::chrono::milliseconds(10);
     shaping.shape(sample);
-    sample.motion = shaping.motion_at(sample.capture_time + std::chrono::milliseconds(5));
+    sample.deflection = shaping.motion_at(sample.capture_time + std::chrono::milliseconds(5));
     if (i % 100 == 0) shaping.change(options);
   }
   const Duration spent = std::chrono::steady_clock::now() - before;
   EXPECT_EQ(test::stop_counting_allocations(), 0);
-  EXPECT_TRUE(sample.motion.allFinite());
+  EXPECT_TRUE(sample.deflection.allFinite());
   std::printf("shaping: %.2f us a sample\n", static_cast<double>(spent.count()) / 1e3 / kSamples);
 }
 

@@ -72,7 +72,7 @@ class Log:
             self.last = None  # a bridge that starts again counts from zero
 
     def sample(self, sample, now):
-        of_a_frame = sample.capture_time_ns != 0  # the bridge's guardian sends neutral ones that are not
+        of_a_frame = sample.capture_time_ns != 0  # the bridge's watchdog sends neutral ones that are not
         step = (sample.sequence - self.last) % TURN if self.last is not None and of_a_frame else 1
         missing = step - 1 if 0 < step < TURN // 2 else 0
         self.last = sample.sequence if of_a_frame else self.last

@@ -31,17 +31,17 @@ export class CameraPicture {
       make('div', { class: 'picture-frame' }, this.canvas, this.words),
       choice,
     );
-    this.toggle.addEventListener('change', () => this.wish());
+    this.toggle.addEventListener('change', () => this.request());
     link.on('picture', (picture) => this.show(picture));
     link.on('hello', (hello) => this.shape(hello.camera.width, hello.camera.height));
   }
 
   shown(on: boolean): void {
     this.visible = on;
-    this.wish();
+    this.request();
   }
 
-  private wish(): void {
+  private request(): void {
     const on = this.visible && this.toggle.checked;
     this.link.wantPictures(this, on);
     if (on) return;

@@ -119,7 +119,7 @@ export class JobPanel {
     if (this.keys.dataset.keys === wanted.join()) return;
     this.keys.dataset.keys = wanted.join();
     const press = (key: string): HTMLButtonElement =>
-      button(KEY_WORDS[key] ?? key, () => void this.app.wish('job_key', { key }));
+      button(KEY_WORDS[key] ?? key, () => void this.app.request('job_key', { key }));
     this.keys.replaceChildren(...wanted.map((key) => (key === 'close' ? this.close : press(key))));
   }
 }

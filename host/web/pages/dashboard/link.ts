@@ -110,7 +110,7 @@ export class Link {
     const text = JSON.stringify({ id, ask: what, ...extra });
     if (new TextEncoder().encode(text).length > LONGEST_ASK)
       return refuse('that is too long for the bridge (20,000 bytes)');
-    if (!this.mayAsk()) return refuse('too many wishes at once; wait a second');
+    if (!this.mayAsk()) return refuse('too many requests at once; wait a second');
     this.socket.send(text);
     return new Promise((resolve) => {
       const timer = setTimeout(

@@ -96,7 +96,7 @@ export class Shell implements App {
     while (this.lines.childElementCount > MOST_LINES) this.lines.lastElementChild?.remove();
   }
 
-  async wish(what: string, extra: Readonly<Record<string, unknown>> = {}): Promise<Answer> {
+  async request(what: string, extra: Readonly<Record<string, unknown>> = {}): Promise<Answer> {
     return this.wishSaying((text) => text, what, extra);
   }
 
@@ -157,7 +157,7 @@ export class Shell implements App {
   private key(event: KeyboardEvent): void {
     const typing = event.target instanceof HTMLElement && event.target.matches('input, select, textarea');
     if (typing || event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
-    if (event.key === '0') void this.wish('zero');
+    if (event.key === '0') void this.request('zero');
   }
 
   private showLink(state: LinkState): void {
@@ -189,7 +189,7 @@ export class Shell implements App {
     if (stopped)
       this.warn(
         `The sensor does not run: ${why} `,
-        button('Try again', () => void this.wish('retry')),
+        button('Try again', () => void this.request('retry')),
       );
     else present(this.banner, false);
   }

@@ -17,8 +17,8 @@ export interface App {
   /** A line for people, at the bottom of the page and for screen readers. */
   tell(text: string, kind?: 'news' | 'good' | 'error'): void;
   /** Asks, and tells what came of it. */
-  wish(what: string, extra?: Readonly<Record<string, unknown>>): Promise<Answer>;
-  /** As wish(); `words` are made of what the bridge answers when it did it, empty: nothing is told then. */
+  request(what: string, extra?: Readonly<Record<string, unknown>>): Promise<Answer>;
+  /** As request(); `words` are made of what the bridge answers when it did it, empty: nothing is told then. */
   wishSaying(
     words: (text: string) => string,
     what: string,

@@ -1,4 +1,4 @@
-// A screen that flips between black and white: for `tagwrench bandwidth` (opened with #screen, from its own address), for this browser's
+// A screen that flips between black and white: for `tagwrench camera-timing` (opened with #screen, from its own address), for this browser's
 // camera, which measures how late it sees it, or for any other.
 import '../common/theme.css';
 import './flip.css';

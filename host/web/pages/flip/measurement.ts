@@ -1,4 +1,4 @@
-// The published measurement: the screen flips, and as soon as the camera sees it, it flips back. As `tagwrench bandwidth --screen`
+// The published measurement: the screen flips, and as soon as the camera sees it, it flips back. As `tagwrench camera-timing --screen`
 // has it, with the browser's way of a picture in place of the kernel's.
 import type { Brightness } from './brightness';
 
@@ -162,7 +162,7 @@ export function reportText({ frame_rate_hz, round_trip_s, latency_s, seen, misse
   ];
 }
 
-/** The format of `tagwrench bandwidth --screen --json`. */
+/** The format of `tagwrench camera-timing --screen --json`. */
 export function reportJson(result: Result, camera: string): string {
   const { frame_rate_hz, round_trip_s, latency_s, seen, missed, contrast_counts } = result;
   return JSON.stringify({

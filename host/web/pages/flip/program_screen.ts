@@ -1,4 +1,4 @@
-// This screen for `tagwrench bandwidth`: it says when to flip, and hears when that was, by this page's clock.
+// This screen for `tagwrench camera-timing`: it says when to flip, and hears when that was, by this page's clock.
 import type { Patch } from './patch';
 import { subprotocols } from '../common/token';
 
@@ -49,8 +49,8 @@ export class ProgramScreen {
       socket.addEventListener('message', ({ data }) => this.take(data));
       socket.addEventListener('close', () => {
         const end = open
-          ? 'tagwrench bandwidth has ended; its terminal says what it measured'
-          : 'tagwrench bandwidth does not answer: does it still wait for a screen? Open the address that it printed';
+          ? 'tagwrench camera-timing has ended; its terminal says what it measured'
+          : 'tagwrench camera-timing does not answer: does it still wait for a screen? Open the address that it printed';
         done(this.why || end);
       });
     });

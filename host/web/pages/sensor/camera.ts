@@ -1,7 +1,7 @@
 // The camera: choice, mode, opening, and coming back after it was unplugged.
 import { type Trouble, cameraTrouble } from './checks';
 
-export interface CameraWish {
+export interface CameraRequest {
   /** Empty: the rear camera of a phone, else the browser's first. */
   deviceId: string;
   width: number;
@@ -29,7 +29,7 @@ const RATES: readonly number[] = [15, 25, 30, 50, 60, 90, 120];
 
 export class Camera {
   state: CameraState = { name: 'closed' };
-  private wish: CameraWish | null = null;
+  private request: CameraRequest | null = null;
   private turn = 0;
 
   constructor(private readonly onState: (state: CameraState) => void) {
@@ -42,14 +42,14 @@ export class Camera {
     return all.filter((device) => device.kind === 'videoinput');
   }
 
-  async open(wish: CameraWish): Promise<void> {
+  async open(request: CameraRequest): Promise<void> {
     this.close();
-    this.wish = wish;
+    this.request = request;
     const turn = this.turn;
     this.become({ name: 'opening' });
     let stream: MediaStream;
     try {
-      stream = await navigator.mediaDevices.getUserMedia({ audio: false, video: Camera.constraints(wish) });
+      stream = await navigator.mediaDevices.getUserMedia({ audio: false, video: Camera.constraints(request) });
     } catch (error) {
       if (turn !== this.turn) return;
       const missing = error instanceof Error && error.name === 'NotFoundError';
@@ -62,8 +62,8 @@ export class Camera {
       return;
     }
     track.addEventListener('ended', () => this.ended(turn, track.label));
-    const { width = 0, height = 0, frameRate = 0, deviceId = wish.deviceId } = track.getSettings();
-    this.wish = { ...wish, deviceId }; // after it was unplugged, this one is waited for and no other
+    const { width = 0, height = 0, frameRate = 0, deviceId = request.deviceId } = track.getSettings();
+    this.request = { ...request, deviceId }; // after it was unplugged, this one is waited for and no other
     this.become({ name: 'open', track, mode: { width, height, rate_hz: frameRate } });
   }
 
@@ -87,14 +87,14 @@ export class Camera {
     return RATES.filter((rate) => rate <= most + 0.5);
   }
 
-  private static constraints(wish: CameraWish): MediaTrackConstraints {
+  private static constraints(request: CameraRequest): MediaTrackConstraints {
     // Scaled pictures have another focal length than sensor.yaml says, and softer edges.
     const unscaled = { resizeMode: { ideal: 'none' } };
     return {
-      ...(wish.deviceId ? { deviceId: { exact: wish.deviceId } } : { facingMode: { ideal: 'environment' } }),
-      width: { ideal: wish.width },
-      height: { ideal: wish.height },
-      frameRate: { ideal: wish.rate_hz },
+      ...(request.deviceId ? { deviceId: { exact: request.deviceId } } : { facingMode: { ideal: 'environment' } }),
+      width: { ideal: request.width },
+      height: { ideal: request.height },
+      frameRate: { ideal: request.rate_hz },
       ...unscaled,
     };
   }
@@ -106,10 +106,10 @@ export class Camera {
 
   private async devicesChanged(): Promise<void> {
     const waiting = this.state.name === 'gone' || (this.state.name === 'failed' && this.state.waiting);
-    if (!waiting || !this.wish) return;
-    const { wish } = this;
+    if (!waiting || !this.request) return;
+    const { request } = this;
     const there = await this.list();
-    if (there.some((device) => !wish.deviceId || device.deviceId === wish.deviceId)) await this.open(wish);
+    if (there.some((device) => !request.deviceId || device.deviceId === request.deviceId)) await this.open(request);
   }
 
   private become(state: CameraState): void {

@@ -74,21 +74,21 @@ export class CameraControls {
 
   private async toggle(): Promise<void> {
     const held = this.held;
-    const wish: Record<string, unknown> = {};
+    const request: Record<string, unknown> = {};
     for (const [mode] of this.holdable) {
       const automatic = (this.capabilities[mode] as string[]).find((choice) => choice !== 'manual' && choice !== 'none');
-      wish[mode] = held ? (automatic ?? 'manual') : 'manual';
+      request[mode] = held ? (automatic ?? 'manual') : 'manual';
     }
     if (!held) {
       // What the automatics have found is what is held.
-      for (const { key, mode } of SETTINGS) if (mode && mode in wish && key in this.settings) wish[key] = this.settings[key];
+      for (const { key, mode } of SETTINGS) if (mode && mode in request && key in this.settings) request[key] = this.settings[key];
     }
-    await this.apply(wish);
+    await this.apply(request);
   }
 
-  private async apply(wish: Record<string, unknown>): Promise<void> {
+  private async apply(request: Record<string, unknown>): Promise<void> {
     try {
-      await this.track?.applyConstraints({ advanced: [wish as MediaTrackConstraintSet] });
+      await this.track?.applyConstraints({ advanced: [request as MediaTrackConstraintSet] });
       this.show();
     } catch (error) {
       this.show();
@@ -127,9 +127,9 @@ export class CameraControls {
     const automatic = mode !== undefined && this.settings[mode] !== 'manual';
     input.addEventListener('input', () => say(shown, `${input.value} ${unit}`));
     input.addEventListener('change', () => {
-      const wish: Record<string, unknown> = { [key]: Number(input.value) };
-      if (mode && Array.isArray(this.capabilities[mode])) wish[mode] = 'manual';
-      void this.apply(wish);
+      const request: Record<string, unknown> = { [key]: Number(input.value) };
+      if (mode && Array.isArray(this.capabilities[mode])) request[mode] = 'manual';
+      void this.apply(request);
     });
     const row = field(automatic ? `${label} (automatic)` : label, input);
     row.append(shown);

@@ -1,11 +1,11 @@
 // Choice of camera and mode, start and stop, and what the camera lets a page set.
 import { button, field, make, panel, say } from '../common/elements';
-import { Camera, type CameraState, type CameraWish } from './camera';
+import { Camera, type CameraState, type CameraRequest } from './camera';
 import { CameraControls } from './camera_controls';
-import { storeWish } from './storage';
+import { storeRequest } from './storage';
 
 export interface CameraPanelOptions {
-  onStart: (wish: CameraWish) => void;
+  onStart: (request: CameraRequest) => void;
   onStop: () => void;
 }
 
@@ -25,10 +25,10 @@ export class CameraPanel {
 
   constructor(
     parent: HTMLElement,
-    private wish: CameraWish,
+    private request: CameraRequest,
     private readonly options: CameraPanelOptions,
   ) {
-    this.startButton = button('Start', () => (this.open ? options.onStop() : options.onStart(this.wish)), { class: 'main' });
+    this.startButton = button('Start', () => (this.open ? options.onStop() : options.onStart(this.request)), { class: 'main' });
     const settings = make('div');
     this.controls = new CameraControls(settings);
     parent.append(panel(
@@ -48,14 +48,14 @@ export class CameraPanel {
   /** The pictures that the sensor is described for; chosen if others were. */
   setSensorSize(width: number, height: number): void {
     this.own = [width, height];
-    if (this.wish.width !== width || this.wish.height !== height) this.choose({ width, height });
+    if (this.request.width !== width || this.request.height !== height) this.choose({ width, height });
     this.offerModes();
   }
 
   offerCameras(devices: readonly MediaDeviceInfo[]): void {
     const named = devices.filter((device) => device.deviceId !== '');
     const options = named.map((device, i) => option(device.deviceId, device.label || `camera ${i + 1}`));
-    const present = this.track?.getSettings().deviceId ?? this.wish.deviceId;
+    const present = this.track?.getSettings().deviceId ?? this.request.deviceId;
     if (!this.track || options.length === 0) options.unshift(option('', 'the rear or the first one'));
     this.cameras.replaceChildren(...options);
     this.cameras.value = named.some((device) => device.deviceId === present) ? present : (options[0]?.value ?? '');
@@ -85,17 +85,17 @@ export class CameraPanel {
       const own = width === this.own[0] && height === this.own[1];
       return option(size(width, height), `${width}×${height}${own ? ' (sensor)' : ''}`);
     }));
-    this.sizes.value = size(this.wish.width, this.wish.height);
+    this.sizes.value = size(this.request.width, this.request.height);
     const rates = Camera.rates(this.track);
-    if (!rates.includes(this.wish.rate_hz)) rates.push(this.wish.rate_hz);
+    if (!rates.includes(this.request.rate_hz)) rates.push(this.request.rate_hz);
     rates.sort((a, b) => a - b);
     this.rates.replaceChildren(...rates.map((rate) => option(String(rate), `${rate}`)));
-    this.rates.value = String(this.wish.rate_hz);
+    this.rates.value = String(this.request.rate_hz);
   }
 
-  private choose(part: Partial<CameraWish>): void {
-    this.wish = { ...this.wish, ...part };
-    storeWish(this.wish);
-    if (this.open) this.options.onStart(this.wish);
+  private choose(part: Partial<CameraRequest>): void {
+    this.request = { ...this.request, ...part };
+    storeRequest(this.request);
+    if (this.open) this.options.onStart(this.request);
   }
 }

@@ -3,7 +3,7 @@ import { button, make, panel } from '../common/elements';
 import type { PlatformView } from '../common/platform_view';
 import { Readings } from '../common/readings';
 import { Traces } from '../common/traces';
-import { Camera, type CameraState, type CameraWish } from './camera';
+import { Camera, type CameraState, type CameraRequest } from './camera';
 import { CameraPanel } from './camera_panel';
 import exampleYaml from './example.yaml?raw';
 import { ExtrasPanel } from './extras/extras_panel';
@@ -13,12 +13,12 @@ import { PictureView } from './picture_view';
 import { RecordPanel } from './record_panel';
 import { SensorPanel } from './sensor_panel';
 import { StatusPanel } from './status_panel';
-import { storeFiles, storeWish, storedFiles, storedWish } from './storage';
+import { storeFiles, storeRequest, storedFiles, storedRequest } from './storage';
 import { TabLock } from './tab_lock';
 import { type News, TrackerClient } from './tracker_client';
 
 const EXAMPLE: SensorFiles = { name: 'published sensor', yaml: exampleYaml };
-const USUAL: CameraWish = { deviceId: '', width: 640, height: 480, rate_hz: 60 };
+const USUAL: CameraRequest = { deviceId: '', width: 640, height: 480, rate_hz: 60 };
 /** Before anything was measured. */
 const WELCOME =
   'The camera looks at the tags under the platform. Start, allow the camera, then hands off for a second. ' +
@@ -53,7 +53,7 @@ export class Instrument {
     const view = panel('Picture', 'picture-panel');
     this.picture = new PictureView(view);
     const side = make('div', { class: 'side' }, view);
-    this.cameraPanel = new CameraPanel(side, storedWish(USUAL), { onStart: (wish) => void this.start(wish), onStop: () => this.stop() });
+    this.cameraPanel = new CameraPanel(side, storedRequest(USUAL), { onStart: (request) => void this.start(request), onStop: () => this.stop() });
     const status = panel('State', 'state-panel');
     const actions = [this.cameraPanel.startButton, this.takeOver];
     this.status = new StatusPanel(status, () => void this.sensor.setMirrored(this.mirrored), actions);
@@ -141,17 +141,17 @@ export class Instrument {
     this.cameraPanel.setSensorSize(info.width, info.height);
   }
 
-  private async start(wish: CameraWish = storedWish(USUAL)): Promise<void> {
+  private async start(request: CameraRequest = storedRequest(USUAL)): Promise<void> {
     if (!(await this.lock.take())) {
       this.status.say('another tab of this browser measures already');
       this.takeOver.hidden = false;
       return;
     }
     this.takeOver.hidden = true;
-    storeWish(wish);
+    storeRequest(request);
     if (this.welcoming) this.status.setHint('', false);
     this.welcoming = false;
-    await this.camera.open(wish);
+    await this.camera.open(request);
   }
 
   private stop(): void {

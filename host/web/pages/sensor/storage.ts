@@ -1,6 +1,6 @@
 // What is remembered between visits: the sensor's files and the choice of camera. Storage may be forbidden or full; then things
 // last as long as the page.
-import type { CameraWish } from './camera';
+import type { CameraRequest } from './camera';
 import type { SensorFiles } from './messages';
 
 const DATABASE = 'tagwrench';
@@ -56,9 +56,9 @@ export async function storeFiles(files: SensorFiles | null): Promise<boolean> {
   }
 }
 
-export function storedWish(otherwise: CameraWish): CameraWish {
+export function storedRequest(otherwise: CameraRequest): CameraRequest {
   try {
-    const said = JSON.parse(localStorage.getItem(CAMERA) ?? '{}') as Partial<CameraWish>;
+    const said = JSON.parse(localStorage.getItem(CAMERA) ?? '{}') as Partial<CameraRequest>;
     const number = (value: unknown, usual: number): number =>
       typeof value === 'number' && value > 0 && value < 1e4 ? value : usual;
     return {
@@ -72,9 +72,9 @@ export function storedWish(otherwise: CameraWish): CameraWish {
   }
 }
 
-export function storeWish(wish: CameraWish): void {
+export function storeRequest(request: CameraRequest): void {
   try {
-    localStorage.setItem(CAMERA, JSON.stringify(wish));
+    localStorage.setItem(CAMERA, JSON.stringify(request));
   } catch {
     // Not remembered, which is all.
   }

@@ -14,15 +14,15 @@ namespace {
 
 using study::estimate_lag;
 using study::Lag;
-using study::Stretch;
+using study::Segment;
 
-Stretch stretch_of(const study::Trial& trial) {
+Segment segment_of(const study::Trial& trial) {
   return {trial.time, trial.features, trial.reference_time, trial.reference};
 }
 
 Lag lag_of(const LoadedPlatform& platform) {
-  const Stretch stretch = stretch_of(platform.trial());
-  return estimate_lag({&stretch, 1});
+  const Segment segment = segment_of(platform.trial());
+  return estimate_lag({&segment, 1});
 }
 
 TEST(Lag, OfEitherSignIsFoundToAFractionOfAMillisecond) {
@@ -78,14 +78,14 @@ TEST(Lag, AxesThatNeverChangeDoNotCount) {
   study::Trial trial = platform.trial();
   trial.reference.rightCols(4).setConstant(0.25);
   trial.features.col(5).setConstant(1e-3);
-  const Stretch stretch = stretch_of(trial);
-  const Lag found = estimate_lag({&stretch, 1});
+  const Segment segment = segment_of(trial);
+  const Lag found = estimate_lag({&segment, 1});
   EXPECT_TRUE(found.known);
   EXPECT_NEAR(found.value, platform.lag, 1e-3) << "s";
 }
 
 TEST(Lag, PushesInSeveralDirectionsShareIt) {
-  std::array<Stretch, 3> pushes;
+  std::array<Segment, 3> pushes;
   for (int i = 0; i < 3; ++i) {
     LoadedPlatform platform;
     platform.seconds = 5;
@@ -95,7 +95,7 @@ TEST(Lag, PushesInSeveralDirectionsShareIt) {
     platform.bias[i] = 1.6;
     const study::Trial trial = platform.trial();
     auto& push = pushes[static_cast<std::size_t>(i)];
-    push = stretch_of(trial);
+    push = segment_of(trial);
     push.reference = trial.reference.col(i);
     push.model = i;
   }
@@ -106,11 +106,11 @@ TEST(Lag, PushesInSeveralDirectionsShareIt) {
 
 TEST(Lag, OfSignalsThatHaveNothingInCommonIsNotKnown) {
   LoadedPlatform platform;
-  Stretch stretch = stretch_of(platform.trial());
+  Segment segment = segment_of(platform.trial());
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
-  for (double& v : stretch.reference.reshaped()) v = normal(random);
-  const Lag found = estimate_lag({&stretch, 1});
+  for (double& v : segment.reference.reshaped()) v = normal(random);
+  const Lag found = estimate_lag({&segment, 1});
   EXPECT_FALSE(found.known);
   EXPECT_EQ(found.value, 0);
   EXPECT_NE(study::lag_warning(found), "");
@@ -145,9 +145,9 @@ TEST(Lag, OutsideOfWhatIsUsualIsWarnedAbout) {
 
 TEST(Lag, NothingToEstimateFromIsNotKnown) {
   EXPECT_FALSE(estimate_lag({}).known);
-  Stretch stretch = stretch_of(LoadedPlatform().trial());
-  stretch.time.array() += 1000;
-  EXPECT_FALSE(estimate_lag({&stretch, 1}).known);
+  Segment segment = segment_of(LoadedPlatform().trial());
+  segment.time.array() += 1000;
+  EXPECT_FALSE(estimate_lag({&segment, 1}).known);
 }
 
 TEST(ReferenceAt, InterpolatesButNeverAcrossGapsNorBeyondTheEnds) {

@@ -281,11 +281,11 @@ TEST(ViewCollector, WaitsUntilTheBoardIsStill) {
   Placement p = good_placements(Lens{}, 1, kTilt)[0];
   for (std::uint64_t i = 0; i < 4; ++i) {
     p.middle[0] += 0.1;  // squares: 5 px
-    EXPECT_EQ(collector.look(view_of(renderer(kCharuco).render(p, i)), ""), Taken::moving);
+    EXPECT_EQ(collector.look(view_of(renderer(kCharuco).render(p, i)), ""), ViewResult::moving);
   }
-  EXPECT_EQ(collector.look(view_of(renderer(kCharuco).render(p, 11)), ""), Taken::moving);
-  EXPECT_EQ(collector.look(view_of(renderer(kCharuco).render(p, 12)), ""), Taken::yes);
-  EXPECT_EQ(collector.look(view_of(renderer(kCharuco).render(p, 13)), ""), Taken::alike);
+  EXPECT_EQ(collector.look(view_of(renderer(kCharuco).render(p, 11)), ""), ViewResult::moving);
+  EXPECT_EQ(collector.look(view_of(renderer(kCharuco).render(p, 12)), ""), ViewResult::yes);
+  EXPECT_EQ(collector.look(view_of(renderer(kCharuco).render(p, 13)), ""), ViewResult::alike);
   EXPECT_EQ(collector.views().size(), 1u);
 }
 
@@ -305,7 +305,7 @@ TEST(BoardCorners, AreFoundToAFewHundredthsOfAPixel) {
     const Placement p = good_placements(lens, 5, kTilt)[4];
     const cv::Mat image = renderer(kCharuco).render(p, 7, conditions);
     const BoardSighting sighting = finder.find(view_of(image));
-    ASSERT_EQ(sighting.look, Look::board);
+    ASSERT_EQ(sighting.look, BoardView::board);
     ASSERT_GE(sighting.corners.size(), 20u);
     cv::Matx33d r;
     cv::Rodrigues(p.rotation, r);
@@ -318,9 +318,9 @@ TEST(BoardCorners, AreFoundToAFewHundredthsOfAPixel) {
     }
     EXPECT_LT(std::sqrt(sum / static_cast<double>(sighting.corners.size())),
               0.025 * std::max(1.0, blur));
-    EXPECT_NEAR(sighting.corner_look.blur_px, std::hypot(blur, 0.3),
+    EXPECT_NEAR(sighting.corner_view.blur_px, std::hypot(blur, 0.3),
                 0.15);  // px; a pixel adds 0.29
-    EXPECT_NEAR(sighting.corner_look.contrast, conditions.white - conditions.black, 10);
+    EXPECT_NEAR(sighting.corner_view.contrast, conditions.white - conditions.black, 10);
   }
 }
 

@@ -237,12 +237,12 @@ TEST(Plots, OfHoldsAndOfNothingDoNotFail) {
 TEST(Plots, PausesBetweenSlowReadingsStayShort) {
   NEEDS("gnuplot");
   study::Analysis a = example_certificate().analysis;
-  constexpr Eigen::Index kReadings = 80;  // a second apart; ten stretches, 70 s
+  constexpr Eigen::Index kReadings = 80;  // a second apart; ten segments, 70 s
   a.time = Eigen::VectorXd::LinSpaced(kReadings, 0, kReadings - 1);
   a.felt = a.felt.topRows(kReadings).eval();
   a.predicted = a.predicted.topRows(kReadings).eval();
-  a.stretch.resize(kReadings);
-  for (Eigen::Index i = 0; i < kReadings; ++i) a.stretch[i] = static_cast<int>(i / 8);
+  a.segment.resize(kReadings);
+  for (Eigen::Index i = 0; i < kReadings; ++i) a.segment[i] = static_cast<int>(i / 8);
   const std::string svg = traces_svg(a, {700, 300});
   EXPECT_TRUE(holds(svg, ">100<"));
   EXPECT_FALSE(holds(svg, ">150<") || holds(svg, ">200<")) << "mostly pauses";

@@ -23,12 +23,12 @@ AtRest healthy() {
     tag.centre << 0, side * 2.2e-3, 0.5e-3;
     tag.displacement << 3e-6, -2e-6, 8e-6, 1e-3, 0, -1e-3;
     tag.covariance.diagonal() << 1e-14, 1e-14, 1e-12, 1e-8, 1e-8, 1e-9;
-    tag.residual_part = 0.01;
+    tag.residual_fraction = 0.01;
     rest.tags.push_back(tag);
   }
-  rest.now = rest.then = {.white_counts = 180, .clipped_part = 0.01, .blur_px = 1.2};
+  rest.now = rest.then = {.white_counts = 180, .clipped_fraction = 0.01, .blur_px = 1.2};
   rest.held = true;
-  rest.residual_part = 0.01;
+  rest.residual_fraction = 0.01;
   rest.wrench = 0.01 * range();
   rest.range = range();
   return rest;
@@ -146,17 +146,17 @@ TEST(InSitu, LightTooDarkOrTooBright) {
   expect_only(rest, {Subject::light});
   EXPECT_EQ(find(rest, Subject::light).fault, Fault::too_dark);
   rest = healthy();
-  rest.now.clipped_part = 0.3;
+  rest.now.clipped_fraction = 0.3;
   expect_only(rest, {Subject::light});
   EXPECT_EQ(find(rest, Subject::light).fault, Fault::too_bright);
   // A calibration in the same glare.
-  rest.then.clipped_part = 0.3;
+  rest.then.clipped_fraction = 0.3;
   expect_only(rest, {});
 }
 
 TEST(InSitu, AResidualThatHasGrownNamesTheTag) {
   AtRest rest = healthy();
-  rest.tags[0].residual_part = 0.07;
+  rest.tags[0].residual_fraction = 0.07;
   expect_only(rest, {Subject::residual});
   EXPECT_EQ(find(rest, Subject::residual).tag, 2);
 }

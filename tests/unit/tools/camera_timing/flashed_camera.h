@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "host/tools/camera_timing/bandwidth.h"
+#include "host/tools/camera_timing/camera_timing.h"
 
 namespace tagwrench::test {
 
@@ -52,12 +52,12 @@ inline double overlap(const std::vector<double>& edges, double from, double to) 
   return on / (to - from);
 }
 
-inline BandwidthInput flash(const FlashedCamera& camera, FlashedTruth& truth) {
+inline CameraTimingInput flash(const FlashedCamera& camera, FlashedTruth& truth) {
   std::mt19937_64 random(camera.seed);
   std::uniform_real_distribution<double> uniform(0, 1);
   std::normal_distribution<double> normal(0, 1);
   std::exponential_distribution<double> exponential(1);
-  BandwidthInput input;
+  CameraTimingInput input;
   input.bit = bit_period_for(camera.announced);
   input.period = camera.announced;
   const double length = camera.frames * camera.period * 1.2 + 1;

@@ -34,7 +34,7 @@ TEST(RowProfiler, MeasuresTheMeanOfEachBandOfRows) {
   profiler.learn_dark(Picture(10).view());
   ASSERT_EQ(profiler.choose(), "");
   ASSERT_EQ(profiler.bands().size(), 48U);
-  EXPECT_NEAR(profiler.ambient_part(), 10.0 / 120, 1e-9);
+  EXPECT_NEAR(profiler.ambient_fraction(), 10.0 / 120, 1e-9);
   Picture half(10);
   half.paint(48, 96, 0, kWidth, 120);
   half.paint(10, 11, 0, kWidth, 60);
@@ -66,8 +66,8 @@ TEST(RowProfiler, LeavesOutWhatIsWhiteOrNotLit) {
   profiler.learn_lit(lit.view());
   profiler.learn_dark(dark.view());
   ASSERT_EQ(profiler.choose(), "");
-  EXPECT_NEAR(profiler.saturated_part(), 0.2, 1e-9);
-  EXPECT_NEAR(profiler.used_part(), 0.7, 1e-9);
+  EXPECT_NEAR(profiler.saturated_fraction(), 0.2, 1e-9);
+  EXPECT_NEAR(profiler.used_fraction(), 0.7, 1e-9);
   Picture garbage(50);
   garbage.paint(0, kHeight, 0, 30, 200);
   for (const double row : profiler.measure(garbage.view())) EXPECT_DOUBLE_EQ(row, 50);

@@ -244,9 +244,9 @@ TEST(Table, StiffnessGrowsWithTheRangeAndForcesWithIt) {
 TEST(Table, DoesNotDependOnHowStiffTheGivenSpringsAre) {
   const Design soft = design(instrument(), {1, 40});
   Instrument hard = instrument();
-  hard.stiffness *= 3e4;  // holds the tags in view far beyond kMostForce
+  hard.stiffness *= 3e4;  // holds the tags in view far beyond kMaxForce
   const Design stiff = design(hard, {1, 40});
-  EXPECT_GT(stiff.reach[1].in_view, 10 * kMostForce);
+  EXPECT_GT(stiff.reach[1].in_view, 10 * kMaxForce);
   for (std::size_t i : {1U, 2U}) {
     // The search goes in steps of 1 %.
     EXPECT_NEAR(stiff.rows[i].lateral / soft.rows[i].lateral, 1, 0.011);

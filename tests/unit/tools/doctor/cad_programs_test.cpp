@@ -43,8 +43,8 @@ TEST(DoctorSpnav, TellsWhoServesASocketFromALeftOver) {
   const UniqueFd spacenavd = listener((folder / "other.sock").string());
   EXPECT_EQ(server_at(folder / "other.sock"), SpnavServer::other);
 
-  const auto keeper = listen_spnav((folder / "ours.sock").string());
-  ASSERT_TRUE(keeper);
+  const auto daemon = listen_spnav((folder / "ours.sock").string());
+  ASSERT_TRUE(daemon);
   EXPECT_EQ(server_at(folder / "ours.sock"), SpnavServer::tagwrench);
 
   { const UniqueFd gone = listener((folder / "gone.sock").string()); }

@@ -64,7 +64,7 @@ TEST_F(ReadLoop, EachSampleIsLoggedUntilASignal) {
   EXPECT_EQ(logged(17), (std::vector<std::string>{"missing", "0", "0", "2"}));
 }
 
-TEST_F(ReadLoop, TheGuardiansNeutralSamplesAreNoGap) {
+TEST_F(ReadLoop, TheWatchdogsNeutralSamplesAreNoGap) {
   const auto hid =
       plug({.path = "/dev/hidraw0",
             .reports = {numbered_report(7), test::golden_reports()[2].bytes, numbered_report(8)}});

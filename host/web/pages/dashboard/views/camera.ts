@@ -63,7 +63,7 @@ export class CameraView implements View {
     this.picture = new CameraPicture(app.link, 'camera picture');
     const setLevel = paced((value) => void this.tellFailure('led', { level: value / 100 }));
     this.level.addEventListener('input', () => setLevel(Number(this.level.value)));
-    const auto = button('Automatic', () => void app.wish('led', { level: 'auto' }), {
+    const auto = button('Automatic', () => void app.request('led', { level: 'auto' }), {
       title: 'The bridge keeps the tags\u2019 white where it should be',
     });
     const row = make(
@@ -139,7 +139,7 @@ export class CameraView implements View {
 
   private cellRow(channel: number): readonly [HTMLElement, HTMLElement] {
     const values = [make('td', { class: 'number' }), make('td', { class: 'number' })] as const;
-    const tare = button('Tare', () => void this.app.wish('tare', { channel }), {
+    const tare = button('Tare', () => void this.app.request('tare', { channel }), {
       'aria-label': `Tare cell ${channel}`,
     });
     this.cells.append(

@@ -195,7 +195,7 @@ export class DeviceView implements View {
     if (!this.saveName.reportValidity()) return;
     const as = this.saveName.value.trim();
     await this.tries;
-    await this.app.wish('save_profile', {
+    await this.app.request('save_profile', {
       name: this.shown_?.name ?? '',
       text: this.text.with([]),
       ...(as === '' ? {} : { as }),

@@ -43,7 +43,7 @@ export class LiveView implements View {
       button('Clear', () => this.traces.clear(), { class: 'quiet' }),
     );
     const numbers = panel('Force and torque on the platform', 'panel-numbers');
-    this.readings = new Readings(numbers, { onZero: () => void app.wish('zero') });
+    this.readings = new Readings(numbers, { onZero: () => void app.request('zero') });
     const platform = panel('Platform', 'panel-platform');
     this.platform = new PlatformView(platform);
     this.picture = new CameraPicture(app.link, 'camera picture');

@@ -1,0 +1,307 @@
+#include "host/commands/camera_timing_command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <memory>
+#include <vector>
+
+#include "host/app/input.h"
+#include "host/app/scenario_config.h"
+#include "host/commands/board/loop.h"
+#include "host/commands/web_place.h"
+#include "host/core/config_error.h"
+#include "host/core/log.h"
+#include "host/core/os/atomic_file.h"
+#include "host/core/os/termination.h"
+#include "host/motion/shaping.h"
+#include "host/output/watchdog.h"
+#include "host/output/wrench_hid.h"
+#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
+#include "host/tools/camera_timing/board_pattern_lamp.h"
+#include "host/tools/camera_timing/measurement.h"
+#include "host/tools/camera_timing/page_patch.h"
+#include "host/tools/camera_timing/report.h"
+#include "host/tools/camera_timing/screen_measurement.h"
+#include "host/tools/camera_timing/screen_window.h"
+#include "host/tools/camera_timing/simulated_lamp.h"
+#include "host/tracker/tracker.h"
+#include "host/web/server/token_file.h"
+#include "host/wrench/estimate.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr double kMin = 3;   // s: enough pictures at 25 Hz
+constexpr double kMax = 20;  // s: a bare LED stays cool enough
+
+/// A camera and the lamp before it.
+struct Bench {
+  std::unique_ptr<BoardLoop> board;  ///< of the lamp; nothing for the simulator's
+  Input input;
+  std::unique_ptr<PatternLamp> lamp;
+  std::string lamp_description;
+};
+
+/// The simulator's own lamp, at the camera's own clock.
+Bench simulated_bench(const std::string& sensor, const std::string& source, bool fast) {
+  const Spec spec = split_spec(source);
+  if (spec.kind != "sim") {
+    throw ConfigError(fmt::format(
+        "--port sim: the simulated lamp lights the simulated sensor alone; use --source sim or "
+        "--source sim:SCENARIO.yaml with it, not {}",
+        source));
+  }
+  const sim::Scenario scenario =
+      spec.argument.empty() ? sim::Scenario{} : load_scenario(spec.argument);
+  auto lamp = std::make_unique<SimulatedLamp>(!fast);
+  Bench bench;
+  bench.input.sensor = sensor.empty()
+                           ? parse_sensor(sim::sensor_yaml(scenario), "the simulated sensor")
+                           : load_sensor(sensor);
+  auto camera = std::make_unique<SimulatorSource>(scenario, !fast, lamp.get());
+  lamp->set_time_zero(camera->time_zero());
+  bench.input.source = std::move(camera);
+  bench.lamp = std::move(lamp);
+  bench.lamp_description = "simulated, on the camera's own clock";
+  return bench;
+}
+
+/// A board's LED before a camera. No lamp: a signal came.
+Bench board_bench(const std::string& sensor, const std::string& source, const std::string& port,
+                  bool fast) {
+  if (fast) throw ConfigError("--fast: a board has its own time; leave it out, or use --port sim");
+  if (split_spec(source).kind != "v4l2") {
+    throw ConfigError(fmt::format(
+        "--port {}: a board lights cameras; use --source v4l2:/dev/videoN with it, or --port sim "
+        "for the simulated sensor",
+        port));
+  }
+  Bench bench;
+  bench.board = std::make_unique<BoardLoop>(port, link::new_session());
+  log_info("waiting for the board's clock to be known");
+  if (!bench.board->settle()) return bench;
+  bench.input = open_input({sensor, source, false});
+  link::BoardLink& link = bench.board->link();
+  bench.lamp = std::make_unique<BoardPatternLamp>(
+      link.session(),
+      [&link] {
+        link.send();
+        link.service();
+      },
+      link.poll_fd());
+  bench.lamp_description =
+      fmt::format("LED of board {} at {}", bench.board->session().hello().board, link.port());
+  return bench;
+}
+
+void check_report_file(const std::string& file) {
+  try {
+    check_replaceable(file);
+  } catch (const ConfigError&) {
+    throw ConfigError(
+        fmt::format("--json {}: cannot be written; name a file in a folder of yours", file));
+  }
+}
+
+/// What a run does with a frame, to a HID device where one may be made.
+class Processing {
+ public:
+  explicit Processing(const SensorConfig& sensor)
+      : tracker_(sensor.camera, sensor.target, sensor.rest),
+        wrench_(sensor.wrench),
+        shaping_(sensor.shaping) {
+    try {
+      device_ = std::make_unique<WrenchHidOutput>(WrenchHidOptions{});
+    } catch (const ConfigError& e) {
+      log_info(fmt::format("measured up to the wrench, without HID device: {}", e.what()));
+    }
+  }
+  void take(Frame& frame) noexcept {
+    const Track track = tracker_.track(frame);
+    Sample sample{.sequence = frame.sequence,
+                  .capture_time = frame.capture_time,
+                  .latency_origin = frame.latency_origin,
+                  .dropped = frame.dropped};
+    wrench_.estimate(track, sample);
+    shaping_.shape(sample);
+    if (carries_numbers(sample.status)) ++held_;
+    if (device_) device_->send(sample);
+  }
+  int held() const { return held_; }
+  const char* output() const { return device_ ? "HID report" : "wrench"; }
+
+ private:
+  Tracker tracker_;
+  WrenchEstimator wrench_;
+  Shaping shaping_;
+  std::unique_ptr<WrenchHidOutput> device_;
+  int held_ = 0;
+};
+
+}  // namespace
+
+CameraTimingCommand::CameraTimingCommand(command_line::Command program)
+    : verb_(program.add_subcommand(
+          "camera-timing",
+          "measure the camera with the LED: true frame rate, latency, jitter, read-out, stale and "
+          "missing frames")) {
+  verb_.footer(
+      "With a board, its LED lights the picture: steadily for 3 s, not at all for 1 s, then in a\n"
+      "pattern. Hands off, and little light from elsewhere. Without a board, --screen shows a "
+      "window\n"
+      "that flips between black and white, for the camera to look at; that tells frame rate and\n"
+      "latency alone, the screen's own latency included. --screen web is the same as a page, for "
+      "a\n"
+      "phone or a tablet before the camera. Without any of them:\n"
+      "  tagwrench camera-timing --source sim:tests/sim/scenarios/camera_timing.yaml --port sim "
+      "--fast");
+  verb_.add_option("--source", source_, "the camera: v4l2:/dev/videoN, sim or sim:SCENARIO.yaml")
+      .required();
+  command_line::Option port = verb_.add_option(
+      "--port", port_,
+      "the board: its serial port, usb:VENDOR:PRODUCT, or sim for the simulated lamp");
+  screen_option_ = verb_
+                       .add_option("--screen", screen_,
+                                   "a screen instead of a board's LED: window (as without a "
+                                   "value), or web[:ADDRESS:PORT], a page for any browser")
+                       .expected(0, 1)
+                       .excludes(port);
+  verb_
+      .add_option("--web-token", web_token_,
+                  "file with the token that the page needs, so that other computers may open it; "
+                  "made if it is not there")
+      .needs(screen_option_);
+  verb_.add_option("--sensor", sensor_, "sensor.yaml of this sensor");
+  verb_.add_option("--seconds", seconds_, "length of the pattern")
+      .check(command_line::number(
+          kMin, kMax, fmt::format("a number of seconds from {:g} to {:g}", kMin, kMax), "SECONDS"))
+      .capture_default_str();
+  verb_.add_option("--json", json_,
+                   "write the report as JSON to this file too; - is standard output");
+  verb_.add_flag("--fast", fast_, "the simulated sensor runs as fast as it can");
+}
+
+int CameraTimingCommand::run() const {
+  const bool screen = screen_option_.count() > 0;
+  if (!screen && port_.empty())
+    throw ConfigError(
+        "camera-timing: needs a light: --port PORT for a board's LED, --port sim or --screen");
+  if (screen) check_screen();
+  if (!json_.empty() && json_ != "-") check_report_file(json_);
+  return screen ? run_with_screen() : run_with_lamp();
+}
+
+void CameraTimingCommand::check_screen() const {
+  const std::string kind = split_spec(screen_).kind;
+  if (!screen_.empty() && screen_ != "window" && kind != "web") {
+    throw ConfigError(fmt::format(
+        "--screen {}: is no screen; use --screen, or --screen web, or web:ADDRESS:PORT", screen_));
+  }
+  if (kind != "web" && !web_token_.empty())
+    throw ConfigError("--web-token: is for a page; use it with --screen web:ADDRESS:PORT");
+  if (split_spec(source_).kind == "sim") {
+    if (kind == "web")
+      throw ConfigError(
+          "--screen web: the simulated camera sees no screen; give a camera as --source, or leave "
+          "web out");
+  } else if (fast_) {
+    throw ConfigError("--fast: a camera has its own time; leave it out");
+  }
+}
+
+void CameraTimingCommand::print(const std::string& text, const std::string& json) const {
+  fmt::print("{}", json_ == "-" ? json : text);
+  if (!json_.empty() && json_ != "-") write_atomically(json_, json);
+}
+
+int CameraTimingCommand::run_with_screen() const {
+  const UniqueFd stop = termination_fd();
+  const Spec screen = split_spec(screen_);
+  if (split_spec(source_).kind == "sim") {
+    const Bench bench = simulated_bench(sensor_, source_, fast_);
+    auto& patch = dynamic_cast<FlipPatch&>(*bench.lamp);
+    return measure(*bench.input.source, patch, stop, [] { return "simulated, without latency"; });
+  }
+  if (screen.kind != "web") {
+    ScreenWindow window;
+    const Input input = open_input({sensor_, source_, false});
+    return measure(*input.source, window, stop, [&] { return window.description(); });
+  }
+  WebOptions options = parse_web("--screen web", screen.argument);
+  options.pages = built_pages();
+  std::string token_text;
+  if (!web_token_.empty()) {
+    const WebToken token = web_token(web_token_);
+    options.token = token.text;
+    token_text = token.made ? "&token=" + token.text
+                            : fmt::format("&token=... (the token is in {})", web_token_);
+  }
+  PagePatch page(options);
+  const Input input = open_input({sensor_, source_, false});
+  log_info("the page: " + page.url() + token_text);
+  log_info("open it on the screen that the camera looks at; Ctrl-C ends");
+  if (!page.wait_for_page(stop.get())) {
+    log_info("camera-timing: " + (page.ended().empty() ? "stopped" : page.ended()));
+    return kFailed;
+  }
+  return measure(*input.source, page, stop, [&] { return page.description(); });
+}
+
+int CameraTimingCommand::measure(FrameSource& source, FlipPatch& patch, const UniqueFd& stop,
+                                 const std::function<std::string()>& screen) const {
+  log_info("source: " + source.format().description);
+  log_info("point the camera at the flipping patch, so that it fills the picture");
+  ScreenOptions options;
+  options.seconds = seconds_;
+  options.stopped = [&] { return termination_requested(); };
+  options.stop_fd = stop.get();
+  const ScreenMeasurement measured = measure_screen(source, patch, options);
+  if (!measured.refusal.empty()) {
+    log_info("camera-timing: " + measured.refusal);
+    return kFailed;
+  }
+  const double period = std::chrono::duration<double>(source.format().period).count();
+  print(report_text(measured, source.format().description, screen(), period),
+        report_json(measured, source.format().description, screen(), period));
+  return kDone;
+}
+
+int CameraTimingCommand::run_with_lamp() const {
+  const UniqueFd stop = termination_fd();
+  Bench bench = port_ == "sim" ? simulated_bench(sensor_, source_, fast_)
+                               : board_bench(sensor_, source_, port_, fast_);
+  if (!bench.lamp) return kFailed;
+  check_size(bench.input);
+  log_info("source: " + bench.input.source->format().description);
+  Processing processing(bench.input.sensor);
+
+  CameraTimingOptions options;
+  options.seconds = seconds_;
+  options.process = [&](Frame& frame) { processing.take(frame); };
+  options.stopped = [&] { return termination_requested(); };
+  options.stop_fd = stop.get();
+  options.say = [](const std::string& line) { log_info(line); };
+  const CameraTimingMeasurement measured =
+      measure_camera_timing(*bench.input.source, *bench.lamp, options);
+  if (!measured.refusal.empty()) {
+    log_info((measured.failed ? "camera-timing: " : "camera-timing: nothing can be told: ") +
+             measured.refusal);
+    return kFailed;
+  }
+  if (processing.held() == 0)
+    log_info(
+        "the tags were not held while the LED was steady: the processing time is that of looking "
+        "for them");
+  const CameraTimingSetting setting{
+      bench.input.source->format().description, bench.lamp_description, processing.output(),
+      std::chrono::duration<double>(bench.input.source->format().period).count()};
+  print(report_text(measured, setting), report_json(measured, setting));
+  return kDone;
+}
+
+}  // namespace tagwrench

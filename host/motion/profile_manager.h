@@ -1,0 +1,116 @@
+// What the person at the desk has chosen, and what it makes of newtons: the profile in force, its
+// shaping and gestures, and how it changes while the sensor runs.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "host/core/os/unique_fd.h"
+#include "host/core/types.h"
+#include "host/motion/control_socket.h"
+#include "host/motion/focus_watch.h"
+#include "host/motion/gestures.h"
+#include "host/motion/live.h"
+#include "host/motion/profile_files.h"
+#include "host/motion/shaping.h"
+#include "host/wrench/zero.h"
+#include "host/wrench/zero_text.h"
+
+namespace tagwrench {
+
+class ProfileManager {
+ public:
+  /// The sensor's own shaping, for good.
+  explicit ProfileManager(const Profile& defaults)
+      : ProfileManager(ProfileFiles({}, defaults), {}, {}) {}
+  /// The first profile is in force until somebody says otherwise. Throws ConfigError if the system
+  /// has no more descriptors.
+  ProfileManager(ProfileFiles files, std::optional<ControlSocket> control,
+                 std::optional<FocusWatch> focus);
+
+  /// Where the focus is not known, the program chooses that connected last: `last_program` gives
+  /// its name, empty if none is connected, and is asked with every sample.
+  void follow_programs(std::function<std::string_view()> last_program) {
+    last_program_ = std::move(last_program);
+  }
+
+  /// Fills sample.deflection, and adds what gestures press to sample.buttons. No heap, unless a
+  /// gesture changes the profile.
+  void shape(Sample& sample) noexcept;
+  /// The sample's motion at a later time, on the clock of its capture time.
+  void move_on(Sample& sample, TimePoint time) const noexcept {
+    sample.deflection = shaping_.motion_at(time);
+  }
+  /// Between two moves of a device; zero: it moves with every sample.
+  Duration period() const noexcept { return period_; }
+
+  /// Whether a gesture or a command has asked since the last call that what reads now be nothing.
+  bool take_zero() noexcept { return std::exchange(zero_wanted_, false); }
+  /// What has changed since the last call, a line for people; empty: nothing.
+  std::string take_status_line() noexcept { return std::exchange(status_line_, {}); }
+
+  /// Readable when service() has something to do.
+  int poll_fd() const noexcept { return events_.get(); }
+  /// Changed files, requests, the focus.
+  void service() noexcept;
+
+  /// In force: the one on trial, else the one chosen.
+  const Profile& profile() const noexcept {
+    return trial_ ? trial_->profile : files_.profiles()[current_];
+  }
+
+ private:
+  /// What somebody tries at a page. It ends when he does not ask for a while: he is gone.
+  struct Trial {
+    std::size_t of = 0;  ///< the profile that it stands for
+    Profile profile;
+    std::string owner;  ///< ControlSocket::asker()
+  };
+
+  void use(std::size_t profile, std::string_view because) noexcept;
+  void use_for(std::string_view program);
+  void apply() noexcept;
+  void take_files();
+  void take_requests();
+  void take_focus();
+  void take_program() noexcept;
+  void take_lapse();
+  std::string granted(const ControlRequest& request);
+  std::string choose(std::string_view name);
+  std::string window(std::string_view program);
+  std::string live() const;
+  std::string show(std::string_view name) const;
+  std::string attempt(const ControlRequest& request);
+  std::string keep();
+  std::string revert();
+  std::optional<std::size_t> find(std::string_view name) const noexcept;
+  std::string unknown(std::string_view name) const;
+  bool asker_tries() const noexcept;
+  void extend_trial() noexcept;
+  void end_trial() noexcept;
+
+  ProfileFiles files_;
+  std::optional<ControlSocket> control_;
+  std::optional<FocusWatch> focus_;
+  UniqueFd lapse_;   ///< timer: a trial's end
+  UniqueFd events_;  ///< epoll of them all
+  std::size_t current_ = 0;
+  std::optional<Trial> trial_;
+  GestureOptions gesture_options_;
+  Gestures gestures_;
+  Shaping shaping_;
+  Duration period_{};
+  bool focus_told_ = false;
+  std::function<std::string_view()> last_program_;
+  std::string program_;              ///< the last that it gave
+  std::size_t before_programs_ = 0;  ///< the profile in force before there was one
+  LiveReading latest_;
+  bool zero_wanted_ = false;
+  std::string status_line_;
+};
+
+}  // namespace tagwrench

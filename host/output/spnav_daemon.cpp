@@ -1,0 +1,233 @@
+#include "host/output/spnav_daemon.h"
+
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <climits>
+#include <cstdio>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "host/core/config_error.h"
+
+namespace tagwrench {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr int kUpdatesAtOnce = 16;
+constexpr int kConnectionsAtOnce = 16;
+constexpr std::uint32_t kMaxValid_ms = 1000;
+
+SpnavPeer peer_of(int socket) noexcept {
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  SpnavPeer peer;
+  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return peer;
+  peer.pid = credentials.pid;
+  char path[32];
+  std::snprintf(path, sizeof path, "/proc/%d/comm", peer.pid);
+  const UniqueFd file(::open(path, O_RDONLY | O_CLOEXEC));
+  const ssize_t got = file ? ::read(file.get(), peer.name.data(), peer.name.size() - 1) : 0;
+  const auto end = peer.name.begin() + std::max<ssize_t>(got, 0);
+  std::fill(std::find(peer.name.begin(), end, '\n'), peer.name.end(), '\0');
+  return peer;
+}
+
+UniqueFd spare_descriptor() noexcept { return UniqueFd(::open("/dev/null", O_RDONLY | O_CLOEXEC)); }
+
+}  // namespace
+
+SpnavDaemon::SpnavDaemon(SpnavSockets sockets, const SpnavDaemonOptions& options, int stop_fd)
+    : sockets_(std::move(sockets)),
+      options_(options),
+      stop_fd_(stop_fd),
+      epoll_(::epoll_create1(EPOLL_CLOEXEC)),
+      idle_since_(steady_clock::now()),
+      spare_(spare_descriptor()) {
+  if (!epoll_)
+    throw ConfigError("spnav socket " + sockets_.path + ": no epoll to be had; end other programs");
+  clients_.reserve(options_.most_programs);
+  watch(sockets_.programs.get(), &sockets_.programs, EPOLLIN, EPOLL_CTL_ADD);
+  watch(sockets_.bridge.get(), &sockets_.bridge, EPOLLIN, EPOLL_CTL_ADD);
+  if (stop_fd_ >= 0) watch(stop_fd_, &stop_fd_, EPOLLIN, EPOLL_CTL_ADD);
+}
+
+SpnavDaemon::~SpnavDaemon() {
+  sockets_.remove();
+  lose_bridge();
+}
+
+void SpnavDaemon::run() noexcept {
+  std::array<epoll_event, 32> events;
+  while (!stopped_) {
+    const int count =
+        ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), patience_ms());
+    for (int i = 0; i < count; ++i) handle(events[static_cast<std::size_t>(i)]);
+    check_time();
+    sweep();
+  }
+}
+
+void SpnavDaemon::handle(const epoll_event& event) noexcept {
+  const void* about = event.data.ptr;
+  if (about == &stop_fd_) {
+    stopped_ = true;
+  } else if (about == &sockets_.programs) {
+    accept_programs();
+  } else if (about == &sockets_.bridge) {
+    accept_bridge();
+  } else if (about == &bridge_) {
+    read_bridge();
+  } else {
+    auto& client = *static_cast<SpnavClient*>(event.data.ptr);
+    if ((event.events & (EPOLLHUP | EPOLLERR)) != 0) {
+      client.hang_up();
+    } else if ((event.events & EPOLLOUT) != 0) {
+      client.resume(state_, device(), steady_clock::now());
+    } else {
+      client.read(device(), sockets_.path);
+    }
+  }
+}
+
+void SpnavDaemon::accept_programs() noexcept {
+  for (int i = 0; i < kConnectionsAtOnce; ++i) {
+    UniqueFd socket(::accept4(sockets_.programs.get(), nullptr, nullptr, SOCK_CLOEXEC));
+    if (!socket && (errno == EMFILE || errno == ENFILE)) turn_away();
+    if (!socket) return;
+    if (clients_.size() < options_.most_programs) add_program(std::move(socket));
+  }
+}
+
+/// Without a descriptor for it; else its connection would wake the loop for ever.
+void SpnavDaemon::turn_away() noexcept {
+  spare_.reset();
+  UniqueFd(::accept4(sockets_.programs.get(), nullptr, nullptr, SOCK_CLOEXEC)).reset();
+  spare_ = spare_descriptor();
+}
+
+void SpnavDaemon::add_program(UniqueFd socket) noexcept {
+  const SpnavPeer peer = peer_of(socket.get());
+  std::unique_ptr<SpnavClient> client(
+      new (std::nothrow) SpnavClient(std::move(socket), peer, device_.has_value()));
+  if (client == nullptr) return;  // closed with `socket`
+  client->watched = client->interest();
+  watch(client->fd(), client.get(), client->watched, EPOLL_CTL_ADD);
+  tell_bridge(*client, true);
+  clients_.push_back(std::move(client));  // within what was reserved
+}
+
+/// One at a time; another one is told who has the place.
+void SpnavDaemon::accept_bridge() noexcept {
+  UniqueFd socket(::accept4(sockets_.bridge.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  if (!socket) return;
+  SpnavGreeting greeting;
+  greeting.daemon_pid = ::getpid();
+  greeting.refused = bridge_ ? 1 : 0;
+  greeting.other_bridge = bridge_ ? bridge_pid_ : 0;
+  if (!send_spnav(socket.get(), greeting) || bridge_) return;
+  bridge_pid_ = peer_of(socket.get()).pid;
+  bridge_ = std::move(socket);
+  watch(bridge_.get(), &bridge_, EPOLLIN, EPOLL_CTL_ADD);
+  for (const auto& client : clients_) tell_bridge(*client, true);
+}
+
+void SpnavDaemon::read_bridge() noexcept {
+  std::array<std::uint8_t, kSpnavLongestMessage> buffer;
+  for (int i = 0; i < kUpdatesAtOnce && bridge_; ++i) {
+    const SpnavReceived received = receive_spnav(bridge_.get(), buffer);
+    if (received.open && received.bytes.empty()) return;
+    if (!received.open || !take(received.bytes)) lose_bridge();
+  }
+}
+
+/// False: nothing that a bridge says.
+bool SpnavDaemon::take(std::span<const std::uint8_t> message) noexcept {
+  if (const auto hello = spnav_message<SpnavHello>(message)) {
+    device_ = hello->device;
+    device_->name.back() = '\0';
+    show(false);
+    return true;
+  }
+  const auto update = spnav_message<SpnavUpdate>(message);
+  if (!update || !device_) return false;
+  state_ = update->state;
+  const bool rest = state_ == SpnavState{};
+  const milliseconds valid(std::min(update->valid_ms, kMaxValid_ms));
+  valid_until_ = rest ? TimePoint::max() : steady_clock::now() + valid;
+  show(true);
+  return true;
+}
+
+void SpnavDaemon::lose_bridge() noexcept {
+  if (bridge_) watch(bridge_.get(), nullptr, 0, EPOLL_CTL_DEL);
+  bridge_.reset();
+  device_.reset();
+  state_ = {};
+  valid_until_ = TimePoint::max();
+  show(false);
+}
+
+void SpnavDaemon::show(bool moved) noexcept {
+  const TimePoint now = steady_clock::now();
+  for (const auto& client : clients_) client->show(state_, device(), moved, now);
+}
+
+/// What epoll waits for follows what the programs are good for; those that are gone go.
+void SpnavDaemon::sweep() noexcept {
+  for (const auto& client : clients_) {
+    if (client->gone()) {
+      tell_bridge(*client, false);
+      watch(client->fd(), nullptr, 0, EPOLL_CTL_DEL);
+    } else if (client->watched != client->interest()) {
+      client->watched = client->interest();
+      watch(client->fd(), client.get(), client->watched, EPOLL_CTL_MOD);
+    }
+  }
+  std::erase_if(clients_, [](const auto& client) { return client->gone(); });
+}
+
+void SpnavDaemon::watch(int fd, void* about, std::uint32_t events, int operation) noexcept {
+  epoll_event event{};
+  event.events = events;
+  event.data.ptr = about;
+  ::epoll_ctl(epoll_.get(), operation, fd, &event);
+}
+
+void SpnavDaemon::tell_bridge(const SpnavClient& client, bool connected) noexcept {
+  if (!bridge_) return;
+  SpnavProgram program;
+  program.connected = connected ? 1 : 0;
+  program.peer = client.peer();
+  send_spnav(bridge_.get(), program);  // unsaid if there is no room: it is status_line for people
+}
+
+int SpnavDaemon::patience_ms() const noexcept {
+  TimePoint until = valid_until_;
+  if (options_.idle_end && !bridge_ && clients_.empty())
+    until = std::min(until, idle_since_ + *options_.idle_end);
+  if (until == TimePoint::max()) return -1;
+  const auto left = std::chrono::ceil<milliseconds>(until - steady_clock::now()).count();
+  return static_cast<int>(std::clamp<std::int64_t>(left, 0, INT_MAX));
+}
+
+void SpnavDaemon::check_time() noexcept {
+  const TimePoint now = steady_clock::now();
+  if (now >= valid_until_) {
+    valid_until_ = TimePoint::max();
+    state_ = {};
+    show(false);
+  }
+  if (bridge_ || !clients_.empty()) idle_since_ = now;
+  if (options_.idle_end && now >= idle_since_ + *options_.idle_end) stopped_ = true;
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,241 @@
+#include "host/tracker/diagnostics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <optional>
+#include <span>
+
+#include "host/tracker/corner_pose.h"
+#include "host/tracker/flipped.h"
+#include "host/tracker/picture_quality.h"
+#include "host/tracker/rotation.h"
+#include "host/tracker/square_reader.h"
+
+namespace tagwrench {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// A hand that passes by says nothing: the first look comes this late, and two must agree.
+constexpr Duration kFirstLook = milliseconds(300);
+constexpr Duration kBetweenLooks = milliseconds(400);
+/// So long a line can be read before the next one comes.
+constexpr Duration kQuiet = milliseconds(2000);
+
+constexpr int kBlack = 40;           ///< grey levels
+constexpr int kEvenContrast = 25;    ///< grey levels
+constexpr double kMaxWhite = 0.4;    ///< of the picture
+constexpr double kUnsharp_px = 4.5;  ///< tags of the published size decode up to about this blur
+
+constexpr double kOtherScale = 0.03;
+constexpr double kSameScale =
+    0.01;  ///< motion shears the picture of a rolling shutter, never alike
+/// Between tags, as four corners each tell it: rad.
+constexpr double kOtherTurn = 0.25;
+constexpr double kOtherDirection = 0.2;
+
+bool holds(const DiagnosticDetails::Ids& ids, int id) {
+  return std::find(ids.id.begin(), ids.id.begin() + ids.count, id) != ids.id.begin() + ids.count;
+}
+
+/// How two tags sit to each other, as seen against as described.
+struct PairMisfit {
+  double scale = 1;  ///< size of the tags over what was described, if the distance is right
+  double turn = 0;   ///< rad
+  double direction = 0;
+
+  double total() const { return turn + direction; }
+  bool elsewhere() const { return turn > kOtherTurn || direction > kOtherDirection; }
+};
+
+/// Of the poses that the corners of each tag allow, those that fit best.
+std::optional<PairMisfit> compare(const FoundTag& a, const FoundTag& b,
+                                  const Eigen::Isometry3d& platform_T_a,
+                                  const Eigen::Isometry3d& platform_T_b) {
+  const Eigen::Isometry3d described = platform_T_a.inverse() * platform_T_b;
+  std::optional<PairMisfit> best;
+  for (const Eigen::Isometry3d& camera_T_a : a.camera_T_tag) {
+    for (const Eigen::Isometry3d& camera_T_b : b.camera_T_tag) {
+      const Eigen::Isometry3d seen = camera_T_a.inverse() * camera_T_b;
+      const double distance = seen.translation().norm();
+      const double described_distance = described.translation().norm();
+      if (!(distance > 0) || !(described_distance > 0)) continue;
+      PairMisfit misfit;
+      misfit.scale = described_distance / distance;
+      misfit.turn = rotation_to_vector(seen.linear() * described.linear().transpose()).norm();
+      misfit.direction = std::acos(std::clamp(
+          seen.translation().dot(described.translation()) / distance / described_distance, -1.0,
+          1.0));
+      if (!best || misfit.total() < best->total()) best = misfit;
+    }
+  }
+  return best;
+}
+
+/// Tags that are where the description has them, to each other and to rest? A cause if not.
+Diagnostic judge_geometry(const TargetDescription& target, const KnownReference& rest,
+                          const Finding& finding, DiagnosticDetails& details) {
+  const std::vector<FoundTag>& tags = finding.tags;
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    for (std::size_t j = i + 1; j < tags.size(); ++j) {
+      const auto& platform_T_a = target.tags[tags[i].index].platform_T_tag;
+      const auto& platform_T_b = target.tags[tags[j].index].platform_T_tag;
+      if (!platform_T_a || !platform_T_b) continue;
+      const auto misfit = compare(tags[i], tags[j], *platform_T_a, *platform_T_b);
+      if (!misfit) continue;
+      details.concerned = {};
+      details.concerned.add(target.tags[tags[i].index].id);
+      details.concerned.add(target.tags[tags[j].index].id);
+      details.amount = misfit->scale;
+      if (misfit->elsewhere()) return Diagnostic::other_places;
+      if (std::abs(misfit->scale - 1) > kOtherScale) return Diagnostic::other_scale;
+    }
+  }
+  details.concerned = {};
+  details.amount = 0;
+  if (!rest.known) return Diagnostic::none;
+  // The nearest of all poses that any tag allows: what is out of reach then is so beyond doubt.
+  double nearest = 1e9;
+  for (const FoundTag& tag : tags) {
+    for (const Eigen::Isometry3d& camera_T_tag : tag.camera_T_tag) {
+      const Eigen::Isometry3d pose = camera_T_tag * rest.platform_T_tag[tag.index].inverse();
+      if (within_reach(rest.camera_T_platform, pose)) return Diagnostic::none;
+      const Vector6 offset = motion_between(rest.camera_T_platform, pose);
+      const double far = offset.head<3>().norm() / rest.camera_T_platform.translation().norm() +
+                         offset.tail<3>().norm();
+      if (far >= nearest) continue;
+      nearest = far;
+      details.offset = offset;
+      details.rest_given = rest.given;
+    }
+  }
+  return nearest < 1e9 ? Diagnostic::rest_elsewhere : Diagnostic::none;
+}
+
+/// What is printed in the picture's squares that are not the target's tags.
+std::vector<ReadSquare> read_others(const CameraModel& camera, const ImageView& image,
+                                    const Finding& finding, TagFamily family,
+                                    const DiagnosticDetails::Ids& missing) {
+  const std::span<const std::int16_t> ids(missing.id.data(), missing.count);
+  if (!camera.mirrored) return read_squares(image, finding.squares, family, ids);
+  return read_squares(FlippedImage(image).view(), finding.squares, family, ids);
+}
+
+/// Light and focus, if they are so bad that tags may not be found.
+Diagnostic judge_light(const PictureQuality& quality, DiagnosticDetails& details) {
+  const double was = details.amount;
+  details.amount = quality.bright_counts;
+  if (quality.bright_counts < kBlack) return Diagnostic::image_black;
+  details.amount = quality.white_fraction;
+  if (quality.white_fraction > kMaxWhite) return Diagnostic::image_saturated;
+  details.amount = quality.bright_counts;
+  if (quality.bright_counts - quality.dark_counts < kEvenContrast) return Diagnostic::image_empty;
+  details.amount = quality.blur_px.value_or(0);
+  if (quality.blur_px > kUnsharp_px) return Diagnostic::image_unsharp;
+  details.amount = was;
+  return Diagnostic::none;
+}
+
+Diagnostic name_family(const std::vector<ReadSquare>& others, DiagnosticDetails& details) {
+  details.family = name(others.front().family);
+  for (const ReadSquare& tag : others) {
+    if (tag.family == others.front().family && !holds(details.seen, tag.id))
+      details.seen.add(tag.id);
+  }
+  return Diagnostic::wrong_family;
+}
+
+/// Why not all of the target's tags are found.
+Diagnostic judge_missing(const CameraModel& camera, const TargetDescription& target,
+                         const ImageView& image, const Finding& finding,
+                         DiagnosticDetails& details) {
+  DiagnosticDetails::Ids mirrored;
+  std::vector<ReadSquare> others;
+  for (const ReadSquare& tag :
+       read_others(camera, image, finding, target.family, details.concerned)) {
+    if (tag.mirrored && !holds(mirrored, tag.id)) mirrored.add(tag.id);
+    if (tag.family != target.family) others.push_back(tag);
+  }
+  if (mirrored.count > 0) {
+    // All of them: the image is flipped, which is told elsewhere.
+    if (finding.tags.empty()) return Diagnostic::none;
+    details.concerned = mirrored;
+    details.seen = {};
+    for (const FoundTag& tag : finding.tags) details.seen.add(target.tags[tag.index].id);
+    return Diagnostic::tag_printed_mirrored;
+  }
+  if (!finding.other_ids.empty()) return Diagnostic::wrong_ids;
+  if (finding.tags.empty() && !others.empty()) return name_family(others, details);
+  const PictureQuality quality = picture_quality(image);
+  const Diagnostic light = judge_light(quality, details);
+  if (light != Diagnostic::none) return light;
+  if (!finding.tags.empty()) return Diagnostic::tag_missing;
+  details.amount = quality.bright_counts;
+  return quality.blur_px ? Diagnostic::no_tag : Diagnostic::image_empty;
+}
+
+/// The same thing to say, though the numbers may differ.
+bool same(const Diagnosis& a, const Diagnosis& b) {
+  return a.cause == b.cause && a.details.seen == b.details.seen &&
+         a.details.concerned == b.details.concerned && a.details.family == b.details.family;
+}
+
+}  // namespace
+
+Diagnosis diagnose(const CameraModel& camera, const TargetDescription& target,
+                   const KnownReference& rest, const ImageView& image, const Finding& finding) {
+  Diagnosis out;
+  if (finding.other_way_round) return out;  // said by whoever asked for the finding
+  DiagnosticDetails& details = out.details;
+  details.expected_family = details.family = name(target.family);
+  const auto found = [&finding](std::size_t t) {
+    return std::any_of(finding.tags.begin(), finding.tags.end(),
+                       [t](const FoundTag& tag) { return tag.index == t; });
+  };
+  for (std::size_t t = 0; t < target.tags.size(); ++t) {
+    details.expected.add(target.tags[t].id);
+    (found(t) ? details.seen : details.concerned).add(target.tags[t].id);
+  }
+  for (const int id : finding.other_ids) details.seen.add(id);
+
+  if (!finding.twice.empty()) {
+    details.concerned = {};
+    for (const int id : finding.twice) details.concerned.add(id);
+    out.cause = Diagnostic::tag_twice;
+    return out;
+  }
+  const DiagnosticDetails::Ids missing = details.concerned;
+  out.cause = judge_geometry(target, rest, finding, details);
+  if (out.cause != Diagnostic::none || missing.count == 0) return out;
+  details.concerned = missing;
+  out.cause = judge_missing(camera, target, image, finding, details);
+  return out;
+}
+
+Diagnosis TrackingDiagnostics::not_held(TimePoint time, const KnownReference& rest,
+                                        const ImageView& image, const Finding& finding) noexcept {
+  try {
+    if (!not_held_since_ || time < *not_held_since_) {
+      not_held_since_ = time;
+      next_look_ = time + kFirstLook;
+      last_look_ = {};
+    }
+    if (time < next_look_) return {};
+    next_look_ = time + kBetweenLooks;
+    const Diagnosis look = diagnose(camera_, target_, rest, image, finding);
+    const bool agreed = same(look, last_look_) &&
+                        (look.cause != Diagnostic::other_scale ||
+                         std::abs(look.details.amount - last_look_.details.amount) < kSameScale);
+    last_look_ = look;
+    if (!agreed || look.cause == Diagnostic::none || same(look, said_) || time < quiet_until_)
+      return {};
+    quiet_until_ = time + kQuiet;
+    said_ = look;
+    return look;
+  } catch (const std::exception&) {
+    return {};  // an image that the library refuses, or out of memory: nothing can be told
+  }
+}
+
+}  // namespace tagwrench

@@ -1,0 +1,76 @@
+// The rest pose, the tags' placement and their looks, learned from the first frames.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "host/tracker/acquire.h"
+#include "host/tracker/pixel_template.h"
+#include "host/tracker/refine.h"
+
+namespace tagwrench {
+
+/// What a target at rest is known to be.
+struct LearnedReference {
+  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
+  EdgeTarget target;
+  Eigen::Isometry3d seen_from = Eigen::Isometry3d::Identity();  ///< camera_T_platform in `image`
+  Matrix6 pose_covariance = Matrix6::Zero();  ///< of seen_from; matters when rest was given
+  ReferenceImage image;                       ///< the average of the rest frames, as delivered
+  PixelNoise noise;                           ///< of one frame
+  /// How well each tag's pose is known: of its motion, camera axes, m and rad.
+  std::vector<Matrix6> tag_covariance;
+};
+
+/// Feed it frames until it is done. It averages them, so that one careful fit at the end sees
+/// neither noise nor quantisation; a frame in which the platform has moved starts it again.
+class ReferenceEstimator {
+ public:
+  enum class Progress : std::uint8_t {
+    waiting,   ///< not all tags seen
+    learning,  ///< this frame counted
+    moved,     ///< the platform moved: starts again
+    done,      ///< learned() is filled
+  };
+
+  ReferenceEstimator(const CameraModel& camera, const TargetDescription& target,
+                     const ReferenceOptions& options, const std::vector<TagPattern>& patterns);
+
+  /// True while the next add() needs what the acquirer finds in the image.
+  bool wants_finding() const noexcept { return frames_ == 0; }
+
+  /// May allocate; frames at rest are few.
+  Progress add(const ImageView& image, const Finding& finding);
+
+  const LearnedReference& learned() const { return learned_; }
+  int tags_seen() const noexcept { return tags_seen_; }
+
+ private:
+  bool start(const ImageView& image, const Finding& finding);
+  std::optional<Eigen::Isometry3d> tag_pose(const ImageView& image, const FoundTag& found);
+  bool place(const std::vector<Eigen::Isometry3d>& camera_T_tag);
+  Eigen::Isometry3d seen_from(const std::vector<Eigen::Isometry3d>& camera_T_tag) const;
+  void accumulate(const ImageView& image);
+  double motion_px(const Eigen::Isometry3d& camera_T_platform) const;
+  bool finish();
+  PixelNoise measure_noise() const;
+  Matrix6 distance_covariance(const Eigen::Isometry3d& camera_T_body) const;
+
+  CameraModel camera_;
+  TargetDescription description_;
+  ReferenceOptions options_;
+  std::vector<TagPattern> patterns_;
+  EdgeMeter meter_;
+  Refiner single_;  // one tag alone
+  Refiner joint_;   // all, as placed after the first frame
+  int frames_ = 0;
+  int tags_seen_ = 0;
+  Eigen::Isometry3d first_pose_ = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d last_pose_ = Eigen::Isometry3d::Identity();
+  std::vector<float> sum_;
+  std::vector<float> squares_;  // of differences between successive frames
+  std::vector<std::uint8_t> previous_;
+  LearnedReference learned_;
+};
+
+}  // namespace tagwrench

@@ -1,0 +1,24 @@
+// What a page sends: one request, as text. Pure; the bytes are not trusted.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace tagwrench {
+
+struct PageMessage {
+  static constexpr std::size_t kDeepest = 8;
+  static constexpr std::size_t kMaxArguments = 32;
+
+  std::optional<std::int64_t> id;  ///< without one, there is nobody to answer
+  std::string what;
+  nlohmann::json arguments;
+  std::string_view fault;  ///< empty: it is a request. Else what is wrong with it, in words
+};
+
+PageMessage parse_page_message(std::string_view text);
+
+}  // namespace tagwrench
