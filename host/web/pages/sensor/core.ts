@@ -163,7 +163,7 @@ export class Core {
 
   /** What the tracker noticed last, in words; empty when all is well. */
   hint(): string {
-    return this.module.UTF8ToString(this.module._tagwrench_hint(this.core));
+    return this.module.UTF8ToString(this.module._tagwrench_diagnostic(this.core));
   }
 
   /** The sensor.yaml that was opened, with the rest pose and the tags' places that were learned since. */

@@ -58,7 +58,7 @@ export interface CoreModule {
     sequence: number,
   ): number;
   _tagwrench_zero(core: number): void;
-  _tagwrench_hint(core: number): number;
+  _tagwrench_diagnostic(core: number): number;
   _tagwrench_learned(core: number): number;
 }
 
