@@ -113,7 +113,7 @@ test('of two pages that try a profile at the same instant one is refused', { ski
   const { text } = await page.ask('show', { name: 'cad' });
   for (let i = 0; i < 10; i++) {
     const both = await Promise.all([page, other].map((one) => one.ask('try', { name: 'cad', text })));
-    const [taken, left] = both[0].ok ? both : both.toReversed();
+    const [taken, left] = both[0].ok ? both : [...both].reverse();
     assert.ok(taken.ok, taken.text);
     assert.ok(!left.ok);
     assert.match(left.text, /^another page tries profile cad; keep or revert it there/);

@@ -4,6 +4,7 @@ import { run } from 'node:test';
 import { spec } from 'node:test/reporters';
 import { resolve } from 'node:path';
 
+process.exitCode = 1; // until the end is reached
 const count = { passed: 0, failed: 0, skipped: 0 };
 const reasons = new Set();
 const isTest = (event) => event.details?.type !== 'suite' && event.name !== resolve(process.argv[2]);
@@ -19,10 +20,9 @@ stream.on('test:pass', (event) => {
   }
 });
 stream.on('test:fail', () => ++count.failed);
-const text = stream.compose(spec);
+const text = stream.compose(new spec());
 text.pipe(process.stdout);
 text.on('end', () => {
   for (const reason of reasons) console.log(reason);
-  if (count.failed > 0) process.exitCode = 1;
-  else if (count.passed === 0) process.exitCode = 77;
+  if (count.failed === 0) process.exitCode = count.passed > 0 ? 0 : 77;
 });

@@ -183,7 +183,7 @@ test('whoever moves the platform at the start is told to let it rest; a zero whi
   await load(page, join(folder, 'sensor.yaml'));
   await page.locator('.sensor-panel p').first().filter({ hasText: 'sensor.yaml: tags 5, 2' }).waitFor();
   const there = pictures.slice(6);
-  await page.evaluate(cameraOf, { still: pictures.slice(0, 6), moving: [...there, ...there.toReversed()] });
+  await page.evaluate(cameraOf, { still: pictures.slice(0, 6), moving: [...there, ...[...there].reverse()] });
   await startButton(page).click();
   const status = page.locator('.status');
   const hint = page.locator('.hint-words');

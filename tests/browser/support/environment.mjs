@@ -30,7 +30,7 @@ export const chromiumPath =
 const require = createRequire(join(pages, 'package.json'));
 export const nodePackage = (name) => require(name);
 
-const kOldestNode = 20;
+const kOldestNode = 18;
 const lacks = {
   packages: () => false,
   chromium: () => !chromiumPath && 'chromium is not installed (apt install chromium)',
