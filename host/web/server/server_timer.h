@@ -26,7 +26,7 @@ class ServerTimer {
 
  private:
   struct Timer;
-  std::unique_ptr<Timer> timer_;
+  std::shared_ptr<Timer> timer_;
 };
 
 }  // namespace tagwrench
