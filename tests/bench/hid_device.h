@@ -29,7 +29,7 @@ class SimulatedDevice {
     while (next_move_ && *next_move_ <= sample.capture_time) {
       Sample between = last_;
       desk_.move_on(between, *next_move_);
-      moved(*next_move_, to_counts(between.motion, kSpacemouseLimit_counts));
+      moved(*next_move_, to_counts(between.deflection, kSpacemouseLimit_counts));
       *next_move_ += desk_.period();
     }
     zero_.follow(sample, noise);

@@ -53,17 +53,17 @@ int read_all(std::uint16_t port) {
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   if (::connect(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) return 1;
   const std::string host = "127.0.0.1:" + std::to_string(port);
-  std::string ask =
+  std::string sent =
       "GET /ws HTTP/1.1\r\nHost: " + host + "\r\nOrigin: http://" + host +
       "\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
       "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\nSec-WebSocket-Protocol: tagwrench.v1\r\n\r\n";
   std::vector<char> bytes(65536);
-  if (::send(socket.get(), request.data(), request.size(), 0) < 0) return 1;
+  if (::send(socket.get(), sent.data(), sent.size(), 0) < 0) return 1;
   if (::recv(socket.get(), bytes.data(), bytes.size(), 0) <= 0) return 1;
   const std::string request = R"({"id":1,"ask":"pictures","on":true})";
-  ask = "\x81" + std::string(1, static_cast<char>(0x80 | request.size())) + std::string(4, '\0') +
-        request;
-  if (::send(socket.get(), request.data(), request.size(), 0) < 0) return 1;
+  sent = "\x81" + std::string(1, static_cast<char>(0x80 | request.size())) + std::string(4, '\0') +
+         request;
+  if (::send(socket.get(), sent.data(), sent.size(), 0) < 0) return 1;
   while (::recv(socket.get(), bytes.data(), bytes.size(), 0) > 0) {
   }
   return 0;
