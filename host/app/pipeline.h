@@ -1,3 +1,8 @@
+// Room app: one run, put together.
+// In:  a source, an instrument (tracker, wrench, motion), outputs, a stop.
+// Out: every frame's sample in every output, in order, on one thread; what became of the run.
+// Units and frames: core/types.h. The life of a frame: docs/architecture.md.
+//
 // THE data path, on one screen: frame -> pose -> wrench -> motion -> outputs, and the one poll loop
 // that drives it.
 #pragma once

@@ -1,3 +1,9 @@
+// Room board: the board that lights the tags and reads load cells.
+// In:  bytes of a serial port (protocol/README.md), the board's time in us, the host's clock.
+// Out: load cells in counts or N, buttons, voltages, faults, each with its time on the host's clock
+//      and that time's standard deviation; orders for the LED, in permille.
+// Then: board_link.h (port and session), clock_sync.h (docs/theory.md), cell_calibration.h.
+//
 // The conversation with a board. Pure: bytes and times go in, bytes and samples come out; it has no
 // descriptor and, once constructed, touches no heap.
 #pragma once

@@ -1,3 +1,7 @@
+// Room core: what all rooms speak of, and what they stand on. It uses no other room.
+// Beside this: config_error.h (set-up's errors), log.h (lines for people), os/ (files, signals,
+// processes), yaml/, json/, png/, algebra/ (decompositions), robust_statistics.h.
+//
 // The words of the house: frames, poses, wrenches and samples, with their units and axes, stated
 // once.
 //

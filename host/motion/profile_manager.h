@@ -1,3 +1,9 @@
+// Room motion: newtons -> what an input device shows.
+// In:  Sample with its wrench, N and N m; profiles; requests; which program has the focus.
+// Out: Sample::deflection, -1..1 on the HID axes (X right, Y toward the user, Z down), and buttons.
+//      At rest it is exactly zero. Formats and figures: docs/profiles.md.
+// Then: shaping.h (one frame's way), dead_zone.h, axis_filter.h, gestures.h, profile_config.h.
+//
 // What the person at the desk has chosen, and what it makes of newtons: the profile in force, its
 // shaping and gestures, and how it changes while the sensor runs.
 #pragma once

@@ -1,3 +1,8 @@
+// Room recording: all of a run in one SQLite file.
+// In:  frames as they came, tracks, samples, references, events (records.h); SI, ns.
+// Out: the same again, for replay and export. Tables, units and order: schema.h.
+// Then: schema.h, writer.h, records.h.
+//
 // The reading side of a recording. The file may be damaged, or anything else: every number is
 // checked before it is used.
 #pragma once

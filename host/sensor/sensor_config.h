@@ -1,3 +1,8 @@
+// Room sensor: one physical sensor, as files have it.
+// In:  sensor.yaml (mm, N/mm, px), what was measured beside it. Every key: docs/sensor-yaml.md.
+// Out: CameraModel, TargetDescription, ReferenceOptions, WrenchModel, shaping; SI, frames as in
+//      core/types.h. ConfigError with file, line, key and remedy for all that is wrong.
+//
 // sensor.yaml -> the plain structs that the rooms take. Every check and message is here.
 #pragma once
 

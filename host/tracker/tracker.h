@@ -1,3 +1,9 @@
+// Room tracker: pixels -> where the platform is.
+// In:  Frame (grey pixels); camera, tags and rest as sensor/ has read them.
+// Out: Track: displacement from rest (m, rad, along the camera's axes), its covariance, status, and
+//      why the target is not held. Formulas: docs/theory.md.
+// Then: photometric.h (the pose), acquire.h (without one), reference.h (rest), diagnostics.h.
+//
 // Frame -> displacement of the platform from rest.
 //
 // acquire   image -> tag corners, by OpenCV; runs only while the target is not held.

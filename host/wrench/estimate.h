@@ -1,3 +1,9 @@
+// Room wrench: where the platform is -> newtons.
+// In:  Track: displacement (m, rad, camera axes) with its covariance; a WrenchModel of sensor/.
+// Out: Sample: force and torque that the user applies, N and N m, with sigmas, about wrench_origin
+//      along wrench_frame. Formulas: docs/theory.md.
+// Then: zero.h (what reads hands off), spring_model.h, fit.h (known loads -> a model).
+//
 // Displacement -> wrench, with covariance and a range check.
 #pragma once
 

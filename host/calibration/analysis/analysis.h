@@ -1,3 +1,8 @@
+// Room calibration/analysis: how well readings predict a reference, on data held out.
+// In:  trials: times (s), features (m, rad), loads (N, N m); of calibrations, recordings, CSV.
+// Out: per axis R^2, RMSE (N, N m), lag (s), cross-talk, and why an axis is not calibrated.
+// Then: cross_validation.h, lag.h, metrics.h.
+//
 // Trials -> what a certificate says about an instrument.
 #pragma once
 

@@ -1,3 +1,8 @@
+// Room calibration/camera: pictures of a printed board -> the lens.
+// In:  corners of the board, px of the camera's picture; the board's squares, m.
+// Out: CameraModel: focal lengths and centre in px, OpenCV's distortion, with standard deviations.
+// Then: collector.h (takes views by itself), corners.h, coverage.h (what is still missing).
+//
 // Views of a board -> camera. Uses OpenCV inside.
 #pragma once
 

@@ -1,3 +1,8 @@
+// Room calibration/certificate: an analysis -> one page, as HTML, PDF and JSON.
+// In:  the figures of calibration/analysis, N and N m; facts about sensor, plan and program.
+// Out: three files that bear the same number, a hash of the contents.
+// Then: render.h, html.h, plots.h, files.h.
+//
 // What a certificate says: the figures of an analysis, and what they rest on.
 #pragma once
 

@@ -1,3 +1,8 @@
+// Room calibration/check: whether a sensor in use still measures what it did.
+// In:  means over seconds: tags (m, rad), light (grey levels), blur (px^2), loads (N).
+// Out: findings: fine or off, by how much, and what to do again.
+// Then: reference_monitor.h (a load cell that is there for good), focus_guide.h (turning the lens).
+//
 // Whether a calibrated sensor is still the one that was calibrated: numbers from a few seconds with
 // hands off, and from a known load, in; what is wrong, out.
 #pragma once

@@ -1,3 +1,8 @@
+// Room calibration/light: exposure, LED and gain, once, before a run.
+// In:  what a picture shows of the tags' white, grey levels 0..255; what can be set.
+// Out: exposure (us), LED (permille), gain to set next, until white is at 190 and nothing clips.
+// Then: reading.h (white of a picture), settle.h (the loop).
+//
 // How bright: exposure, LED and gain such that the white of the tags has a set level. Pure: it is
 // told what a picture showed, and says what to set next.
 #pragma once

@@ -1,3 +1,8 @@
+// Room calibration/print: tags and boards, true to scale.
+// In:  families, ids and sizes, mm.
+// Out: drawings in mm on A4 or letter, as PDF or SVG, with bars of 50.0 mm to measure.
+// Then: board_spec.h (a board in one word), drawing.h, vector_file.h.
+//
 // What `tagwrench tags` prints: sheets of tags, calibration boards and the published sheet, as
 // drawings.
 #pragma once

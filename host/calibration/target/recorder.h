@@ -1,3 +1,9 @@
+// Room calibration/target: the platform at rest and moved about -> where its tags sit.
+// In:  frames of a source; the camera as calibrated.
+// Out: each tag's pose in the platform frame (m, rad) with sigmas, the rest pose in the
+//      camera frame, the picture at rest, the shutter's read-out (s).
+// Then: adjust.h (the least squares), keyframes.h, verdict.h (what a recording cannot tell).
+//
 // From a source's frames to what a calibration of the target works on: first the platform at rest,
 // then in motion.
 #pragma once

@@ -1,3 +1,9 @@
+// Room calibration/wrench: known loads, step by step -> a calibrated wrench model.
+// In:  a plan (masses in kg, points in m of the platform frame), tracks, readings of references.
+// Out: observations (displacement m and rad, wrench N and N m, covariances) for wrench/fit.h, and
+//      what people are asked to do.
+// Then: plan.h, hold.h (when it is steady), load.h (what a step applies), record.h.
+//
 // Leads through a plan: asks for step after step, looks at frames and readings, accepts what is
 // steady and as it should be, and says what is not. Pure: it has no clock, no descriptor and no
 // terminal of its own, and never waits.

@@ -1,3 +1,8 @@
+// Room source/simulator: a sensor that is not there, with its print, light, lens, noise and hand.
+// In:  a scenario; time. Out: frames as a camera delivers them, and the truth (m, rad, N, N m).
+// It shares no mathematics with tracker and wrench: shared errors would cancel.
+// Then: simulator_source.h, renderer.h, mechanics.h, trajectory.h, bench.h.
+//
 // Everything that can be set about the simulated sensor. Scenario{} is the sensor of Ouyang & Howe
 // (ICRA 2020): a camera 21 mm below a roof with two hand-glued tags, on a platform that four
 // compression springs carry.

@@ -1,3 +1,9 @@
+// Room tools/camera_timing: what a camera really does.
+// In:  pictures of a light that flashes a known pattern, or of a screen that flips; their stamps.
+// Out: frame rate (Hz), latency, jitter, read-out, exposure (s), stale and missing pictures, each
+//      with its standard deviation. Formulas: docs/theory.md.
+// Then: camera_timing.h (the model), camera_timing_fit.h, screen_measurement.h, pattern_lamp.h.
+//
 // `tagwrench camera-timing` without its options: a camera, a lamp, and what is done with them.
 #pragma once
 

@@ -1,3 +1,8 @@
+// Room tools/doctor: what of this machine is ready.
+// In:  device nodes, groups, udev rules, cameras, serial ports, sockets of CAD programs.
+// Out: a line each: ok, not needed, or missing with what to do.
+// Then: access.h (permissions), cad_programs.h (spacenavd and ours), bridges.h (what runs).
+//
 // `tagwrench doctor`: what of this machine is ready, line by line, and what to do about the rest.
 #pragma once
 

@@ -1,3 +1,8 @@
+// Room tools/reading: wrench sensors and 6-DOF pucks on HID, ours and others; for `read`.
+// In:  HID reports; /sys for who is there.
+// Out: N and N m with sigmas, or counts of a puck; rate (Hz), jitter and latency (s).
+// Then: tagwrench_hid.h (the C library for other programs), six_axis.h, reading_stats.h.
+//
 // The loop of `tagwrench read`: one device, found, read, lost and found again.
 #pragma once
 

@@ -1,3 +1,9 @@
+// Room web/bridge: what pages see of a run, and what their requests become.
+// In:  samples (m, rad, N, N m), pictures, facts of a run; requests of pages.
+// Out: messages for web/server; zero, profiles, recordings, camera settings; jobs: commands of the
+//      program as child processes.
+// Then: run_facts.h, bridge_answers.cpp (every request), jobs.h, web_output.h.
+//
 // The pages' other end: what they see of runs, and what their requests become. It outlives the
 // runs: a job that needs the camera ends one, and another is built when the job is over.
 #pragma once

@@ -1,3 +1,8 @@
+// Room web/server: HTTP and WebSocket, one thread beside the loop.
+// In:  requests of browsers, all of it untrusted and bounded; messages of web/bridge to pages.
+// Out: built pages, files, samples (SI) and pictures; requests to a PageRequestHandler.
+// Then: the protocol in host/web/README.md.
+//
 // The bridge's pages: a small HTTP and WebSocket server with a thread of its own. It hands out the
 // built pages, what the live feed reads, and the bridge's messages; and it takes the pages'
 // requests.

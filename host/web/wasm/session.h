@@ -1,3 +1,8 @@
+// Room web/wasm: the tracker and the wrench, compiled for a page.
+// In:  grey pixels of a browser's camera; sensor.yaml and what was measured.
+// Out: displacement (m, rad), wrench (N, N m), sigmas and status, as the program has them.
+// Then: browser_core.cpp (what JavaScript calls), page.h (what it asks of the page).
+//
 // A sensor that a page has opened: frame -> displacement -> wrench, as the program's pipeline does
 // it.
 #pragma once
