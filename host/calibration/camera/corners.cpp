@@ -3,10 +3,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <optional>
 
 #include "host/core/algebra/decompositions.h"
+#include "host/core/algebra/levenberg_marquardt.h"
 #include "host/core/robust_statistics.h"
 
 namespace tagwrench {
@@ -22,7 +24,6 @@ constexpr double kWidestWindow_px = 14;   // a lens bends lines too little to se
 constexpr double kWindowFraction = 0.45;  // of the spacing, so that no other edge is in it
 constexpr double kWorstFit = 0.25;        // RMS over contrast
 constexpr double kWhiteTop = 252;         // grey levels
-constexpr int kIterations = 15;
 constexpr int kMinPixels = 25;
 
 /// The board near one corner, linearised: pixel = centre + axes * (board - corner), px per square.
@@ -159,63 +160,27 @@ struct Fit {
   double rms = 0;
 };
 
-double sum_of_squares(const std::vector<Pixel>& pixels, const Parameters& p, const Print& print) {
-  double sum = 0;
-  for (const Pixel& pixel : pixels) {
-    const double e = pixel.level - model(p, pixel.at, print).value;
-    sum += e * e;
-  }
-  return sum;
-}
-
-/// Levenberg-Marquardt from the neighbours' grid.
+/// From the neighbours' grid.
 std::optional<Fit> fit_corner(const std::vector<Pixel>& pixels, const Eigen::Vector2d& centre,
                               const LocalGrid& grid, const Print& print) {
   if (pixels.size() < kMinPixels) return std::nullopt;
+  const auto look = [&](const Parameters& at) {
+    FitSums<9> sums;
+    for (const Pixel& pixel : pixels) {
+      const Model m = model(at, pixel.at, print);
+      sums.add(m.jacobian, pixel.level - m.value);
+    }
+    return sums;
+  };
   const Eigen::Matrix2d to_board = grid.axes.inverse();
   Parameters p = Parameters::Zero();
   p.head<2>() = centre;
   p[2] = std::atan2(to_board(0, 1), to_board(0, 0));
   p[3] = std::atan2(to_board(1, 1), to_board(1, 0));
-  p[4] = 0;
-  // The linear parameters at once.
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d right = Eigen::Vector4d::Zero();
-  for (const Pixel& pixel : pixels) {
-    Parameters unit = p;
-    unit[5] = 1;
-    const Eigen::Vector4d row = model(unit, pixel.at, print).jacobian.tail<4>();
-    normal += row * row.transpose();
-    right += row * pixel.level;
-  }
-  p.tail<4>() = Ldlt<Eigen::Dynamic>(normal).solve(right);
-
-  double cost = sum_of_squares(pixels, p, print);
-  double damping = 1e-3;
-  for (int i = 0; i < kIterations; ++i) {
-    Eigen::Matrix<double, 9, 9> h = Eigen::Matrix<double, 9, 9>::Zero();
-    Parameters g = Parameters::Zero();
-    for (const Pixel& pixel : pixels) {
-      const Model m = model(p, pixel.at, print);
-      h.selfadjointView<Eigen::Lower>().rankUpdate(m.jacobian);
-      g += m.jacobian * (pixel.level - m.value);
-    }
-    const Parameters diagonal = h.diagonal();
-    h.diagonal() += damping * diagonal + Parameters::Constant(1e-9);
-    const Parameters step = Ldlt<Eigen::Dynamic>(h).solve(g);
-    const double tried = sum_of_squares(pixels, p + step, print);
-    if (!(tried < cost)) {
-      damping *= 10;
-      if (damping > 1e6) break;
-      continue;
-    }
-    p += step;
-    cost = tried;
-    damping = std::max(1e-9, 0.1 * damping);
-    if (step.head<2>().norm() < 1e-4) break;
-  }
+  p += look(p).step(0, 4);  // the linear parameters at once
+  const double squares = levenberg_marquardt(p, look, std::plus<Parameters>()).squares;
   if (!p.allFinite()) return std::nullopt;
-  return Fit{p, std::sqrt(cost / static_cast<double>(pixels.size()))};
+  return Fit{p, std::sqrt(squares / static_cast<double>(pixels.size()))};
 }
 
 bool inside(const ImageView& image, const Eigen::Vector2d& pixel, double margin_px) {
