@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/core/algebra/decompositions.h"
+#include "host/core/algebra/levenberg_marquardt.h"
 
 namespace tagwrench {
 namespace {
@@ -27,7 +27,6 @@ constexpr double kClear = 2;           // blurs between that and the paper's end
 /// Corners (8), logarithm of the blur, gain, its slopes to the right and down, offset.
 constexpr int kBlur = 8, kGain = 9, kOffset = 12, kUnknowns = 13;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
-using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
 /// Pixels -> cells, 0..cells to the right and down.
 Eigen::Matrix3d cells_from_pixels(const Unknowns& x, int cells) {
@@ -76,13 +75,6 @@ struct Seen {
   }
 };
 
-struct Sums {
-  Normal normal = Normal::Zero();
-  Unknowns slope = Unknowns::Zero();
-  double squares = 0;
-  int pixels = 0;
-};
-
 class TagFit {
  public:
   TagFit(const ImageView& image, const TagPattern& pattern) : image_(image), pattern_(pattern) {}
@@ -113,23 +105,22 @@ class TagFit {
         const Eigen::Vector2d at = (to_cells * Eigen::Vector3d(column, row, 1)).hnormalized();
         if (at.minCoeff() < -margin || at.maxCoeff() > n + margin) continue;
         const int level = image_.pixels[static_cast<std::ptrdiff_t>(row) * image_.stride + column];
-        pixels_.push_back(
-            {static_cast<double>(column), static_cast<double>(row), static_cast<double>(level)});
-        white_ += level >= kWhite ? 1 : 0;
+        if (level >= kWhite) {
+          ++white_;
+        } else {
+          pixels_.emplace_back(column, row, level);
+        }
       }
     }
   }
 
-  double white_fraction() const {
-    return pixels_.empty() ? 0 : static_cast<double>(white_) / static_cast<double>(pixels_.size());
-  }
+  double pixels() const { return static_cast<double>(pixels_.size()); }
+  double white_fraction() const { return white_ == 0 ? 0 : white_ / (white_ + pixels()); }
 
-  Sums sums(const Unknowns& x) {
+  FitSums<kUnknowns> sums(const Unknowns& x) {
     const Eigen::Matrix3d to_cells = cells_from_pixels(x, pattern_.cells);
-    Sums out;
-    for (const Eigen::Vector3d& pixel : pixels_) {
-      if (pixel.z() < kWhite) add(x, to_cells, pixel, out);
-    }
+    FitSums<kUnknowns> out;
+    for (const Eigen::Vector3d& pixel : pixels_) add(x, to_cells, pixel, out);
     return out;
   }
 
@@ -159,7 +150,7 @@ class TagFit {
   }
 
   void add(const Unknowns& x, const Eigen::Matrix3d& to_cells, const Eigen::Vector3d& pixel,
-           Sums& out) {
+           FitSums<kUnknowns>& out) {
     const Eigen::Vector3d h = to_cells * Eigen::Vector3d(pixel.x(), pixel.y(), 1);
     const Eigen::Vector2d at = h.hnormalized();
     const Eigen::Matrix2d by_pixel =
@@ -184,29 +175,15 @@ class TagFit {
     row.segment<3>(kGain) << tag.level, tag.level * (right - 0.5), tag.level * (below - 0.5);
     row[kOffset] = 1;
     const double residual = pixel.z() - gain * tag.level - x[kOffset];
-    out.normal.noalias() += row * row.transpose();
-    out.slope += residual * row;
-    out.squares += residual * residual;
-    ++out.pixels;
+    out.add(row, residual);
   }
 
   const ImageView& image_;
   const TagPattern& pattern_;
-  std::vector<Eigen::Vector3d> pixels_;  ///< column, row, level
-  int white_ = 0;
+  std::vector<Eigen::Vector3d> pixels_;  ///< column, row, level; none that is white
+  double white_ = 0;
   Seen across_, down_;
 };
-
-/// Solves for those unknowns from `first` on, the others as they are.
-Unknowns step(const Sums& sums, double damping, int first) {
-  const int count = kUnknowns - first;
-  Eigen::MatrixXd normal = sums.normal.bottomRightCorner(count, count);
-  normal.diagonal() *= 1 + damping;
-  normal.diagonal().array() += 1e-9 * normal.diagonal().maxCoeff();
-  Unknowns out = Unknowns::Zero();
-  out.tail(count) = Ldlt<Eigen::Dynamic>(normal).solve(sums.slope.tail(count));
-  return out;
-}
 
 /// The best of some blurs, with the light that goes with it.
 Unknowns start(TagFit& fit, const SquareCorners& corners) {
@@ -216,36 +193,24 @@ Unknowns start(TagFit& fit, const SquareCorners& corners) {
     Unknowns x = Unknowns::Zero();
     for (int i = 0; i < 4; ++i) x.segment<2>(2 * i) = corners[static_cast<std::size_t>(i)];
     x[kBlur] = std::log(blur);
-    x += step(fit.sums(x), 0, kGain);
+    x += fit.sums(x).step(0, kUnknowns - kGain);
     const double squares = fit.sums(x).squares;
-    if (squares >= least) continue;
+    if (!(squares < least)) continue;
     least = squares;
     best = x;
   }
   return best;
 }
 
-/// Levenberg and Marquardt.
-Unknowns converge(TagFit& fit, Unknowns x) {
-  constexpr int kSteps = 30;
-  constexpr double kEnough = 1e-5;  // of the squares
-  double damping = 1e-3;
-  Sums here = fit.sums(x);
-  for (int i = 0; i < kSteps && damping < 1e6; ++i) {
-    Unknowns there = x + step(here, damping, 0);
-    there[kBlur] = std::clamp(there[kBlur], 0.5 * std::log(kPixelVariance), std::log(kMaxBlur_px));
-    const Sums sums = fit.sums(there);
-    if (!(sums.squares < here.squares)) {
-      damping *= 10;
-      continue;
-    }
-    const bool done = here.squares - sums.squares < kEnough * here.squares;
-    x = there;
-    here = sums;
-    damping *= 0.1;
-    if (done) break;
-  }
-  return x;
+/// The squares that are left.
+double converge(TagFit& fit, Unknowns& x) {
+  const auto moved = [](const Unknowns& from, const Unknowns& step) {
+    Unknowns to = from + step;
+    to[kBlur] = std::clamp(to[kBlur], 0.5 * std::log(kPixelVariance), std::log(kMaxBlur_px));
+    return to;
+  };
+  const auto look = [&](const Unknowns& at) { return fit.sums(at); };
+  return levenberg_marquardt(x, look, moved).squares;
 }
 
 /// Of the shortest side, px.
@@ -270,19 +235,19 @@ std::optional<EdgeWidth> edge_width(const ImageView& image, const TagPattern& pa
   Unknowns corners = Unknowns::Zero();
   for (int i = 0; i < 4; ++i) corners.segment<2>(2 * i) = corners_px[static_cast<std::size_t>(i)];
   fit.choose(corners, margin(1));
-  Unknowns x = converge(fit, start(fit, corners_px));
+  Unknowns x = start(fit, corners_px);
+  converge(fit, x);
   if (!x.allFinite()) return std::nullopt;
   // What lies beyond the paper is not white: kept away from, once the blur is known.
   fit.choose(x, margin(std::exp(x[kBlur])));
-  x = converge(fit, x);
-  const Sums sums = fit.sums(x);
-  if (!x.allFinite() || sums.pixels < 10 * kUnknowns) return std::nullopt;
+  const double squares = converge(fit, x);
+  if (!x.allFinite() || fit.pixels() < 10 * kUnknowns) return std::nullopt;
   EdgeWidth out;
   const double total = std::exp(2 * x[kBlur]);
   out.blur_px = std::sqrt(std::max(total - kPixelVariance, kMinVariance));
   out.contrast = x[kGain];
   out.white_fraction = fit.white_fraction();
-  out.residual_fraction = std::sqrt(sums.squares / sums.pixels) / std::abs(out.contrast);
+  out.residual_fraction = std::sqrt(squares / fit.pixels()) / std::abs(out.contrast);
   double shift = 0;
   for (int i = 0; i < 4; ++i) {
     const auto k = static_cast<std::size_t>(i);
