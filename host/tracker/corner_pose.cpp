@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "host/core/algebra/decompositions.h"
+#include "host/core/algebra/levenberg_marquardt.h"
 #include "host/tracker/projection.h"
 #include "host/tracker/rotation.h"
 
@@ -11,8 +11,7 @@ namespace {
 
 constexpr double kReachRotation = 0.6;  ///< rad
 constexpr double kReachDistanceFraction =
-    0.5;  ///< translation, as a part of the distance from the lens at rest
-constexpr int kIterations = 12;
+    0.5;                           ///< translation, as a part of the distance from the lens at rest
 constexpr double kUnfit_px = 8.0;  ///< RMS beyond which corners and target do not belong together
 
 struct CornerPair {
@@ -20,37 +19,25 @@ struct CornerPair {
   Eigen::Vector2d pixel;
 };
 
-struct CornerFit {
-  Eigen::Isometry3d pose;
-  double rms_px;
-};
-
-std::optional<CornerFit> fit_corners(const CameraModel& camera,
-                                     const std::vector<CornerPair>& pairs, Eigen::Isometry3d pose) {
-  double rms_px = 0;
-  for (int i = 0; i <= kIterations; ++i) {
-    Matrix6 normal = Matrix6::Zero();
-    Vector6 right = Vector6::Zero();
-    double squares = 0;
+/// Moves `pose` to the least squares near it; their RMS, px, infinite where a point is behind the
+/// camera.
+double fit_corners(const CameraModel& camera, const std::vector<CornerPair>& pairs,
+                   Eigen::Isometry3d& pose) {
+  const auto look = [&](const Eigen::Isometry3d& at) {
+    FitSums<6> sums;
     for (const CornerPair& pair : pairs) {
-      const Eigen::Vector3d arm = pose.linear() * pair.p_platform;
-      const ProjectedPoint projected = project(camera, arm + pose.translation());
-      if (!projected.valid) return std::nullopt;
+      const Eigen::Vector3d arm = at.linear() * pair.p_platform;
+      const ProjectedPoint projected = project(camera, arm + at.translation());
+      if (!projected.valid) sums.squares = std::numeric_limits<double>::infinity();
       Eigen::Matrix<double, 2, 6> rows;
       rows << projected.jacobian, -projected.jacobian * cross_matrix(arm);
       const Eigen::Vector2d error = pair.pixel - projected.pixel;
-      normal += rows.transpose() * rows;
-      right += rows.transpose() * error;
-      squares += error.squaredNorm();
+      for (int i = 0; i < 2; ++i) sums.add(rows.row(i).transpose(), error[i]);
     }
-    rms_px = std::sqrt(squares / (2.0 * static_cast<double>(pairs.size())));
-    if (i == kIterations) break;
-    const Vector6 step = Ldlt<6>(normal).solve(right);
-    if (!step.allFinite()) return std::nullopt;
-    pose = moved(pose, step);
-  }
-  if (!pose.matrix().allFinite()) return std::nullopt;
-  return CornerFit{pose, rms_px};
+    return sums;
+  };
+  const double squares = levenberg_marquardt(pose, look, moved).squares;
+  return std::sqrt(squares / (2.0 * static_cast<double>(pairs.size())));
 }
 
 }  // namespace
@@ -80,12 +67,11 @@ std::optional<Eigen::Isometry3d> pose_from_corners(
   if (pairs.empty()) return std::nullopt;
   std::optional<Eigen::Isometry3d> best;
   double best_px = kUnfit_px;
-  for (const Eigen::Isometry3d& start : starts) {
-    const std::optional<CornerFit> fit = fit_corners(camera, pairs, start);
-    if (!fit || fit->rms_px >= best_px || !within_reach(rest_camera_T_platform, fit->pose))
-      continue;
-    best = fit->pose;
-    best_px = fit->rms_px;
+  for (Eigen::Isometry3d& pose : starts) {
+    const double rms_px = fit_corners(camera, pairs, pose);
+    if (!(rms_px < best_px) || !within_reach(rest_camera_T_platform, pose)) continue;
+    best = pose;
+    best_px = rms_px;
   }
   return best;
 }
