@@ -7,6 +7,8 @@
 namespace tagwrench {
 namespace {
 
+using Places = Eigen::Matrix<Eigen::Index, 6, 1>;
+
 constexpr double kLengthUnit = 5e-3;  // m
 constexpr double kSpreadUnit = 1e-4;  // m
 constexpr double kReadoutUnit = 0.1;  // s
@@ -35,55 +37,33 @@ void TargetNormal::add(const EdgeEquation& equation) {
   const double w = equation.weight;
   const Eigen::Index tag = moving_ + 6 * equation.tag;
   const Eigen::Index camera = moving_ + readout_index();
-  const Vector6 by_tag = equation.by_tag.cwiseProduct(units_.segment<6>(tag));
-  const Eigen::Vector2d by_camera(equation.by_readout * units_[camera],
-                                  equation.by_focal * units_[camera + 1]);
-
-  normal_.block<6, 6>(tag, tag) += w * by_tag * by_tag.transpose();
-  normal_.block<2, 6>(camera, tag) += w * by_camera * by_tag.transpose();
-  normal_.block<2, 2>(camera, camera) += w * by_camera * by_camera.transpose();
-  right_.segment<6>(tag) += w * equation.offset * by_tag;
-  right_.segment<2>(camera) += w * equation.offset * by_camera;
-
-  auto column = coupling_.col(equation.point);
+  const bool moves = equation.frame >= 0;
+  const Eigen::Index frame = moves ? 6 * equation.frame : 0;
+  Eigen::Matrix<Eigen::Index, 14, 1> at;
+  at << Places::LinSpaced(frame, frame + 5), Places::LinSpaced(tag, tag + 5), camera, camera + 1;
+  Eigen::Matrix<double, 14, 1> by;
+  by << (moves ? 1 : 0) * equation.by_frame, equation.by_tag, equation.by_readout,
+      equation.by_focal;
+  by.array() *= units_(at).array();
+  normal_(at, at) += w * by * by.transpose();
+  right_(at) += w * equation.offset * by;
   const double v = w * equation.by_normal;
-  column.segment<6>(tag) += v * by_tag;
-  column.segment<2>(camera) += v * by_camera;
+  coupling_.col(equation.point)(at) += v * by;
   pivot_[equation.point] += v * equation.by_normal;
   pull_[equation.point] += v * equation.offset;
-  if (equation.frame < 0) return;
-
-  const Eigen::Index frame = 6 * equation.frame;
-  const Vector6 by_frame = equation.by_frame.cwiseProduct(units_.segment<6>(frame));
-  normal_.block<6, 6>(frame, frame) += w * by_frame * by_frame.transpose();
-  normal_.block<6, 6>(tag, frame) += w * by_tag * by_frame.transpose();
-  normal_.block<2, 6>(camera, frame) += w * by_camera * by_frame.transpose();
-  right_.segment<6>(frame) += w * equation.offset * by_frame;
-  column.segment<6>(frame) += v * by_frame;
 }
 
 void TargetNormal::add_print(Eigen::Index point, int tag, double offset, double weight) {
   const Eigen::Index spread = moving_ + spread_index(tag);
-  const double unit = units_[spread];
-  normal_(spread, spread) += weight * unit * unit;
-  right_[spread] -= weight * offset * unit;
-  coupling_(spread, point) -= weight * unit;
+  add_prior(spread, -offset, weight);
+  coupling_(spread, point) -= weight * units_[spread];
   pivot_[point] += weight;
   pull_[point] += weight * offset;
 }
 
-void TargetNormal::add_spread(int tag, double offset, double weight) {
-  const Eigen::Index at = moving_ + spread_index(tag);
-  const double unit = units_[at];
-  normal_(at, at) += weight * unit * unit;
-  right_[at] += weight * offset * unit;
-}
-
-void TargetNormal::add_readout(double offset, double weight) {
-  const Eigen::Index at = moving_ + readout_index();
-  const double unit = units_[at];
-  normal_(at, at) += weight * unit * unit;
-  right_[at] += weight * offset * unit;
+void TargetNormal::add_prior(Eigen::Index at, double offset, double weight) {
+  normal_(at, at) += weight * units_[at] * units_[at];
+  right_[at] += weight * offset * units_[at];
 }
 
 bool TargetNormal::reduce() {

@@ -32,9 +32,13 @@ class TargetNormal {
   /// shift - spread of the tag = offset + noise
   void add_print(Eigen::Index point, int tag, double offset, double weight);
   /// spread of the tag = offset + noise
-  void add_spread(int tag, double offset, double weight);
+  void add_spread(int tag, double offset, double weight) {
+    add_prior(moving_ + spread_index(tag), offset, weight);
+  }
   /// read-out time = offset + noise
-  void add_readout(double offset, double weight);
+  void add_readout(double offset, double weight) {
+    add_prior(moving_ + readout_index(), offset, weight);
+  }
 
   /// Eliminates points and keyframes; false if the equations do not determine the keyframes. Once.
   bool reduce();
@@ -56,6 +60,8 @@ class TargetNormal {
   Eigen::Index focal_index() const noexcept { return shared_ - 1; }
 
  private:
+  void add_prior(Eigen::Index at, double offset, double weight);
+
   Eigen::Index tags_;
   Eigen::Index moving_;  // unknowns of the keyframes
   Eigen::Index shared_;
