@@ -6,6 +6,7 @@
 #include "host/tracker/edge_measure.h"
 #include "host/tracker/projection.h"
 #include "host/tracker/rotation.h"
+#include "tests/support/differences.h"
 
 namespace tagwrench {
 namespace {
@@ -21,13 +22,10 @@ TEST(Projection, JacobianIsTheDerivative) {
   const Eigen::Vector3d p(0.003, -0.002, 0.02);
   const ProjectedPoint at = project(camera, p);
   ASSERT_TRUE(at.valid);
-  for (int axis = 0; axis < 3; ++axis) {
-    Eigen::Vector3d step = Eigen::Vector3d::Zero();
-    step[axis] = 1e-7;
-    const Eigen::Vector2d slope =
-        (project(camera, p + step).pixel - project(camera, p - step).pixel) / 2e-7;
-    EXPECT_LT((slope - at.jacobian.col(axis)).norm(), 1e-6 * at.jacobian.norm()) << axis;
-  }
+  const Eigen::MatrixXd slopes = test::differences<3>(
+      [&](const Eigen::Vector3d& step) { return project(camera, p + step).pixel; }, 1e-7);
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_LT((slopes - at.jacobian).col(axis).norm(), 1e-6 * at.jacobian.norm()) << axis;
 }
 
 TEST(Projection, RefusesWhatIsBehindTheLens) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host/wrench/features.h"
+#include "tests/support/differences.h"
 #include "tests/unit/wrench/known_loads.h"
 
 namespace tagwrench {
@@ -159,13 +160,12 @@ TEST(Features, QuadraticHasTheDerivativesOfItsProducts) {
   quadratic.update(d, 0);
   const FeatureVector at = quadratic.values();
   const FeatureJacobian slope = quadratic.jacobian();
-  constexpr double kStep = 1e-6;
-  for (int j = 0; j < 6; ++j) {
-    quadratic.update(d + kStep * Vector6::Unit(j), 0);
-    const FeatureVector up = quadratic.values();
-    quadratic.update(d - kStep * Vector6::Unit(j), 0);
-    EXPECT_TRUE(((up - quadratic.values()) / (2 * kStep)).isApprox(slope.col(j), 1e-6)) << j;
-  }
+  const auto moved = [&](const Vector6& step) {
+    quadratic.update(d + step, 0);
+    return quadratic.values();
+  };
+  const Eigen::MatrixXd slopes = test::differences<6>(moved, 1e-6);
+  for (int j = 0; j < 6; ++j) EXPECT_TRUE(slopes.col(j).isApprox(slope.col(j), 1e-6)) << j;
   EXPECT_EQ(at[6], d[0] * d[0]);
   EXPECT_EQ(at[26], d[5] * d[5]);
 }

@@ -9,6 +9,7 @@
 #include "host/calibration/target/normal.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/projection.h"
+#include "tests/support/differences.h"
 #include "tests/unit/calibration/target/target_record.h"
 
 namespace tagwrench {
@@ -87,18 +88,18 @@ TEST_F(Derivatives, AgreeWithDifferencesOfTheProjection) {
 
     const EdgeDerivatives by =
         edge_derivatives(camera, measured_[i], frame_pose_, rest_pose_, camera_T_tag_, point);
+    const auto frame_moved = [&](const Vector6& step) {
+      return pixel(camera, moved(frame_pose_, step), camera_T_tag_, point);
+    };
+    const auto tag_moved = [&](const Vector6& step) {
+      return pixel(camera, frame_pose_, moved(camera_T_tag_, step), point);
+    };
+    const Vector6 by_frame = test::differences<6>(frame_moved, kStep).transpose() * n;
+    const Vector6 by_tag = test::differences<6>(tag_moved, kStep).transpose() * n;
     for (int axis = 0; axis < 6; ++axis) {
-      const Vector6 step = kStep * Vector6::Unit(axis);
-      const double by_frame =
-          n.dot(pixel(camera, moved(frame_pose_, step), camera_T_tag_, point) -
-                pixel(camera, moved(frame_pose_, -step), camera_T_tag_, point)) /
-          (2 * kStep);
-      const double by_tag = n.dot(pixel(camera, frame_pose_, moved(camera_T_tag_, step), point) -
-                                  pixel(camera, frame_pose_, moved(camera_T_tag_, -step), point)) /
-                            (2 * kStep);
       const double tolerance = axis < 3 ? 0.5 : 2e-3;  // px/m of 4e4, px/rad of 100
-      EXPECT_NEAR(by.frame[axis], by_frame, tolerance) << "point " << i << " axis " << axis;
-      EXPECT_NEAR(by.tag[axis], by_tag, tolerance) << "point " << i << " axis " << axis;
+      EXPECT_NEAR(by.frame[axis], by_frame[axis], tolerance) << "point " << i << " axis " << axis;
+      EXPECT_NEAR(by.tag[axis], by_tag[axis], tolerance) << "point " << i << " axis " << axis;
     }
     const double by_normal =
         n.dot(at(point + kStep * white) - at(point - kStep * white)) / (2 * kStep);
