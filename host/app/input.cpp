@@ -3,94 +3,14 @@
 #include <fmt/format.h>
 #include <poll.h>
 
-#include <filesystem>
-#include <utility>
-
-#include "host/app/recording_sensor.h"
-#include "host/app/scenario_config.h"
+#include "host/app/sources.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/recording/reader.h"
-#include "host/source/images.h"
-#include "host/source/recording.h"
 #include "host/source/simulator/folder_export.h"
-#include "host/source/simulator/simulator_source.h"
-#include "host/source/v4l2_source.h"
 #include "host/tracker/appearance_check.h"
 
 namespace tagwrench {
-namespace {
-
-/// The sensor that was asked for.
-bool given_sensor(const InputOptions& options, Input& input) {
-  if (options.sensor.empty()) return false;
-  input.sensor_name = options.sensor;
-  input.sensor = load_sensor(options.sensor, options.calibration);
-  return true;
-}
-
-/// One that has no file.
-void built_in_sensor(std::string text, const char* name, Input& input) {
-  input.sensor = parse_sensor(text, name);
-  input.sensor_name = name;
-  input.sensor_text = std::move(text);
-}
-
-void paper_sensor(Input& input) {
-  built_in_sensor(paper_sensor_yaml(), "the built-in sensor", input);
-}
-
-Input open_simulator(const InputOptions& options, const std::string& scenario_file) {
-  const sim::Scenario scenario =
-      scenario_file.empty() ? sim::Scenario{} : load_scenario(scenario_file);
-  Input input;
-  if (!given_sensor(options, input))
-    built_in_sensor(sim::sensor_yaml(scenario), "the simulated sensor", input);
-  input.source = std::make_unique<SimulatorSource>(scenario, !options.fast);
-  return input;
-}
-
-Input open_images(const InputOptions& options, const std::string& folder) {
-  const std::filesystem::path beside = std::filesystem::path(folder) / "sensor.yaml";
-  Input input;
-  std::error_code unreadable;  // the source itself will complain
-  if (!given_sensor(options, input)) {
-    if (std::filesystem::exists(beside, unreadable)) {
-      input.sensor_name = beside;
-      input.sensor = load_sensor(beside, options.calibration);
-    } else {
-      paper_sensor(input);
-    }
-  }
-  input.source = std::make_unique<ImagesSource>(folder, options.fast);
-  return input;
-}
-
-Input open_recording(const InputOptions& options, const std::string& file) {
-  auto recording = std::make_unique<record::RecordingReader>(file);
-  Input input;
-  if (!given_sensor(options, input)) {
-    input.recorded = recording->head();
-    input.sensor = recorded_sensor(recording->head(), file, options.calibration);
-  }
-  input.source = std::make_unique<RecordingSource>(std::move(recording), options.fast);
-  return input;
-}
-
-Input open_camera(const InputOptions& options, const std::string& argument) {
-  Input input;
-  if (!given_sensor(options, input)) paper_sensor(input);
-  V4l2Options camera = parse_v4l2_spec(argument);
-  camera.preferred_width = input.sensor.camera.width_px;
-  camera.preferred_height = input.sensor.camera.height_px;
-  const UniqueFd caught = termination_fd();  // from here on the camera's settings must be put back
-  input.source = std::make_unique<V4l2Source>(camera);
-  input.camera = true;
-  return input;
-}
-
-}  // namespace
 
 Spec split_spec(const std::string& spec) {
   const std::size_t colon = spec.find(':');
@@ -100,25 +20,11 @@ Spec split_spec(const std::string& spec) {
 
 std::string paper_sensor_yaml() { return sim::sensor_yaml(sim::Scenario{}); }
 
-namespace {
-
-Input open_source(const InputOptions& options) {
-  const Spec spec = split_spec(options.source);
-  if (spec.kind == "sim") return open_simulator(options, spec.argument);
-  if (spec.kind == "images" && !spec.argument.empty()) return open_images(options, spec.argument);
-  if (spec.kind == "v4l2" && !spec.argument.empty()) return open_camera(options, spec.argument);
-  if (spec.kind == "recording" && !spec.argument.empty())
-    return open_recording(options, spec.argument);
-  throw ConfigError(fmt::format(
-      "--source {}: not a source; use sim, sim:SCENARIO.yaml, v4l2:/dev/videoN, images:DIR or "
-      "recording:FILE",
-      options.source));
-}
-
-}  // namespace
-
 Input open_input(const InputOptions& options) {
-  Input input = open_source(options);
+  const SourceSpec spec = parse_source(options.source);
+  Input input = spec.row->open(options, spec.argument);
+  input.kind = spec.row->kind;
+  input.argument = spec.argument;
   input.spec = options.source;
   return input;
 }

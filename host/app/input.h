@@ -13,6 +13,8 @@
 
 namespace tagwrench {
 
+enum class SourceKind : std::uint8_t { simulator, camera, images, recording };
+
 struct Spec {
   std::string kind;
   std::string argument;
@@ -32,8 +34,9 @@ struct InputOptions {
 struct Input {
   SensorConfig sensor;
   std::unique_ptr<FrameSource> source;
-  std::string spec;         ///< SRC that it was opened with
-  bool camera = false;      ///< a real one, that sees what an LED lights
+  std::string spec;  ///< SRC that it was opened with
+  SourceKind kind = SourceKind::simulator;
+  std::string argument;     ///< of SRC, behind the colon
   std::string sensor_name;  ///< path of the sensor.yaml that was loaded, or what stands for it
   std::string sensor_text;  ///< of a sensor that has no file
   std::optional<record::Head> recorded;  ///< of a recording, whose sensor is its own

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <utility>
 
 #include "host/core/log.h"
 #include "host/tracker/diagnostic_text.h"
@@ -20,19 +21,19 @@ constexpr Duration kGrace = milliseconds(40);
 constexpr Duration kWatchdogGrace = milliseconds(60);
 // A camera that slows down in dim light is late, not lost; slower than this it is lost.
 constexpr Duration kSlowestInterval = milliseconds(250);
-constexpr std::size_t kMaxOutputs = 14;
-constexpr std::size_t kOthers = 3;  // source, stop, desk
+constexpr std::size_t kOthers = 3;  // source, stop, profiles
 
 }  // namespace
 
 Pipeline::Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench,
-                   ProfileManager& profiles, std::vector<std::unique_ptr<Output>>& outputs,
-                   Watchdog& watchdog, int stop_fd, FrameLog* log)
+                   ProfileManager& profiles, std::vector<Output*> outputs, Watchdog& watchdog,
+                   int stop_fd, FrameLog* log)
     : source_(source),
       tracker_(tracker),
       wrench_(wrench),
       profiles_(profiles),
-      outputs_(outputs),
+      outputs_(std::move(outputs)),
+      polled_(outputs_.size() + kOthers),
       watchdog_(watchdog),
       stop_fd_(stop_fd),
       log_(log),
@@ -93,13 +94,13 @@ TimePoint Pipeline::missing_at() const noexcept {
 
 /// Blocks until the source, an output's client or a stop wants attention, or the time has come.
 void Pipeline::wait(TimePoint until) noexcept {
-  std::array<pollfd, kMaxOutputs + kOthers> fds{};
+  std::vector<pollfd>& fds = polled_;
   const int source_fd = source_.poll_fd();
   fds[0] = {source_fd, POLLIN, 0};
   fds[1] = {stop_fd_, POLLIN, 0};
   fds[2] = {profiles_.poll_fd(), POLLIN, 0};
-  const std::size_t outputs = std::min(outputs_.size(), kMaxOutputs);
-  for (std::size_t i = 0; i < outputs; ++i) fds[i + kOthers] = {outputs_[i]->poll_fd(), POLLIN, 0};
+  for (std::size_t i = 0; i < outputs_.size(); ++i)
+    fds[i + kOthers] = {outputs_[i]->poll_fd(), POLLIN, 0};
 
   timespec timeout{};
   const bool endless = until == TimePoint::max() && source_fd >= 0;
@@ -109,14 +110,14 @@ void Pipeline::wait(TimePoint until) noexcept {
     timeout.tv_sec = left.count() / 1'000'000'000;
     timeout.tv_nsec = left.count() % 1'000'000'000;
   }
-  const int ready = ::ppoll(fds.data(), outputs + kOthers, endless ? nullptr : &timeout, nullptr);
+  const int ready = ::ppoll(fds.data(), fds.size(), endless ? nullptr : &timeout, nullptr);
   source_ready_ = source_fd < 0 || (ready > 0 && fds[0].revents != 0);
   if (ready <= 0) return;
   if (fds[1].revents != 0) end_ = RunReport::End::interrupted;
   if (fds[2].revents != 0) profiles_.service();
   if (const std::string status_line = profiles_.take_status_line(); !status_line.empty())
     say(status_line);
-  for (std::size_t i = 0; i < outputs; ++i) {
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
     if (fds[i + kOthers].revents == 0) continue;
     if (const std::string_view status_line = outputs_[i]->service(); !status_line.empty())
       say(status_line);
@@ -168,7 +169,7 @@ void Pipeline::send(Sample& sample, std::optional<Duration> recorded_latency) no
   sample.output_time = recorded_latency ? sample.latency_origin + *recorded_latency
                                         : std::chrono::steady_clock::now();
   if (carries_numbers(sample.status)) guard();
-  for (const std::unique_ptr<Output>& output : outputs_) note(output->send(sample), *output);
+  for (Output* output : outputs_) note(output->send(sample), *output);
   last_sample_ = sample;
   neutral_ = !carries_numbers(sample.status);
   const bool steady = profiles_.period() > Duration::zero() && source_.poll_fd() >= 0;
@@ -182,7 +183,7 @@ void Pipeline::send(Sample& sample, std::optional<Duration> recorded_latency) no
 }
 
 void Pipeline::move(const Sample& sample) noexcept {
-  for (const std::unique_ptr<Output>& output : outputs_) note(output->move(sample), *output);
+  for (Output* output : outputs_) note(output->move(sample), *output);
 }
 
 /// Between frames devices move on, to where the motion is by now.
@@ -204,7 +205,7 @@ void Pipeline::note(SendStatus status, const Output& output) noexcept {
 
 std::uint32_t Pipeline::pressed() const noexcept {
   std::uint32_t buttons = 0;
-  for (const std::unique_ptr<Output>& output : outputs_) buttons |= output->pressed();
+  for (Output* output : outputs_) buttons |= output->pressed();
   return buttons;
 }
 
@@ -235,7 +236,7 @@ void Pipeline::send_neutral(std::optional<Duration> recorded_latency) noexcept {
 void Pipeline::say_diagnostic(const Track& track) noexcept {
   if (track.status == Status::ok && trouble_shown_) {
     trouble_shown_ = false;
-    for (const std::unique_ptr<Output>& output : outputs_) output->notice({});
+    for (Output* output : outputs_) output->notice({});
   }
   // The tracker itself sees to it that troubles are not said too often.
   const bool trouble = is_trouble(track.diagnostic);
@@ -255,7 +256,7 @@ void Pipeline::say_diagnostic(const Track& track) noexcept {
 
 void Pipeline::say(std::string_view line) noexcept {
   bool shown = false;
-  for (const std::unique_ptr<Output>& output : outputs_) shown = output->notice(line) || shown;
+  for (Output* output : outputs_) shown = output->notice(line) || shown;
   if (!shown) log_info(line);
 }
 

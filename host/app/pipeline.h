@@ -7,9 +7,10 @@
 // that drives it.
 #pragma once
 
+#include <poll.h>
+
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -49,8 +50,7 @@ class Pipeline {
   /// Borrows everything; `stop_fd` becomes readable when the run shall end (of termination_fd()),
   /// -1 for never. `log` is told of every frame; there may be none.
   Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, ProfileManager& profiles,
-           std::vector<std::unique_ptr<Output>>& outputs, Watchdog& watchdog, int stop_fd,
-           FrameLog* log = nullptr);
+           std::vector<Output*> outputs, Watchdog& watchdog, int stop_fd, FrameLog* log = nullptr);
 
   /// Takes the zero off every sample; without it the wrench stays as it is estimated. Borrowed.
   void follow_zero(ZeroTracking& zero) noexcept { zero_ = &zero; }
@@ -83,7 +83,8 @@ class Pipeline {
   Tracker& tracker_;
   WrenchEstimator& wrench_;
   ProfileManager& profiles_;
-  std::vector<std::unique_ptr<Output>>& outputs_;
+  std::vector<Output*> outputs_;
+  std::vector<pollfd> polled_;  ///< source, stop, profiles, then each output
   Watchdog& watchdog_;
   int stop_fd_;
   FrameLog* log_;

@@ -3,15 +3,16 @@
 #include <utility>
 
 #include "host/app/scenario_config.h"
+#include "host/app/sources.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 
 namespace tagwrench {
 
 BenchInput open_at_bench(const InputOptions& options) {
-  const Spec spec = split_spec(options.source);
+  const SourceSpec spec = parse_source(options.source);
   BenchInput at;
-  if (spec.kind != "sim") {
+  if (!spec.is(SourceKind::simulator)) {
     at.input = open_input(options);
     return at;
   }

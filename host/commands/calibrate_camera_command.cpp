@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "host/app/input.h"
+#include "host/app/sources.h"
 #include "host/calibration/camera/collector.h"
 #include "host/calibration/print/board_spec.h"
 #include "host/commands/events.h"
@@ -323,14 +324,13 @@ std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
   if (options.source.empty())
     throw ConfigError(
         "calibrate camera: nothing to look at; give --source v4l2:/dev/videoN or --images DIR");
-  const Spec spec = split_spec(options.source);
-  if (spec.kind == "sim") {
+  const SourceSpec spec = parse_source(options.source);
+  if (spec.is(SourceKind::simulator)) {
     throw ConfigError(
         "--source sim: the simulated sensor has no board to show; use v4l2:/dev/videoN or "
         "images:DIR");
   }
-  if (spec.kind == "images" && !spec.argument.empty())
-    return look_at_folders(options, {spec.argument}, board, record);
+  if (spec.is(SourceKind::images)) return look_at_folders(options, {spec.argument}, board, record);
   return look_at_camera(options, board, record, stop);
 }
 

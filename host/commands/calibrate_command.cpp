@@ -1,5 +1,6 @@
 #include "host/commands/calibrate_command.h"
 
+#include "host/app/sources.h"
 #include "host/commands/events_option.h"
 
 namespace tagwrench {
@@ -49,7 +50,7 @@ CalibrateCommand::CalibrateCommand(command_line::Command program)
   target_.add_option("--sensor", target_options_.sensor, "sensor.yaml of this sensor").required();
   target_
       .add_option("--source", target_options_.source,
-                  "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
+                  source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}))
       .required();
   target_.add_option("--out", target_options_.out,
                      "sensor.yaml to write; without it --sensor is edited in place");

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "host/app/input.h"
+#include "host/app/sources.h"
 #include "host/calibration/target/recorder.h"
 #include "host/calibration/target/verdict.h"
 #include "host/commands/events.h"
@@ -87,7 +88,7 @@ void tell_events(Events& events, const TargetRecorder& record, const Track& trac
 /// Until the source ends, enough was seen (true) or a signal came (false).
 bool watch(FrameSource& source, const CalibrateTargetOptions& options, const UniqueFd& stop,
            TargetRecorder& record, Events& events) {
-  const bool ends = split_spec(options.source).kind == "images";
+  const bool ends = parse_source(options.source).is(SourceKind::images);
   const double seconds = options.seconds.value_or(
       ends || options.frames ? std::numeric_limits<double>::infinity() : kSecondsFromCamera);
   std::optional<TimePoint> first;

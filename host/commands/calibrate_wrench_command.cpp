@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "host/app/recording_sensor.h"
+#include "host/app/sources.h"
 #include "host/calibration/wrench/plan_config.h"
 #include "host/commands/calibrate_wrench/checks.h"
 #include "host/commands/calibrate_wrench/recorder.h"
@@ -272,7 +273,7 @@ int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFile
   const std::string sensor_text = read_text(options.sensor);
   check_replaceable(options.sensor);
   check_files(files, options);
-  record::RecordingReader recording(split_spec(options.source).argument);
+  record::RecordingReader recording(parse_source(options.source).argument);
   const RecordedCalibration recorded = calibration_in(recording.head());
   const WrenchPlan plan = plan_of_recording(options, recorded);
   const std::vector<AcceptedStep> steps = accepted_steps(recording, plan);
@@ -315,8 +316,8 @@ int calibrate_wrench(const CalibrateWrenchOptions& options) {
   const CalibrationFiles files =
       files_of(options.out.empty() ? fs::path(options.sensor).parent_path() / "calibration.json"
                                    : fs::path(options.out));
-  return split_spec(options.source).kind == "recording" ? calibrate_again(options, files)
-                                                        : calibrate_live(options, files);
+  return parse_source(options.source).is(SourceKind::recording) ? calibrate_again(options, files)
+                                                                : calibrate_live(options, files);
 }
 
 }  // namespace tagwrench

@@ -9,8 +9,8 @@
 
 #include "host/app/input.h"
 #include "host/app/scenario_config.h"
+#include "host/app/sources.h"
 #include "host/commands/board/loop.h"
-#include "host/commands/web_place.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
@@ -29,6 +29,7 @@
 #include "host/tools/camera_timing/simulated_lamp.h"
 #include "host/tracker/tracker.h"
 #include "host/web/server/token_file.h"
+#include "host/web/server/web_place.h"
 #include "host/wrench/estimate.h"
 
 namespace tagwrench {
@@ -49,8 +50,8 @@ struct Bench {
 
 /// The simulator's own lamp, at the camera's own clock.
 Bench simulated_bench(const std::string& sensor, const std::string& source, bool fast) {
-  const Spec spec = split_spec(source);
-  if (spec.kind != "sim") {
+  const SourceSpec spec = parse_source(source);
+  if (!spec.is(SourceKind::simulator)) {
     throw ConfigError(fmt::format(
         "--port sim: the simulated lamp lights the simulated sensor alone; use --source sim or "
         "--source sim:SCENARIO.yaml with it, not {}",
@@ -75,7 +76,7 @@ Bench simulated_bench(const std::string& sensor, const std::string& source, bool
 Bench board_bench(const std::string& sensor, const std::string& source, const std::string& port,
                   bool fast) {
   if (fast) throw ConfigError("--fast: a board has its own time; leave it out, or use --port sim");
-  if (split_spec(source).kind != "v4l2") {
+  if (!parse_source(source).is(SourceKind::camera)) {
     throw ConfigError(fmt::format(
         "--port {}: a board lights cameras; use --source v4l2:/dev/videoN with it, or --port sim "
         "for the simulated sensor",
@@ -204,7 +205,7 @@ void CameraTimingCommand::check_screen() const {
   }
   if (kind != "web" && !web_token_.empty())
     throw ConfigError("--web-token: is for a page; use it with --screen web:ADDRESS:PORT");
-  if (split_spec(source_).kind == "sim") {
+  if (parse_source(source_).is(SourceKind::simulator)) {
     if (kind == "web")
       throw ConfigError(
           "--screen web: the simulated camera sees no screen; give a camera as --source, or leave "
@@ -222,7 +223,7 @@ void CameraTimingCommand::print(const std::string& text, const std::string& json
 int CameraTimingCommand::run_with_screen() const {
   const UniqueFd stop = termination_fd();
   const Spec screen = split_spec(screen_);
-  if (split_spec(source_).kind == "sim") {
+  if (parse_source(source_).is(SourceKind::simulator)) {
     const Bench bench = simulated_bench(sensor_, source_, fast_);
     auto& patch = dynamic_cast<FlipPatch&>(*bench.lamp);
     return measure(*bench.input.source, patch, stop, [] { return "simulated, without latency"; });

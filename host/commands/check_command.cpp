@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "host/app/sources.h"
 #include "host/board/cell_calibration.h"
 #include "host/commands/check_text.h"
 #include "host/commands/emulated_cell.h"
@@ -101,7 +102,7 @@ CheckCommand::CheckCommand(command_line::Command program)
   verb_.add_option("--sensor", options_.sensor, "sensor.yaml of this sensor").required();
   verb_
       .add_option("--source", options_.source,
-                  "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
+                  source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}))
       .required();
   add_events_option(verb_, options_.events);
   add_load_options();

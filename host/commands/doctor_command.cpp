@@ -3,6 +3,7 @@
 #include <iostream>
 #include <stdexcept>
 
+#include "host/app/sources.h"
 #include "host/tools/doctor/doctor.h"
 
 namespace tagwrench {
@@ -14,8 +15,8 @@ DoctorCommand::DoctorCommand(command_line::Command program)
       "--focus", focus_, "instead, how sharp the tags are, live, while you turn the lens");
   verb_
       .add_option("--source", focusing_.source,
-                  "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR; "
-                  "without it the only camera")
+                  source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}) +
+                      "; without it the only camera")
       .needs(focus);
   verb_
       .add_option("--sensor", focusing_.sensor,

@@ -1,5 +1,8 @@
 #include "host/commands/record_command.h"
 
+#include "host/app/outputs.h"
+#include "host/app/sources.h"
+
 namespace tagwrench {
 
 RecordCommand::RecordCommand(command_line::Command program)
@@ -15,8 +18,8 @@ RecordCommand::RecordCommand(command_line::Command program)
       .check(command_line::one_of({"raw", "region", "none"}))
       .capture_default_str();
   verb_.add_option("--sensor", options_.sensor, "sensor.yaml of this sensor");
-  verb_.add_option("--source", options_.source, kSourceHelp);
-  verb_.add_option("--output", options_.outputs, kOutputHelp);
+  verb_.add_option("--source", options_.source, source_help());
+  verb_.add_option("--output", options_.outputs, output_help());
   verb_.add_option("--frames", options_.frames, "end after N frames")
       .check(command_line::range(1, kMaxRunFrames));
   verb_.add_option("--seconds", options_.seconds, "end after S seconds")

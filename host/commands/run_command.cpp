@@ -10,13 +10,15 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "host/app/input.h"
+#include "host/app/outputs.h"
 #include "host/app/pipeline.h"
+#include "host/app/sources.h"
 #include "host/commands/count_text.h"
 #include "host/commands/run_input.h"
-#include "host/commands/run_outputs.h"
 #include "host/commands/run_web.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
@@ -30,6 +32,29 @@
 namespace tagwrench {
 namespace {
 
+/// A board lives in real time.
+void check_board(const RunOptions& options, std::span<const OutputSpec> outputs) {
+  const OutputSpec* reference = find_output(outputs, OutputKind::reference);
+  if (options.board.empty()) {
+    if (!options.cells.empty())
+      throw ConfigError("--cells: the load cells are a board's; name its port with --board");
+    if (reference != nullptr) {
+      throw ConfigError(
+          fmt::format("--output {}: the load cells are a board's; name its port with --board",
+                      reference->text()));
+    }
+    return;
+  }
+  if (options.fast)
+    throw ConfigError("--fast: a board has its own time; leave it out, or leave out --board");
+  if (!options.source.empty() && parse_source(options.source).row->own_time) {
+    throw ConfigError(fmt::format(
+        "--source {}: these pictures are of another time than what the board says now; leave out "
+        "--board",
+        options.source));
+  }
+}
+
 /// The program that connected last of those that are connected.
 std::string_view last_program(const SpnavOutput& output) {
   if (output.programs().empty()) return {};
@@ -37,13 +62,10 @@ std::string_view last_program(const SpnavOutput& output) {
 }
 
 /// Where requests come in, for who has a device on his profiles.
-std::optional<ControlSocket> control_of(const RunOptions& options) {
-  const std::vector<Spec> specs = output_specs(options);
-  const bool device = (specs.empty() && !options.record) ||
-                      std::any_of(specs.begin(), specs.end(), is_input_device);
-  const bool on_hid = std::any_of(specs.begin(), specs.end(), is_hid_device);
-  const bool pages = has_web(options);
-  if (!device && !on_hid && !pages && options.profiles.empty()) return {};
+std::optional<ControlSocket> control_of(const RunOptions& options, const Outputs& outputs,
+                                        bool pages) {
+  const bool on_hid = outputs.any_hid_asked();
+  if (!outputs.any_moves() && !on_hid && !pages && options.profiles.empty()) return {};
   try {
     const std::string path = control_path(options.name);
     if (!on_hid || !listens(path)) return ControlSocket(path);
@@ -84,21 +106,8 @@ void say_zero(const ZeroTracking& zero, const Vector6& range, double band) {
       most > 0.9 * band ? ", about as far as it may: run `tagwrench zero`" : ""));
 }
 
-/// What is recorded of the run, told to all who have something to say.
-Recording& start_recording(const RunOptions& options, const record::Head& head, const Input& input,
-                           const RunLimits& limits, RunBoard* board, Outputs& outputs) {
-  const bool lossless = options.fast && input.source->poll_fd() < 0;
-  auto recording =
-      std::make_unique<Recording>(*options.record, head, lossless, limits.frames, limits.time);
-  Recording& started = *recording;
-  outputs.all.push_back(std::move(recording));
-  if (board != nullptr) board->record_to(started.writer());
-  return started;
-}
-
 /// Ends it, and says so. False: something went wrong.
-bool end_recording(std::unique_ptr<Output> output) {
-  auto& recording = static_cast<Recording&>(*output);
+bool end_recording(Recording& recording) {
   const std::string trouble = recording.finish();
   log_info(recording.summary());
   if (!trouble.empty()) log_info(trouble);
@@ -133,35 +142,41 @@ std::string summary(const RunReport& report, const SensorConfig& sensor) {
 /// What outlives a run that lends its camera.
 struct Session {
   RunOptions options;
-  std::unique_ptr<ServiceWatch> watch = nullptr;  ///< until the first run takes it
+  std::vector<OutputSpec> asked;
+  Outputs outputs{asked, !options.record};
+  std::unique_ptr<ServiceWatch> watch = ServiceWatch::open();  ///< null: no systemd
   WebBridge* web = nullptr;
-  KeptOutputs kept = {};
   std::uint64_t frames = 0;  ///< of the runs before
   TimePoint start = std::chrono::steady_clock::now();
+
+  /// What goes on while there is no run.
+  std::vector<Output*> beside() const {
+    std::vector<Output*> all = outputs.all();
+    if (watch) all.push_back(watch.get());
+    return all;
+  }
 };
 
 /// Pages are told when a run is over, however it ends.
 class WebRun {
  public:
-  WebRun(WebBridge* web, std::unique_ptr<WebOutput> output, Outputs& outputs)
-      : web_(web), output_(output.get()) {
-    if (output) outputs.all.push_back(std::move(output));
-  }
+  WebRun(WebBridge* web, std::unique_ptr<WebOutput> output)
+      : web_(web), output_(std::move(output)) {}
   WebRun(const WebRun&) = delete;
   WebRun& operator=(const WebRun&) = delete;
   ~WebRun() {
     if (web_ != nullptr) web_->end_run();
   }
-  WebOutput* output() const { return output_; }
+  WebOutput* output() const { return output_.get(); }
 
  private:
   WebBridge* web_;
-  WebOutput* output_;
+  std::unique_ptr<WebOutput> output_;
 };
 
 /// Where the next run gets its pictures from, if there is one: from where this one does.
 void stay_with(const Input& input, RunOptions& options) {
-  if (options.source.empty() && split_spec(input.spec).kind == "sim") options.sensor.clear();
+  if (options.source.empty() && input.kind == SourceKind::simulator) options.sensor.clear();
   options.source = input.spec;
 }
 
@@ -187,15 +202,14 @@ RegionSource& choose_region(Input& input, bool narrow) {
 }
 
 std::unique_ptr<WebOutput> begin_web_run(const Session& session, const Input& input,
-                                         RegionSource* source, RunBoard* board, bool profiles,
-                                         const Outputs& outputs) {
+                                         RegionSource* source, RunBoard* board, bool profiles) {
   if (session.web == nullptr) return nullptr;
   WebOutput::Parts parts;
   parts.source = source;
   parts.board = board;
-  parts.programs = outputs.programs;
-  return session.web->begin_run(run_facts(session.options, input, board != nullptr, profiles),
-                                parts);
+  parts.programs = session.outputs.programs();
+  return session.web->begin_run(
+      run_facts(session.options, session.asked, input, board != nullptr, profiles), parts);
 }
 
 /// The exit status; nothing: the camera is wanted for something else, and the run goes on after it.
@@ -226,42 +240,56 @@ std::optional<int> run_once(Session& session) {
   Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
   WrenchEstimator wrench(input.sensor.wrench);
   const bool many_profiles = !options.profiles.empty();
-  std::optional<ControlSocket> control = control_of(options);
+  Outputs& outputs = session.outputs;
+  std::optional<ControlSocket> control = control_of(options, outputs, session.web != nullptr);
   const bool has_control = control.has_value();
   ProfileManager profiles(ProfileFiles(options.profiles, default_profile(input.sensor)),
                           std::move(control), many_profiles ? FocusWatch::open() : std::nullopt);
   const ZeroOptions zero_limits =
       zero_options(input.sensor, wrench.tool(), !options.no_zero_tracking);
   ZeroTracking zero(zero_limits);
-  Outputs outputs = open_outputs(options, input, board.get(), session.kept);
-  if (many_profiles && outputs.programs != nullptr)
-    profiles.follow_programs([&programs = *outputs.programs] { return last_program(programs); });
-  log_info("source: " + input.source->format().description);
+  // Only a source that waits for its reader may be made to wait.
+  const bool lossless = options.fast && input.source->poll_fd() < 0;
+  const std::string source_text = "source: " + input.source->format().description;
+  outputs.open({.sensor = input.sensor,
+                .source = input.source->format().description,
+                .name = options.name,
+                .lossless = lossless});
+  std::unique_ptr<Output> board_output;
+  if (board) {
+    const OutputSpec* reference = find_output(session.asked, OutputKind::reference);
+    board_output = board->output(input.sensor, reference == nullptr ? "" : reference->argument);
+  }
+  if (many_profiles && outputs.programs() != nullptr)
+    profiles.follow_programs([&programs = *outputs.programs()] { return last_program(programs); });
+  log_info(source_text);
   if (!input.sensor.completed_axes.empty()) {
     log_info(
         fmt::format("not calibrated, but as the springs are described: {}; their standard "
                     "deviations say how little is known",
                     input.sensor.completed_axes));
   }
-  if (session.watch != nullptr) {
-    session.watch->ready("source: " + input.source->format().description);
-    outputs.all.push_back(std::move(session.watch));
-  }
+  if (session.watch) session.watch->ready(source_text);
 
   const RunLimits limits = limits_of(session);
   RunReport report;
+  std::optional<Recording> recording;
   {
-    const WebRun web(session.web,
-                     begin_web_run(session, input, region, board.get(), has_control, outputs),
-                     outputs);
-    Watchdog watchdog(outputs.devices);
+    const WebRun web(session.web, begin_web_run(session, input, region, board.get(), has_control));
+    Watchdog watchdog(outputs.devices());
     FrameLog* log = web.output();
     if (options.record) {
-      Recording& recording = start_recording(options, head, input, limits, board.get(), outputs);
-      if (web.output() != nullptr) web.output()->pass_on_to(&recording);
-      if (log == nullptr) log = &recording;
+      recording.emplace(*options.record, head, lossless, limits.frames, limits.time);
+      if (board) board->record_to(recording->writer());
+      if (web.output() != nullptr) web.output()->pass_on_to(&*recording);
+      if (log == nullptr) log = &*recording;
     }
-    Pipeline pipeline(*input.source, tracker, wrench, profiles, outputs.all, watchdog,
+    std::vector<Output*> fed = outputs.all();
+    if (board_output) fed.push_back(board_output.get());
+    if (session.watch) fed.push_back(session.watch.get());
+    if (web.output() != nullptr) fed.push_back(web.output());
+    if (recording) fed.push_back(&*recording);
+    Pipeline pipeline(*input.source, tracker, wrench, profiles, fed, watchdog,
                       session.web == nullptr ? stop.get() : session.web->end_fd(), log);
     pipeline.follow_zero(zero);
     if (web.output() != nullptr) web.output()->follow_skipped(pipeline.so_far().skipped);
@@ -269,16 +297,13 @@ std::optional<int> run_once(Session& session) {
   }
   session.frames += report.frames;
   if (report.end == RunReport::End::interrupted && !termination_requested()) {
-    session.kept = keep_outputs(outputs);
+    outputs.close_for_job();
     return {};
   }
-  std::unique_ptr<Output> recording;
-  if (options.record) {
-    recording = std::move(outputs.all.back());
-    outputs.all.pop_back();
-  }
-  outputs.all.clear();  // neutral, then gone, before anything else is said
-  const bool recorded = recording == nullptr || end_recording(std::move(recording));
+  board_output.reset();
+  outputs.close();  // neutral, then gone, before anything else is said
+  session.watch.reset();
+  const bool recorded = !recording || end_recording(*recording);
   if (report.end == RunReport::End::output_failed) {
     if (recorded) log_info(report.failure);
     return 1;
@@ -292,17 +317,17 @@ std::optional<int> run_once(Session& session) {
 /// One run after the other, as pages want the camera and give it back.
 int run_with_pages(Session& session) {
   const UniqueFd stop = termination_fd();
-  const std::unique_ptr<WebBridge> web = open_web(session.options, stop);
+  const std::unique_ptr<WebBridge> web = open_web(session.options, session.asked, stop);
   session.web = web.get();
   for (bool first = true;; first = false) {
     bool again = false;
     try {
       if (const std::optional<int> status = run_once(session)) return *status;
-      again = web->lend_camera(session.kept);
+      again = web->lend_camera(session.beside());
     } catch (const ConfigError& e) {
       if (first) throw;
       log_info(e.what());
-      again = web->wait_after(e.what(), session.kept);
+      again = web->wait_after(e.what(), session.beside());
     }
     if (!again) return 0;
   }
@@ -312,44 +337,22 @@ int run_with_pages(Session& session) {
 
 int run(const RunOptions& given) {
   const UniqueFd caught = termination_fd();  // what comes while it is set up ends it in order, too
-  output_specs(given);                       // refused before anything is opened or lit
+  const std::vector<OutputSpec> asked = parse_outputs(given.outputs);  // refused before anything
+  check_board(given, asked);                                           // is opened or lit
   check_name(given.name);
-  const bool pages = has_web(given);
-  Session session{with_own_sensor(given)};
-  session.watch = ServiceWatch::open();
+  const bool pages = has_web(given, asked);
+  Session session{with_own_sensor(given), asked};
   if (session.options.record) check_recording(*session.options.record);
   return pages ? run_with_pages(session) : *run_once(session);
 }
-
-const char* const kSourceHelp =
-    "where frames come from:\n"
-    "  sim | sim:SCENARIO.yaml       the simulated sensor\n"
-    "  v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]\n"
-    "  images:DIR                    PNG, PGM or JPEG in name order, times from DIR/frames.csv\n"
-    "  recording:FILE                what `tagwrench record` made\n"
-    "Without it: a camera that sees the tags, else sim";
-
-const char* const kOutputHelp =
-    "where samples go (repeat it for more than one):\n"
-    "  terminal                      live view\n"
-    "  jsonl:FILE, csv:FILE          one line per frame, - is standard output\n"
-    "  spacemouse                    virtual 6-DOF puck for CAD programs\n"
-    "  wrench                        HID force-torque sensor in N and N m\n"
-    "  joystick                      six-axis joystick for games\n"
-    "  spnav[:PATH]                  the socket of libspnav programs, without any device\n"
-    "  web[:ADDRESS:PORT]            pages for a browser: 127.0.0.1:8137\n"
-    "  gadget[:spacemouse|:wrench]   a USB device of another computer, after `tagwrench gadget "
-    "up`\n"
-    "  reference:FILE                as csv, beside the load cells of --board at the same time\n"
-    "Without it: terminal, and every device that this machine allows";
 
 RunCommand::RunCommand(command_line::Command program)
     : verb_(program.add_subcommand("run", "track the tags, compute the wrench, feed the outputs")) {
   verb_.add_option("--sensor", options_.sensor,
                    "sensor.yaml of this sensor; without it, for a camera, the one "
                    "in\n~/.config/tagwrench if it is there");
-  verb_.add_option("--source", options_.source, kSourceHelp);
-  verb_.add_option("--output", options_.outputs, kOutputHelp);
+  verb_.add_option("--source", options_.source, source_help());
+  verb_.add_option("--output", options_.outputs, output_help());
   verb_.add_option("--profile", options_.profiles,
                    "how pushes become motion: cad, game, research, a file, or a folder of them;\n"
                    "several: the first is in force until a program's window, a gesture or\n"

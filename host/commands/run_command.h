@@ -43,8 +43,6 @@ struct RunOptions {
 int run(const RunOptions& options);
 
 constexpr int kMaxRunFrames = 2'000'000'000;
-extern const char* const kSourceHelp;  ///< of --source
-extern const char* const kOutputHelp;  ///< of --output
 
 /// Declares itself on the command line; must outlive the parsing.
 class RunCommand {

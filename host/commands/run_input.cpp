@@ -10,6 +10,7 @@
 #include <cstring>
 #include <utility>
 
+#include "host/app/sources.h"
 #include "host/commands/camera_wait.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
@@ -84,14 +85,17 @@ std::optional<Input> try_camera(const RunOptions& options) {
   }
 }
 
+bool wants_camera(const RunOptions& options) {
+  return options.source.empty() || parse_source(options.source).is(SourceKind::camera);
+}
+
 }  // namespace
 
 std::optional<Input> open_run_input(const RunOptions& options, ServiceWatch* watch) {
   if (!options.sensor.empty())
     load_sensor(options.sensor);  // a mistake in it must not look like a missing camera
-  const Spec spec = split_spec(options.source);
-  if (options.wait && (spec.kind.empty() || spec.kind == "v4l2")) {
-    if (!spec.kind.empty()) parse_v4l2_spec(spec.argument);
+  if (options.wait && wants_camera(options)) {
+    if (!options.source.empty()) parse_v4l2_spec(parse_source(options.source).argument);
     return wait_for_camera([&] { return try_camera(options); }, watch);
   }
   if (options.source.empty()) return find_input(options);
@@ -99,10 +103,9 @@ std::optional<Input> open_run_input(const RunOptions& options, ServiceWatch* wat
 }
 
 RunOptions with_own_sensor(RunOptions options) {
-  const bool camera = options.source.empty() || split_spec(options.source).kind == "v4l2";
   const std::string folder = config_folder();
   const std::string file = folder + "/sensor.yaml";
-  if (!options.sensor.empty() || !camera || folder.empty()) return options;
+  if (!options.sensor.empty() || !wants_camera(options) || folder.empty()) return options;
   struct stat found {};
   if (::lstat(file.c_str(), &found) == 0) {
     options.sensor = file;

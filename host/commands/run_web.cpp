@@ -5,12 +5,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 
 #include "host/commands/recording.h"
-#include "host/commands/web_place.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/config_folder.h"
@@ -18,23 +16,12 @@
 #include "host/source/v4l2_mode.h"
 #include "host/web/bridge/recording_folder.h"
 #include "host/web/server/token_file.h"
+#include "host/web/server/web_place.h"
 
 namespace tagwrench {
 namespace {
 
 namespace fs = std::filesystem;
-
-const Spec* web_among(const std::vector<Spec>& specs) {
-  const auto found =
-      std::find_if(specs.begin(), specs.end(), [](const Spec& spec) { return spec.kind == "web"; });
-  return found == specs.end() ? nullptr : &*found;
-}
-
-std::vector<Spec> specs_of(const RunOptions& options) {
-  std::vector<Spec> specs;
-  for (const std::string& text : options.outputs) specs.push_back(split_spec(text));
-  return specs;
-}
 
 /// In the browser of the desktop, where there is one; the shell leaves it to itself, and Ctrl-C in
 /// our terminal too.
@@ -52,31 +39,21 @@ void open_in_browser(const std::string& url) {
   ::posix_spawnattr_destroy(&own_session);
 }
 
-/// What a job would cut off.
-bool writes_for_good(const RunOptions& options) {
-  const std::vector<Spec> specs = specs_of(options);
-  return options.record || std::any_of(specs.begin(), specs.end(),
-                                       [](const Spec& spec) { return spec.kind == "reference"; });
-}
-
 }  // namespace
 
-bool has_web(const RunOptions& options) {
-  const std::vector<Spec> specs = specs_of(options);
-  const Spec* web = web_among(specs);
-  if (web != nullptr) parse_web("--output web", web->argument);
-  if (web == nullptr && options.web.open) return true;
-  if (web == nullptr && !options.web.token_file.empty())
+bool has_web(const RunOptions& options, std::span<const OutputSpec> outputs) {
+  if (find_output(outputs, OutputKind::pages) != nullptr || options.web.open) return true;
+  if (!options.web.token_file.empty())
     throw ConfigError("--web-token: is for pages; add --output web:ADDRESS:PORT");
-  if (web == nullptr && !options.web.recordings.empty())
+  if (!options.web.recordings.empty())
     throw ConfigError("--recordings: is for pages; add --output web");
-  return web != nullptr;
+  return false;
 }
 
-std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& stop) {
-  const std::vector<Spec> specs = specs_of(options);
+std::unique_ptr<WebBridge> open_web(const RunOptions& options, std::span<const OutputSpec> outputs,
+                                    const UniqueFd& stop) {
   WebBridgeOptions web;
-  const Spec* spec = web_among(specs);
+  const OutputSpec* spec = find_output(outputs, OutputKind::pages);
   web.server = parse_web("--output web", spec == nullptr ? "" : spec->argument);
   web.server.pages = options.web.pages.empty() ? built_pages() : fs::path(options.web.pages);
   bool token_made = false;
@@ -100,7 +77,8 @@ std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& s
   return bridge;
 }
 
-RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bool profiles) {
+RunFacts run_facts(const RunOptions& options, std::span<const OutputSpec> outputs,
+                   const Input& input, bool board, bool profiles) {
   RunFacts facts;
   facts.name = options.name;
   facts.format = input.source->format();
@@ -111,9 +89,9 @@ RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bo
   facts.place.board = options.board;
   facts.place.cells = options.cells;
   facts.place.calibrated = !input.sensor.calibration.empty();
-  facts.place.kept = writes_for_good(options);
-  const Spec source = split_spec(input.spec);
-  if (source.kind == "v4l2") facts.camera_device = parse_v4l2_spec(source.argument).path;
+  // What a job would cut off.
+  facts.place.kept = options.record || find_output(outputs, OutputKind::reference) != nullptr;
+  if (input.kind == SourceKind::camera) facts.camera_device = parse_v4l2_spec(input.argument).path;
   facts.board = board;
   facts.profiles = profiles;
   if (!options.record) facts.head = recording_head(input, record::Keep::raw);

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <memory>
+#include <span>
 
 #include "host/app/input.h"
+#include "host/app/outputs.h"
 #include "host/commands/board/run_board.h"
 #include "host/commands/run_command.h"
 #include "host/core/os/unique_fd.h"
@@ -12,13 +14,15 @@
 
 namespace tagwrench {
 
-/// Whether `web` is among the outputs. Throws ConfigError where it is, but cannot be.
-bool has_web(const RunOptions& options);
+/// Whether there are pages. Throws ConfigError where options are theirs, and they are not there.
+bool has_web(const RunOptions& options, std::span<const OutputSpec> outputs);
 
 /// Binds, and says where; nothing is served yet. `stop` is of termination_fd().
-std::unique_ptr<WebBridge> open_web(const RunOptions& options, const UniqueFd& stop);
+std::unique_ptr<WebBridge> open_web(const RunOptions& options, std::span<const OutputSpec> outputs,
+                                    const UniqueFd& stop);
 
-/// `desk`: it listens to requests.
-RunFacts run_facts(const RunOptions& options, const Input& input, bool board, bool profiles);
+/// `profiles`: they listen to requests.
+RunFacts run_facts(const RunOptions& options, std::span<const OutputSpec> outputs,
+                   const Input& input, bool board, bool profiles);
 
 }  // namespace tagwrench

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <ctime>
 
+#include "host/app/sources.h"
 #include "host/commands/bench_input.h"
 #include "host/commands/check_text.h"
 #include "host/commands/events_option.h"
@@ -71,7 +72,7 @@ ZeroCommand::ZeroCommand(command_line::Command program)
   verb_.add_option("--sensor", options_.sensor, "sensor.yaml of this sensor").required();
   verb_
       .add_option("--source", options_.source,
-                  "sim | sim:SCENARIO.yaml | v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]] | images:DIR")
+                  source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}))
       .required();
   add_events_option(verb_, options_.events);
 }

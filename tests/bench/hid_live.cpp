@@ -11,6 +11,7 @@
 #include <fstream>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <string>
 
 #include "host/app/pipeline.h"
@@ -155,15 +156,16 @@ LiveFigures run_live(const HidClip& clip, const Script& script, double rate_hz,
   ZeroOptions zero_options;
   zero_options.range = clip.sensor.wrench.range;
   ZeroTracking zero(zero_options);
-  std::vector<std::unique_ptr<Output>> outputs;
-  outputs.push_back(std::make_unique<Probe>());
-  auto& probe = static_cast<Probe&>(*outputs.back());
+  Probe probe;
   SpnavOptions options;
   options.socket = path;
-  outputs.push_back(std::make_unique<SpnavOutput>(options));
-  if (bystanders != nullptr)
-    outputs.push_back(std::make_unique<JsonlOutput>(
-        fmt::format("/proc/self/fd/{}", bystanders->slow_pipe), /*lossless=*/false));
+  std::optional<SpnavOutput> spnav(options);
+  std::optional<JsonlOutput> jsonl;
+  std::vector<Output*> outputs{&probe, &*spnav};
+  if (bystanders != nullptr) {
+    jsonl.emplace(fmt::format("/proc/self/fd/{}", bystanders->slow_pipe), /*lossless=*/false);
+    outputs.push_back(&*jsonl);
+  }
   Watchdog watchdog({});
   Pipeline pipeline(source, tracker, wrench, profiles, outputs, watchdog, /*stop_fd=*/-1);
   pipeline.follow_zero(zero);
@@ -176,7 +178,8 @@ LiveFigures run_live(const HidClip& clip, const Script& script, double rate_hz,
   if (bystanders != nullptr) drain(slow, *bystanders);
   figures.loop_cpu = source.cpu_share();
   figures.moves = probe.moves;
-  outputs.clear();
+  jsonl.reset();
+  spnav.reset();
   figures.events = listener.events();
   return figures;
 }

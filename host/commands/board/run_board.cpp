@@ -57,7 +57,7 @@ RunBoard::~RunBoard() { SteadyLamp(loop_.link()).set_level(0); }
 
 bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
   SteadyLamp lamp(loop_.link());
-  if (!input.camera) {
+  if (input.kind != SourceKind::camera) {
     lamp.set_level(kUnseenLevel_permille);
     settled_permille_ = led_permille_ = kUnseenLevel_permille;
     log_info(fmt::format("the board's LED is on at {:.0f} %, but does not light this source",

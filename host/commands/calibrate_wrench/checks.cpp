@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "host/app/input.h"
+#include "host/app/sources.h"
 #include "host/calibration/wrench/coverage.h"
 #include "host/commands/static_measurement.h"
 #include "host/core/config_error.h"
@@ -58,12 +59,12 @@ void check_files(const CalibrationFiles& files, const CalibrateWrenchOptions& op
 }
 
 void check_source(const CalibrateWrenchOptions& options) {
-  if (!options.emulated_cell.empty() && split_spec(options.source).kind != "sim") {
+  if (!options.emulated_cell.empty() && !parse_source(options.source).is(SourceKind::simulator)) {
     throw ConfigError(
         fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
                     options.source));
   }
-  if (split_spec(options.source).kind == "images") {
+  if (parse_source(options.source).is(SourceKind::images)) {
     throw ConfigError(fmt::format(
         "--source {}: nobody is there who could do what the plan asks; give a camera, sim, or the "
         "recording of a calibration",

@@ -137,8 +137,7 @@ void WebBridge::Impl::end_run() {
 
 bool WebBridge::Impl::wait_to_resume(Beside beside) {
   std::vector<pollfd> fds = {{resume_.get(), POLLIN, 0}, {stop_, POLLIN, 0}};
-  for (const std::unique_ptr<Output>& output : beside)
-    fds.push_back({output->poll_fd(), POLLIN, 0});
+  for (const Output* output : beside) fds.push_back({output->poll_fd(), POLLIN, 0});
   while (true) {
     if (::poll(fds.data(), fds.size(), -1) <= 0) continue;
     if (fds[1].revents != 0) return false;

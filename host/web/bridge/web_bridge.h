@@ -47,7 +47,7 @@ class WebBridge {
   int end_fd() const noexcept;
   /// The loop of the run is over.
   void end_run();
-  using Beside = std::span<const std::unique_ptr<Output>>;
+  using Beside = std::span<Output* const>;
   /// Everything of the run is gone, the camera too: until the job that wanted it is over (true) or
   /// a signal has come (false). Outputs that are there all the same are served.
   bool lend_camera(Beside beside);

@@ -1,4 +1,4 @@
-#include "host/commands/web_place.h"
+#include "host/web/server/web_place.h"
 
 #include <fmt/format.h>
 
