@@ -49,6 +49,10 @@ void check_appearance(const Input& input) {
       mismatch->id, name(sensor.target.family), mismatch->likeness));
 }
 
+Tracker make_tracker(const SensorConfig& sensor) {
+  return Tracker(sensor.camera, sensor.target, sensor.rest);
+}
+
 Next next_frame(FrameSource& source, const UniqueFd& stop, Frame& frame) {
   constexpr int kPatience_ms = 200;
   pollfd fds[2] = {{source.poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};

@@ -10,6 +10,7 @@
 #include "host/recording/records.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/frame_source.h"
+#include "host/tracker/tracker.h"
 
 namespace tagwrench {
 
@@ -55,6 +56,9 @@ void check_size(const Input& input);
 void check_appearance(const Input& input);
 
 enum class Next : std::uint8_t { frame, nothing, end, stopped };
+
+/// The tracker of this sensor.
+Tracker make_tracker(const SensorConfig& sensor);
 
 /// Waits a while for a frame, the end of the source or a signal; says when a camera goes or comes.
 Next next_frame(FrameSource& source, const UniqueFd& stop, Frame& frame);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/commands/recording.h"
+#include "host/app/recording.h"
 
 namespace tagwrench {
 

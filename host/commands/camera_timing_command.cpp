@@ -7,10 +7,10 @@
 #include <memory>
 #include <vector>
 
+#include "host/app/board/board_loop.h"
 #include "host/app/input.h"
 #include "host/app/scenario_config.h"
 #include "host/app/sources.h"
-#include "host/commands/board/loop.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
@@ -113,9 +113,7 @@ void check_report_file(const std::string& file) {
 class Processing {
  public:
   explicit Processing(const SensorConfig& sensor)
-      : tracker_(sensor.camera, sensor.target, sensor.rest),
-        wrench_(sensor.wrench),
-        shaping_(sensor.shaping) {
+      : tracker_(make_tracker(sensor)), wrench_(sensor.wrench), shaping_(sensor.shaping) {
     try {
       device_ = std::make_unique<WrenchHidOutput>(WrenchHidOptions{});
     } catch (const ConfigError& e) {

@@ -157,14 +157,8 @@ int CheckCommand::run() const {
   if (!options_.direction.empty() && !(vector3(options_.direction).norm() > kMin))
     throw ConfigError("--direction: has no length; give a direction such as 0,0,-1");
   const UniqueFd stop = termination_fd();
-  std::unique_ptr<RunBoard> board;
-  if (!options_.board.empty()) {
-    BoardOptions board_options;
-    board_options.port = options_.board == "auto" ? "" : options_.board;
-    board_options.cells_file = options_.cells;
-    board = std::make_unique<RunBoard>(board_options);
-    if (!board->connected()) return stopped();
-  }
+  const std::unique_ptr<RunBoard> board = open_board(options_.board, options_.cells);
+  if (board && !board->connected()) return stopped();
   BenchInput at;
   const InputOptions from{options_.sensor, options_.source, /*fast=*/!board};
   if (board && options_.emulated_cell.empty()) {
@@ -229,7 +223,7 @@ bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop,
 bool CheckCommand::by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard& board,
                            Output& cell) const {
   const SensorConfig& sensor = at.input.sensor;
-  Tracker tracker(sensor.camera, sensor.target, sensor.rest);
+  Tracker tracker = make_tracker(sensor);
   WrenchEstimator wrench(sensor.wrench);
   std::optional<EmulatedCell> hand;
   if (!options_.emulated_cell.empty())

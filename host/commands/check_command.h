@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "host/commands/bench_input.h"
-#include "host/commands/board/run_board.h"
+#include "host/app/bench_input.h"
+#include "host/app/board/run_board.h"
 #include "host/commands/static_measurement.h"
 #include "host/core/command_line/command_line.h"
 

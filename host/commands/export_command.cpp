@@ -8,8 +8,8 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "host/commands/count_text.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 #include "host/core/log.h"
 #include "host/output/sample_text.h"
 

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "host/app/recording_sensor.h"
-#include "host/commands/count_text.h"
 #include "host/commands/export_command.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 #include "host/core/log.h"
 #include "host/source/recording.h"
 

@@ -15,9 +15,9 @@
 #include <optional>
 
 #include "host/app/recording_sensor.h"
-#include "host/commands/count_text.h"
 #include "host/commands/export_command.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 #include "host/core/log.h"
 
 namespace tagwrench {

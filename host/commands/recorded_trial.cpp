@@ -10,8 +10,8 @@
 
 #include "host/app/recording_sensor.h"
 #include "host/calibration/analysis/trial_csv.h"
-#include "host/commands/count_text.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 #include "host/recording/reader.h"
 #include "host/sensor/sensor_identity.h"
 

@@ -66,7 +66,7 @@ StaticMeasurement::StaticMeasurement(const SensorConfig& sensor, Duration wanted
     : sensor_(sensor),
       wanted_(wanted),
       patience_(patience),
-      all_(sensor.camera, sensor.target, sensor.rest),
+      all_(make_tracker(sensor)),
       wrench_(at_platform(sensor.wrench)) {
   for (const Tag& tag : sensor.target.tags) {
     TargetDescription one = sensor.target;

@@ -6,8 +6,8 @@
 #include <chrono>
 #include <ctime>
 
+#include "host/app/bench_input.h"
 #include "host/app/sources.h"
-#include "host/commands/bench_input.h"
 #include "host/commands/check_text.h"
 #include "host/commands/events_option.h"
 #include "host/commands/static_measurement.h"

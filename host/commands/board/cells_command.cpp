@@ -9,8 +9,9 @@
 #include <cmath>
 #include <optional>
 
+#include "host/app/board/board_loop.h"
 #include "host/board/cell_file.h"
-#include "host/commands/board/loop.h"
+#include "host/commands/board/options.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/output/text_sink.h"

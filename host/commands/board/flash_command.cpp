@@ -13,9 +13,10 @@
 #include <fstream>
 #include <string_view>
 
+#include "host/app/board/board_loop.h"
 #include "host/board/serial_places.h"
 #include "host/board/usb_identity.h"
-#include "host/commands/board/loop.h"
+#include "host/commands/board/options.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/output/text_sink.h"

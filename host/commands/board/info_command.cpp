@@ -3,8 +3,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host/app/board/board_loop.h"
 #include "host/board/cell_file.h"
-#include "host/commands/board/loop.h"
+#include "host/commands/board/options.h"
 #include "host/core/json/json_text.h"
 #include "host/core/log.h"
 #include "host/output/text_sink.h"

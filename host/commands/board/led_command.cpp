@@ -6,7 +6,8 @@
 #include <cmath>
 #include <initializer_list>
 
-#include "host/commands/board/loop.h"
+#include "host/app/board/board_loop.h"
+#include "host/commands/board/options.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 

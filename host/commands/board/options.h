@@ -5,24 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "host/app/board/board_loop.h"
 #include "host/board/cell_calibration.h"
-#include "host/core/types.h"
 
 namespace tagwrench {
 
-inline TimePoint clock_now() { return std::chrono::steady_clock::now(); }
-
-inline Duration in_seconds(double seconds) {
-  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
-}
-
-struct BoardOptions {
-  std::string port;  ///< path, usb:VID:PID[:SERIAL], or empty: the only one
+struct BoardOptions : BoardSetup {
   bool json = false;
-  std::string cells_file;  ///< empty: by the board's id
-  std::string cell_input = "a128";
-  int cell_rate = 80;             ///< conversions/s
-  int adc_rate = 0;               ///< samples/s of each channel; 0: off
   std::optional<double> seconds;  ///< then end
   double line_period = 0.25;      ///< s between the lines that `watch` prints for people
 

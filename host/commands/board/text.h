@@ -4,8 +4,8 @@
 #include <array>
 #include <string>
 
+#include "host/app/board/board_loop.h"
 #include "host/board/cell_calibration.h"
-#include "host/commands/board/loop.h"
 
 namespace tagwrench {
 

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "host/board/cell_file.h"
+#include "host/commands/board/options.h"
 #include "host/commands/board/text.h"
 #include "host/core/log.h"
 #include "host/output/text_sink.h"

@@ -80,7 +80,7 @@ void add_readings(const std::vector<NumberedReading>& readings, bool hold, std::
 void track_frames(Input& input, const std::vector<AcceptedStep>& steps,
                   std::vector<StepRecord>& records) {
   FrameSource& source = *input.source;
-  Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
+  Tracker tracker = make_tracker(input.sensor);
   Frame frame;
   for (ReadStatus status; (status = source.read(frame)) != ReadStatus::end;) {
     if (status != ReadStatus::frame) continue;

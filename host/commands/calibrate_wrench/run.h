@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <optional>
 
+#include "host/app/bench_input.h"
 #include "host/calibration/wrench/guide.h"
 #include "host/calibration/wrench/reference.h"
-#include "host/commands/bench_input.h"
 #include "host/commands/calibrate_wrench/progress.h"
 #include "host/commands/calibrate_wrench/recorder.h"
 #include "host/commands/events.h"

@@ -5,12 +5,28 @@
 #include <string>
 
 #include "host/board/board_link.h"
-#include "host/commands/board/options.h"
+#include "host/board/cell_calibration.h"
+#include "host/core/types.h"
 
 namespace tagwrench {
 
-/// Of the options: a session's random numbers and the board's configuration.
-link::BoardSessionOptions session_options(const BoardOptions& options);
+inline TimePoint clock_now() { return std::chrono::steady_clock::now(); }
+
+inline Duration in_seconds(double seconds) {
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+}
+
+/// Which board, and what it shall do.
+struct BoardSetup {
+  std::string port;        ///< path, usb:VID:PID[:SERIAL], or empty: the only one
+  std::string cells_file;  ///< empty: by the board's id
+  std::string cell_input = "a128";
+  int cell_rate = 80;  ///< conversions/s
+  int adc_rate = 0;    ///< samples/s of each channel; 0: off
+};
+
+/// Of the setup: a session's random numbers and the board's configuration.
+link::BoardSessionOptions session_options(const BoardSetup& options);
 
 class BoardLoop {
  public:
@@ -49,14 +65,14 @@ class BoardLoop {
   std::string refusal_;  ///< why a board of another version cannot be spoken to
 };
 
-/// Calibration file of the options, or the one kept for this board; empty if it has no id.
-std::string cells_path(const BoardOptions& options, const link::BoardSession& session);
+/// Calibration file of the setup, or the one kept for this board; empty if it has no id.
+std::string cells_path(const BoardSetup& options, const link::BoardSession& session);
 
 /// Throws ConfigError if a calibration file was named and there is none.
-void check_cells_file(const BoardOptions& options);
+void check_cells_file(const BoardSetup& options);
 
 /// What cells_path() holds; nothing is calibrated without it. Throws ConfigError if it cannot be
 /// used.
-link::CellCalibrations load_cells(const BoardOptions& options, const link::BoardSession& session);
+link::CellCalibrations load_cells(const BoardSetup& options, const link::BoardSession& session);
 
 }  // namespace tagwrench

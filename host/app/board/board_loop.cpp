@@ -1,4 +1,4 @@
-#include "host/commands/board/loop.h"
+#include "host/app/board/board_loop.h"
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -29,7 +29,7 @@ link::CellInput cell_input(const std::string& name) {
 
 }  // namespace
 
-link::BoardSessionOptions session_options(const BoardOptions& options) {
+link::BoardSessionOptions session_options(const BoardSetup& options) {
   link::BoardSessionOptions out = link::new_session();
   std::fill(std::begin(out.configuration.cells), std::end(out.configuration.cells),
             cell_input(options.cell_input));
@@ -98,19 +98,19 @@ bool BoardLoop::settle() {
   return true;
 }
 
-std::string cells_path(const BoardOptions& options, const link::BoardSession& session) {
+std::string cells_path(const BoardSetup& options, const link::BoardSession& session) {
   if (!options.cells_file.empty()) return options.cells_file;
   const std::string id = link::id_text(session.hello().unique_id);
   return id.empty() ? std::string() : link::cell_file_path(id);
 }
 
-void check_cells_file(const BoardOptions& options) {
+void check_cells_file(const BoardSetup& options) {
   std::error_code error;
   if (!options.cells_file.empty() && !std::filesystem::exists(options.cells_file, error))
     throw ConfigError(fmt::format("--cells {}: there is no such file", options.cells_file));
 }
 
-link::CellCalibrations load_cells(const BoardOptions& options, const link::BoardSession& session) {
+link::CellCalibrations load_cells(const BoardSetup& options, const link::BoardSession& session) {
   const std::string path = cells_path(options, session);
   if (path.empty()) return {};
   return link::load_cells(path, link::id_text(session.hello().unique_id),

@@ -1,13 +1,13 @@
-#include "host/commands/board/run_board.h"
+#include "host/app/board/run_board.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "host/app/board/board_output.h"
 #include "host/board/cell_file.h"
 #include "host/calibration/light/settle.h"
-#include "host/commands/board/board_output.h"
 #include "host/core/log.h"
 #include "host/wrench/zero.h"
 
@@ -45,12 +45,12 @@ class SteadyLamp final : public Lamp {
 
 }  // namespace
 
-RunBoard::RunBoard(const BoardOptions& options)
-    : rate_(options.cell_rate), loop_(options.port, session_options(options), "--board") {
-  check_cells_file(options);
+RunBoard::RunBoard(const BoardSetup& setup)
+    : rate_(setup.cell_rate), loop_(setup.port, session_options(setup), "--board") {
+  check_cells_file(setup);
   connected_ = loop_.settle();
   if (!connected_) return;
-  cells_ = load_cells(options, loop_.session());
+  cells_ = load_cells(setup, loop_.session());
 }
 
 RunBoard::~RunBoard() { SteadyLamp(loop_.link()).set_level(0); }
@@ -127,6 +127,14 @@ bool RunBoard::tare(std::size_t channel) noexcept {
 
 void RunBoard::record_to(record::RecordingWriter& writer) {
   if (output_ != nullptr) output_->record_to(writer);
+}
+
+std::unique_ptr<RunBoard> open_board(const std::string& port, const std::string& cells_file) {
+  if (port.empty()) return nullptr;
+  BoardSetup setup;
+  setup.port = port == "auto" ? "" : port;
+  setup.cells_file = cells_file;
+  return std::make_unique<RunBoard>(setup);
 }
 
 }  // namespace tagwrench

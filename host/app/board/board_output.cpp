@@ -1,4 +1,4 @@
-#include "host/commands/board/board_output.h"
+#include "host/app/board/board_output.h"
 
 #include <fmt/format.h>
 

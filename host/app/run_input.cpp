@@ -1,4 +1,4 @@
-#include "host/commands/run_input.h"
+#include "host/app/run_input.h"
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -10,8 +10,8 @@
 #include <cstring>
 #include <utility>
 
+#include "host/app/camera_wait.h"
 #include "host/app/sources.h"
-#include "host/commands/camera_wait.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/config_folder.h"
@@ -27,7 +27,7 @@ namespace {
 /// Whether the source shows the sensor's tags within `patience`. A signal ends the search; the loop
 /// then sees it too.
 bool sees_tags(Input& input, Duration patience) {
-  Tracker tracker(input.sensor.camera, input.sensor.target, input.sensor.rest);
+  Tracker tracker = make_tracker(input.sensor);
   const UniqueFd stop = termination_fd();
   const TimePoint until = std::chrono::steady_clock::now() + patience;
   for (TimePoint now; (now = std::chrono::steady_clock::now()) < until;) {

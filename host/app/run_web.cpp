@@ -1,4 +1,4 @@
-#include "host/commands/run_web.h"
+#include "host/app/run_web.h"
 
 #include <fmt/format.h>
 #include <spawn.h>
@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "host/commands/recording.h"
+#include "host/app/recording.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/config_folder.h"

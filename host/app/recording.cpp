@@ -1,4 +1,4 @@
-#include "host/commands/recording.h"
+#include "host/app/recording.h"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -13,8 +13,8 @@
 #include <filesystem>
 
 #include "host/app/recording_sensor.h"
-#include "host/commands/count_text.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 #include "host/core/os/atomic_file.h"
 
 namespace tagwrench {

@@ -4,9 +4,9 @@
 #include <memory>
 #include <string>
 
+#include "host/app/board/board_loop.h"
+#include "host/app/board/board_output.h"
 #include "host/app/input.h"
-#include "host/commands/board/board_output.h"
-#include "host/commands/board/loop.h"
 #include "host/output/output.h"
 #include "host/web/bridge/board_control.h"
 
@@ -16,7 +16,7 @@ class RunBoard final : public BoardControl {
  public:
   /// Waits for the board, some seconds at most. Throws ConfigError if there is no board of ours, or
   /// its load cells' file cannot be used.
-  explicit RunBoard(const BoardOptions& options);
+  explicit RunBoard(const BoardSetup& setup);
   RunBoard(const RunBoard&) = delete;
   RunBoard& operator=(const RunBoard&) = delete;
   /// Turns the light off.
@@ -56,5 +56,8 @@ class RunBoard final : public BoardControl {
   double exposure_us_ = 0;  ///< 0: not known
   BoardOutput* output_ = nullptr;
 };
+
+/// `port`: as BoardSetup has it, `auto` for the only one; null if it is empty.
+std::unique_ptr<RunBoard> open_board(const std::string& port, const std::string& cells_file);
 
 }  // namespace tagwrench

@@ -1,4 +1,4 @@
-#include "host/commands/bench_input.h"
+#include "host/app/bench_input.h"
 
 #include <utility>
 

@@ -1,4 +1,4 @@
-#include "host/commands/camera_wait.h"
+#include "host/app/camera_wait.h"
 
 #include <poll.h>
 #include <sys/inotify.h>

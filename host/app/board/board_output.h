@@ -7,12 +7,12 @@
 #include <optional>
 #include <string>
 
+#include "host/app/board/board_record.h"
 #include "host/board/board_link.h"
 #include "host/board/cell_calibration.h"
 #include "host/board/ring.h"
 #include "host/board/sample_history.h"
 #include "host/calibration/check/reference_monitor.h"
-#include "host/commands/board/board_record.h"
 #include "host/output/output.h"
 #include "host/output/sample_text.h"
 #include "host/output/text_sink.h"

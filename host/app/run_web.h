@@ -5,10 +5,10 @@
 #include <memory>
 #include <span>
 
+#include "host/app/board/run_board.h"
 #include "host/app/input.h"
 #include "host/app/outputs.h"
-#include "host/commands/board/run_board.h"
-#include "host/commands/run_command.h"
+#include "host/app/run_options.h"
 #include "host/core/os/unique_fd.h"
 #include "host/web/bridge/web_bridge.h"
 

@@ -1,4 +1,4 @@
-#include "host/commands/board/board_record.h"
+#include "host/app/board/board_record.h"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "host/app/input.h"
-#include "host/commands/run_command.h"
+#include "host/app/run_options.h"
 #include "host/output/service_watch.h"
 
 namespace tagwrench {
