@@ -9,13 +9,14 @@
 
 #include <poll.h>
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "host/app/frame_watch.h"
+#include "host/app/output_scheduler.h"
+#include "host/app/status_lines.h"
 #include "host/core/frame_log.h"
 #include "host/core/sleep_watch.h"
 #include "host/motion/profile_manager.h"
@@ -52,6 +53,9 @@ class Pipeline {
   Pipeline(FrameSource& source, Tracker& tracker, WrenchEstimator& wrench, ProfileManager& profiles,
            std::vector<Output*> outputs, Watchdog& watchdog, int stop_fd, FrameLog* log = nullptr);
 
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
   /// Takes the zero off every sample; without it the wrench stays as it is estimated. Borrowed.
   void follow_zero(ZeroTracking& zero) noexcept { zero_ = &zero; }
 
@@ -63,20 +67,13 @@ class Pipeline {
 
  private:
   void step(Frame& frame) noexcept;
-  void send(Sample& sample, std::optional<Duration> recorded_latency) noexcept;
-  void send_neutral(std::optional<Duration> recorded_latency) noexcept;
-  void move(const Sample& sample) noexcept;
-  void move_on(TimePoint now) noexcept;
-  void note(SendStatus status, const Output& output) noexcept;
-  std::uint32_t pressed() const noexcept;
-  void follow_zero(Sample& sample, const Vector6& noise) noexcept;
-  void guard() noexcept;
-  bool read_source() noexcept;
-  void note_arrival(TimePoint now) noexcept;
+  void miss(std::optional<Duration> recorded_latency) noexcept;
+  void change(ReadStatus status, std::optional<Duration> recorded_latency) noexcept;
   void wait(TimePoint until) noexcept;
-  void say(std::string_view line) noexcept;
-  void say_diagnostic(const Track& track) noexcept;
-  TimePoint wake_time(const RunLimits& limits) const noexcept;
+  void follow_zero(Sample& sample, const Vector6& noise) noexcept;
+  Sample moved_on(TimePoint now) noexcept;
+  void note(SendStatus status, const Output& output) noexcept;
+  bool live() const noexcept { return source_.poll_fd() >= 0; }
   TimePoint missing_at() const noexcept;
 
   FrameSource& source_;
@@ -84,23 +81,18 @@ class Pipeline {
   WrenchEstimator& wrench_;
   ProfileManager& profiles_;
   std::vector<Output*> outputs_;
-  std::vector<pollfd> polled_;  ///< source, stop, profiles, then each output
-  Watchdog& watchdog_;
   int stop_fd_;
   FrameLog* log_;
   ZeroTracking* zero_ = nullptr;
   SleepWatch sleep_{time_asleep()};
+  FrameWatch frames_;
+  OutputScheduler scheduler_;
+  StatusLines lines_{outputs_};
 
-  TimePoint start_{};
-  TimePoint last_arrival_{};
-  TimePoint next_move_ = TimePoint::max();  ///< of devices that move at a rate of their own
-  std::array<Duration, 3> intervals_;       ///< the last three between frames
-  Duration interval_;                       ///< to be expected, at least the announced period
-  bool neutral_ = true;
+  std::vector<pollfd> polled_;  ///< source, stop, profiles, then each output
   bool source_ready_ = false;
-  Diagnostic last_diagnostic_ = Diagnostic::none;
-  bool trouble_shown_ = false;  ///< since the target was last held
   Sample last_sample_;
+  bool neutral_ = true;  ///< all that others see is
   RunReport report_;
   std::optional<RunReport::End> end_;
 };
