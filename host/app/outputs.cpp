@@ -19,6 +19,7 @@
 #include "host/output/jsonl.h"
 #include "host/output/spacemouse.h"
 #include "host/output/terminal.h"
+#include "host/output/udp.h"
 #include "host/output/wrench_hid.h"
 #include "host/web/server/web_place.h"
 
@@ -166,6 +167,14 @@ constexpr std::array kRows = {
               .moves = as_spacemouse,
               .accepts = is_face,
               .open = open_gadget},
+    OutputRow{
+        .kind = OutputKind::device,
+        .name = "udp",
+        .argument = ":HOST:PORT",
+        .help = "opentrack's UDP over network, in cm and degrees",
+        .moves = always,
+        .open = [](const OutputSetup&,
+                   Argument place) { return with_watchdog(std::make_unique<UdpOutput>(place)); }},
     OutputRow{.kind = OutputKind::reference,
               .name = "reference",
               .argument = ":FILE",
