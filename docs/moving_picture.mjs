@@ -1,6 +1,7 @@
-// Makes docs/moving.webp, the moving picture of the README: node docs/moving_picture.mjs [OUT.webp]
+// Makes docs/moving.webp, the moving picture of the README: `./run picture`, or node docs/moving_picture.mjs [OUT.webp]
 //
-// It takes the program and the dashboard (`./run web` builds both), and of Debian: chromium, nodejs, sqlite3, webp.
+// It takes the program and the dashboard (`./run web` builds both), and of Debian: chromium, nodejs, sqlite3, webp. With
+// TAGWRENCH_KEEP_FRAMES=FOLDER the single pictures stay there.
 //
 // A simulated hand pushes the platform along x, y and z and turns it about x, y and z. The pictures of the simulated
 // camera go through `tagwrench record`; what it measured is played to the real dashboard, one frame after the other, however
@@ -8,7 +9,7 @@
 // seconds before the first one are those of the round before.
 import { spawnSync } from 'node:child_process';
 import { copyFileSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
-import { join, resolve } from 'node:path';
+import { basename, join, resolve } from 'node:path';
 import { openChromium, openPage } from '../tests/browser/support/chromium.mjs';
 import { program, reason, root, scratch, webBuild } from '../tests/browser/support/environment.mjs';
 import { FakeBridge } from '../tests/browser/support/fake_bridge.mjs';
@@ -33,13 +34,16 @@ const kHeight = 540;
 
 /** Of the dashboard, what a small picture has room for. */
 const kLayout = `
-  body > header, body > nav, body > footer, header, nav, footer, .panel-run, .gauges, .picture-toggle, .panel-traces button,
+  header, nav, footer, .panel-run, .gauges, .picture-toggle, .panel-traces button,
   .readings-sums, .readings-actions, .readings thead, .readings .sigma, .readings .peak { display: none !important; }
   html { scrollbar-gutter: auto !important; overflow: hidden !important; }
   body, main { overflow: hidden !important; scrollbar-gutter: auto !important; }
-  .view-live { grid-template: auto 1fr / 312px minmax(0, 1fr) 232px !important; grid-template-areas: 'camera traces numbers' 'platform traces numbers' !important; align-items: stretch !important; height: ${kHeight - 24}px; }
+  .view-live { height: ${kHeight - 24}px; align-items: stretch !important; grid-template: auto 1fr / 312px minmax(0, 1fr) 232px !important;
+    grid-template-areas: 'camera traces numbers' 'platform traces numbers' !important; }
   .view-live .column { display: contents !important; }
-  .panel-camera { grid-area: camera; } .panel-platform { grid-area: platform; } .panel-traces { grid-area: traces; height: auto !important; }
+  .panel-camera { grid-area: camera; }
+  .panel-platform { grid-area: platform; }
+  .panel-traces { grid-area: traces; height: auto !important; }
   .panel-numbers { grid-area: numbers; display: grid; grid-template-rows: auto minmax(0, 1fr); padding-bottom: 36px !important; }
   .readings { height: 100%; }
   .traces { min-height: 0; grid-template-rows: repeat(5, minmax(0, 1fr)) minmax(0, 1.28fr); }
@@ -183,6 +187,8 @@ for (let at = 0; at < round.length; at += kEvery) {
 await browser.close();
 await bridge.stop();
 if (faults.length > 0) throw new Error(faults.join('\n'));
-if (process.env.TAGWRENCH_KEEP_FRAMES) for (const shot of shots) copyFileSync(shot, join(process.env.TAGWRENCH_KEEP_FRAMES, shot.split('/').at(-1)));
-run('img2webp', ['-loop', '0', '-lossy', '-q', String(kQuality), '-m', '6', '-d', String((1000 * kEvery) / kFps), ...shots, '-o', kOut]);
+const keep = process.env.TAGWRENCH_KEEP_FRAMES;
+if (keep) for (const shot of shots) copyFileSync(shot, join(keep, basename(shot)));
+const forEach = ['-lossy', '-q', String(kQuality), '-m', '6', '-d', String((1000 * kEvery) / kFps)];
+run('img2webp', ['-loop', '0', ...forEach, ...shots, '-o', kOut]);
 console.log(`${kOut}: ${shots.length} pictures, ${(readFileSync(kOut).length / 1024).toFixed(0)} KiB`);
