@@ -28,7 +28,7 @@ const kAxes = [
   ['mz', -0.0075],
 ];
 const kShown_s = 20; // of the dashboard's traces
-const kQuality = 55; // of WebP
+const kQuality = 75; // of WebP; a whole picture now and then wipes away what lossy differences leave
 const kWidth = 920;
 const kHeight = 540;
 
@@ -189,6 +189,6 @@ await bridge.stop();
 if (faults.length > 0) throw new Error(faults.join('\n'));
 const keep = process.env.TAGWRENCH_KEEP_FRAMES;
 if (keep) for (const shot of shots) copyFileSync(shot, join(keep, basename(shot)));
-const forEach = ['-lossy', '-q', String(kQuality), '-m', '6', '-d', String((1000 * kEvery) / kFps)];
-run('img2webp', ['-loop', '0', ...forEach, ...shots, '-o', kOut]);
+const forEach = ['-lossy', '-q', String(kQuality), '-m', '4', '-d', String((1000 * kEvery) / kFps)];
+run('img2webp', ['-loop', '0', '-kmin', '3', '-kmax', '9', ...forEach, ...shots, '-o', kOut]);
 console.log(`${kOut}: ${shots.length} pictures, ${(readFileSync(kOut).length / 1024).toFixed(0)} KiB`);
