@@ -124,9 +124,12 @@ class PipelineLoop : public testing::Test {
     WrenchEstimator wrench(sensor_.wrench);
     ProfileManager desk(default_profile(sensor_));
     Watchdog watchdog({});
-    std::vector<Output*> fed;
-    for (const std::unique_ptr<Output>& output : outputs_) fed.push_back(output.get());
-    return Pipeline(source, tracker, wrench, desk, fed, watchdog, stop_.get()).run(limits);
+    return Pipeline(source, tracker, wrench, desk, fed(), watchdog, stop_.get()).run(limits);
+  }
+  std::vector<Output*> fed() const {
+    std::vector<Output*> all;
+    for (const std::unique_ptr<Output>& output : outputs_) all.push_back(output.get());
+    return all;
   }
   const Recorder& recorder() const { return static_cast<const Recorder&>(*outputs_.back()); }
 

@@ -66,7 +66,7 @@ class RecordedLoop : public PipelineLoop {
     WrenchEstimator wrench(sensor_.wrench);
     ProfileManager desk(default_profile(sensor_));
     Watchdog watchdog({});
-    Pipeline(source, tracker, wrench, desk, outputs_, watchdog, stop_.get(), log).run({});
+    Pipeline(source, tracker, wrench, desk, fed(), watchdog, stop_.get(), log).run({});
     std::uint64_t stopped = 0;
     ::eventfd_read(stop_.get(), &stopped);
     return recorder().samples;
