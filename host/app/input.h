@@ -14,8 +14,6 @@
 
 namespace tagwrench {
 
-enum class SourceKind : std::uint8_t { simulator, camera, images, recording };
-
 struct Spec {
   std::string kind;
   std::string argument;

@@ -86,6 +86,7 @@ RunFacts run_facts(const RunOptions& options, std::span<const OutputSpec> output
   const bool is_file = input.sensor_text.empty() && !input.recorded;
   if (is_file) facts.place.sensor = fs::absolute(input.sensor_name).string();
   facts.place.source = input.spec;
+  facts.place.source_kind = input.kind;
   facts.place.board = options.board;
   facts.place.cells = options.cells;
   facts.place.calibrated = !input.sensor.calibration.empty();

@@ -15,6 +15,8 @@
 
 namespace tagwrench {
 
+enum class SourceKind : std::uint8_t { simulator, camera, images, recording };
+
 struct SourceFormat {
   int width = 0;
   int height = 0;

@@ -53,13 +53,9 @@ const JobVerb& verb_named(std::string_view name) {
       "page");
 }
 
-std::string source_kind(const JobPlace& place) {
-  return place.source.substr(0, place.source.find(':'));
-}
-
 /// Why it cannot be, whatever the options; empty if it can.
 std::string objection_to(const JobVerb& verb, const JobPlace& place) {
-  const std::string kind = source_kind(place);
+  const SourceKind kind = place.source_kind;
   if (verb.needs != Needs::nothing && place.sensor.empty()) {
     return fmt::format(
         "{}: this sensor has no sensor.yaml to write to; start with `tagwrench run --sensor FILE`",
@@ -74,11 +70,11 @@ std::string objection_to(const JobVerb& verb, const JobPlace& place) {
         "them",
         verb.name);
   }
-  if (verb.name == "camera" && kind != "v4l2" && kind != "images")
+  if (verb.name == "camera" && kind != SourceKind::camera && kind != SourceKind::images)
     return "camera: needs a real camera; start with `tagwrench run --source v4l2:/dev/videoN`";
-  if (verb.camera && kind == "recording")
+  if (verb.camera && kind == SourceKind::recording)
     return fmt::format("{}: needs a live sensor, and this is a recording of one", verb.name);
-  if (verb.name == "wrench" && kind == "images")
+  if (verb.name == "wrench" && kind == SourceKind::images)
     return "wrench: nobody is in the pictures who could hang a weight; use a camera or sim";
   return {};
 }
@@ -163,13 +159,13 @@ void add_wrench(JobOptions& options, const JobPlace& place, std::vector<std::str
     throw RequestRefused("plan: must be one of " + names);
   }
   const ReferenceKind reference = parse_plan(ready->text, ready->name).reference;
-  if (reference == ReferenceKind::six_axis && source_kind(place) != "sim") {
+  if (reference == ReferenceKind::six_axis && place.source_kind != SourceKind::simulator) {
     throw RequestRefused(fmt::format(
         "plan {}: needs the port of the six-axis sensor; run `tagwrench calibrate wrench` in a "
         "terminal",
         plan));
   }
-  if (reference == ReferenceKind::load_cell && source_kind(place) != "sim") {
+  if (reference == ReferenceKind::load_cell && place.source_kind != SourceKind::simulator) {
     if (place.board.empty()) {
       throw RequestRefused(
           fmt::format("plan {}: needs a load cell; start with `tagwrench run --board PORT`", plan));

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "host/source/frame_source.h"
+
 namespace tagwrench {
 
 /// One line for the page that wished: what cannot be, and what to do.
@@ -18,8 +20,9 @@ class RequestRefused : public std::runtime_error {
 
 /// What the bridge works with, which a job gets too.
 struct JobPlace {
-  std::string sensor;       ///< path of sensor.yaml; empty: the sensor has none
-  std::string source;       ///< SRC
+  std::string sensor;  ///< path of sensor.yaml; empty: the sensor has none
+  std::string source;  ///< SRC
+  SourceKind source_kind = SourceKind::simulator;
   std::string board;        ///< port; empty: there is none
   std::string cells;        ///< calibration of its load cells; may be empty
   bool calibrated = false;  ///< sensor.yaml names a calibration

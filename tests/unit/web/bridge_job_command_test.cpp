@@ -62,6 +62,7 @@ TEST(JobCommands, TakeNothingThatWasNotLookedAt) {
   EXPECT_NE(refusal_of("check", {{"mass_g", 50}, {"at", {1, 2, "x"}}}, place), "");
   JobPlace camera = place;
   camera.source = "v4l2:/dev/video0";
+  camera.source_kind = SourceKind::camera;
   EXPECT_NE(refusal_of("camera", {{"board", "--help"}}, camera), "");
   EXPECT_EQ(refusal_of("camera", {{"board", "charuco:9x6:1.2mm:0.9mm:aruco_4x4_50"}}, camera), "");
 }
@@ -79,6 +80,7 @@ TEST(JobCommands, SayWhatIsMissing) {
   EXPECT_EQ(possible_jobs(place), (Words{"certificate", "doctor"}));
   place = bench_place();
   place.source = "v4l2:/dev/video0";
+  place.source_kind = SourceKind::camera;
   EXPECT_NE(refusal_of("wrench", {{"plan", "load_cell"}}, place).find("--board"),
             std::string::npos);
   place.board = "auto";
