@@ -66,19 +66,16 @@ constexpr Declared (*kCommands[])(command_line::Command) = {
     declare<ControlCommand>, declare<SpnavCommand>, declare<GadgetCommand>, declare<DoctorCommand>,
     declare<ManualCommand>};
 
-int dispatch(int argc, char** argv) {
-  command_line::Program program(
-      "tagwrench: a camera under a spring platform as a 6-axis force-torque sensor and 6-DOF input "
-      "device",
-      TAGWRENCH_VERSION);
+/// What does the command that was given; nothing: help was asked for.
+std::function<int()> command_of(command_line::Program& program, int argc, char** argv) {
   program.require_subcommand();
   std::vector<Declared> commands;
   for (const auto declaration : kCommands) commands.push_back(declaration(program));
-  if (!program.parse(argc, argv)) return 0;
+  if (!program.parse(argc, argv)) return {};
   for (const Declared& command : commands) {
-    if (command.parsed()) return command.run();
+    if (command.parsed()) return command.run;
   }
-  return 0;
+  return {};
 }
 
 /// A closed standard stream would give its number to the next file that is opened, a device's say.
@@ -99,7 +96,12 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);  // and so does a reader that has gone
   cv::setNumThreads(1);           // one thread, one poll loop
   try {
-    return dispatch(argc, argv);
+    command_line::Program program(
+        "tagwrench: a camera under a spring platform as a 6-axis force-torque sensor and 6-DOF "
+        "input device",
+        TAGWRENCH_VERSION);
+    const std::function<int()> command = command_of(program, argc, argv);
+    return command ? command() : 0;
   } catch (const ConfigError& e) {
     log_info(e.what());
     return kUnusable;

@@ -236,21 +236,22 @@ std::vector<Output*> Instrument::fed() {
   return all;
 }
 
-RunReport Instrument::run() {
-  const RunReport report = pipeline_->run(limits_);
+/// Pages are told, and the watchdog is dismissed, before outputs go.
+void Instrument::end_loop(const RunReport& report) {
   session_.frames += report.frames;
   pipeline_.reset();
   watchdog_.reset();
   pages_.reset();
-  return report;
 }
 
-void Instrument::lend() {
+void Instrument::lend(const RunReport& report) {
+  end_loop(report);
   board_output_.reset();
   session_.outputs.close_for_job();
 }
 
 int Instrument::end(const RunReport& report) {
+  end_loop(report);
   board_output_.reset();
   session_.outputs.close();  // neutral, then gone, before anything else is said
   session_.watch.reset();

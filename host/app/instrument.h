@@ -55,10 +55,12 @@ class Instrument {
   Instrument& operator=(const Instrument&) = delete;
   ~Instrument();
 
-  /// The loop; pages are told when it is over.
-  RunReport run();
+  Pipeline& pipeline() { return *pipeline_; }
+  const RunLimits& limits() const { return limits_; }
+
+  // Once the loop is over.
   /// Brings to their end, at once, those outputs that do not outlive a job.
-  void lend();
+  void lend(const RunReport& report);
   /// Brings all outputs to their end, and says what there is to say. The exit status.
   int end(const RunReport& report);
 
@@ -78,6 +80,7 @@ class Instrument {
   void begin_pages(RegionSource* region);
   void begin_recording(const record::Head& head);
   std::vector<Output*> fed();
+  void end_loop(const RunReport& report);
 
   // In the order in which they are built.
   RunSession& session_;

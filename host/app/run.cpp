@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cctype>
 #include <memory>
-#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "host/app/instrument.h"
@@ -53,41 +53,12 @@ void check_name(const std::string& name) {
         fmt::format("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name));
 }
 
-/// The exit status; nothing: the camera is wanted for something else, and the run goes on after it.
-std::optional<int> run_once(RunSession& session) {
-  const std::unique_ptr<Instrument> instrument = Instrument::build(session);
-  if (!instrument) return 0;
-  const RunReport report = instrument->run();
-  const bool lent = report.end == RunReport::End::interrupted && !termination_requested();
-  if (!lent) return instrument->end(report);
-  instrument->lend();
-  return std::nullopt;
-}
-
 /// What goes on while there is no run.
 std::vector<Output*> beside(RunSession& session) {
   session.outputs.close_for_job();
   std::vector<Output*> all = session.outputs.all();
   if (session.watch) all.push_back(session.watch.get());
   return all;
-}
-
-/// One run after the other, as pages want the camera and give it back.
-int run_with_pages(RunSession& session) {
-  const UniqueFd stop = termination_fd();
-  session.pages = open_web(session.options, session.asked, stop);
-  for (bool first = true;; first = false) {
-    bool again = false;
-    try {
-      if (const std::optional<int> status = run_once(session)) return *status;
-      again = session.pages->lend_camera(beside(session));
-    } catch (const ConfigError& e) {
-      if (first) throw;
-      log_info(e.what());
-      again = session.pages->wait_after(e.what(), beside(session));
-    }
-    if (!again) return 0;
-  }
 }
 
 }  // namespace
@@ -100,7 +71,27 @@ int run(const RunOptions& given) {
   const bool pages = has_web(given, asked);
   RunSession session{with_own_sensor(given), asked};
   if (session.options.record) check_recording(*session.options.record);
-  return pages ? run_with_pages(session) : *run_once(session);
+  const UniqueFd stop = termination_fd();
+  if (pages) session.pages = open_web(session.options, asked, stop);
+  // One run after the other, as pages want the camera and give it back.
+  for (bool first = true;; first = false) {
+    std::string failure;
+    try {
+      const std::unique_ptr<Instrument> instrument = Instrument::build(session);
+      if (!instrument) return 0;
+      const RunReport report = instrument->pipeline().run(instrument->limits());
+      const bool lent = report.end == RunReport::End::interrupted && !termination_requested();
+      if (!lent || !pages) return instrument->end(report);
+      instrument->lend(report);
+    } catch (const ConfigError& e) {
+      if (first) throw;
+      failure = e.what();
+      log_info(failure);
+    }
+    const bool again = failure.empty() ? session.pages->lend_camera(beside(session))
+                                       : session.pages->wait_after(failure, beside(session));
+    if (!again) return 0;
+  }
 }
 
 }  // namespace tagwrench
