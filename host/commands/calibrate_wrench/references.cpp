@@ -6,8 +6,8 @@
 #include <variant>
 
 #include "host/app/board/board_loop.h"
-#include "host/commands/board/options.h"
 #include "host/board/optoforce_sensor.h"
+#include "host/commands/board/options.h"
 #include "host/commands/emulated_cell.h"
 #include "host/core/config_error.h"
 #include "host/source/simulator/bench_references.h"
