@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "host/app/sources.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
@@ -19,6 +22,23 @@ Spec split_spec(const std::string& spec) {
 }
 
 std::string paper_sensor_yaml() { return sim::sensor_yaml(sim::Scenario{}); }
+
+std::string paper_sensor_yaml(const CameraModel& camera) {
+  sim::Scenario scenario;
+  sim::Camera& to = scenario.camera;
+  to.width_px = camera.width_px;
+  to.height_px = camera.height_px;
+  to.fx_px = camera.fx_px;
+  to.fy_px = camera.fy_px;
+  to.cx_px = camera.cx_px;
+  to.cy_px = camera.cy_px;
+  std::copy(camera.distortion.begin(), camera.distortion.end(), to.distortion.begin());
+  to.mirrored = camera.mirrored;
+  const std::string text = sim::sensor_yaml(scenario);
+  return "# The camera as it was found; target and springs are the paper's: change what "
+         "differs.\n" +
+         text.substr(text.find('\n') + 1);
+}
 
 Input open_input(const InputOptions& options) {
   const SourceSpec spec = parse_source(options.source);
@@ -44,9 +64,10 @@ void check_appearance(const Input& input) {
   const auto mismatch = check_appearance(sensor.camera, sensor.target, sensor.rest);
   if (!mismatch) return;
   throw ConfigError(fmt::format(
-      "sensor.yaml: rest.appearance: the picture does not show tag {} of {} where the rest pose "
-      "puts it (likeness {:.2f}); run `tagwrench calibrate target`, or remove rest.appearance",
-      mismatch->id, name(sensor.target.family), mismatch->likeness));
+      "{}: the picture at rest does not show tag {} of {} where the rest pose puts it (likeness "
+      "{:.2f}); run `tagwrench calibrate target`, or remove {}",
+      sensor.target_from.file, mismatch->id, name(sensor.target.family), mismatch->likeness,
+      sensor.target_from.file == InForce{}.file ? "rest.appearance" : "the file"));
 }
 
 Tracker make_tracker(const SensorConfig& sensor) {

@@ -47,6 +47,9 @@ Input open_input(const InputOptions& options);
 /// sensor.yaml of the paper's sensor with nominal lens: what a fresh build comes closest to.
 std::string paper_sensor_yaml();
 
+/// The same behind this camera: a whole new sensor.yaml for people to change.
+std::string paper_sensor_yaml(const CameraModel& camera);
+
 /// Throws ConfigError unless the source's frames have the size that the sensor's camera has.
 void check_size(const Input& input);
 

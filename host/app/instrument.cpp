@@ -199,6 +199,7 @@ void Instrument::open_outputs() {
 void Instrument::announce() const {
   const std::string source = "source: " + input_.source->format().description;
   log_info(source);
+  for (const std::string& line : in_force(input_.sensor)) log_info(line);
   if (!input_.sensor.completed_axes.empty()) {
     log_info(
         fmt::format("not calibrated, but as the springs are described: {}; their standard "

@@ -70,6 +70,7 @@ record::Head recording_head(const Input& input, record::Keep keep) {
     head.sensor_yaml = input.recorded->sensor_yaml;
     head.appearance = input.recorded->appearance;
     head.calibration = input.recorded->calibration;
+    head.measured = input.recorded->measured;
   } else {
     const bool is_file = input.sensor_text.empty();
     take_sensor(input.sensor_name, is_file ? read_text(input.sensor_name) : input.sensor_text,

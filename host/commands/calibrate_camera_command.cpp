@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
+#include <filesystem>
 #include <memory>
+#include <optional>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -16,17 +18,18 @@
 #include "host/calibration/print/board_spec.h"
 #include "host/commands/events.h"
 #include "host/commands/exit_status.h"
-#include "host/commands/today.h"
+#include "host/commands/measured_results.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
-#include "host/sensor/sensor_edit.h"
+#include "host/sensor/measured_files.h"
 #include "host/source/images.h"
 
 namespace tagwrench {
 namespace {
 
+namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr int kViewsFromCamera = 20;
@@ -34,66 +37,70 @@ constexpr int kViewsFromFolders = 60;
 constexpr Duration kSayEvery = std::chrono::seconds(2);
 constexpr double kGuessedFocal = 1.25;  // of the image's width
 
-/// The sensor.yaml that is edited, and where the result goes.
+/// The sensor whose camera it is, and where the result goes.
 struct Record {
-  std::string text;
-  std::string target;
+  std::optional<MeasuredSensor> measured;  ///< of --sensor
+  std::string fresh;                       ///< path of the whole new sensor.yaml without one
   SensorConfig sensor;
-  bool known = false;  ///< there was a --sensor; else the sensor is the paper's
+
+  bool known() const { return measured.has_value(); }
+  fs::path file() const { return known() ? measured->sensor() : fs::path(fresh); }
 };
 
-SectionEdit camera_section(const CameraModel& camera, const CameraFit& fit) {
-  const auto& [k1, k2, p1, p2, k3] = camera.distortion;
-  return {
-      "camera",
-      {{"width", fmt::format("{}", camera.width_px)},
-       {"height", fmt::format("{}", camera.height_px)},
-       {"fx", fmt::format("{:.3f}", camera.fx_px)},
-       {"fy", fmt::format("{:.3f}", camera.fy_px)},
-       {"cx", fmt::format("{:.3f}", camera.cx_px)},
-       {"cy", fmt::format("{:.3f}", camera.cy_px)},
-       {"distortion", fmt::format("[{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]", k1, k2, p1, p2, k3)},
-       {"mirrored", fmt::format("{}", camera.mirrored)},
-       {"calibrated",
-        fmt::format("{{date: {}, views: {}, rms_px: {:.4f}}}", today(), fit.used, fit.rms_px)}}};
+CameraFile camera_file(const fs::path& sensor, const CameraFit& fit) {
+  CameraFile file{fit.camera, fit.camera.mirrored, fit.used, fit.rms_px, stamp_for(sensor)};
+  if (!fit.camera.mirrored) return file;
+  file.camera.cx_px = fit.camera.width_px - 1 - fit.camera.cx_px;
+  file.camera.distortion[3] = -fit.camera.distortion[3];
+  return file;
 }
 
 Record open_record(const CalibrateCameraOptions& options) {
   Record record;
-  record.known = !options.sensor.empty();
-  record.target = options.out.empty() ? options.sensor : options.out;
-  if (record.target.empty()) {
+  if (!options.sensor.empty()) {
+    record.measured.emplace(options.sensor, options.out, std::vector<const char*>{kMeasuredCamera});
+    record.sensor = load_sensor(options.sensor, WrenchCalibration::without_camera);
+    return record;
+  }
+  record.fresh = options.out;
+  if (record.fresh.empty()) {
     throw ConfigError(
-        "calibrate camera: no file to write; name the sensor.yaml to edit with --sensor, or a new "
+        "calibrate camera: no sensor to write for; name its sensor.yaml with --sensor, or a new "
         "one with --out");
   }
-  if (record.known) {
-    record.text = read_text(options.sensor);
-    record.sensor = load_sensor(options.sensor, WrenchCalibration::ignore);
-  } else {
-    const std::string paper = paper_sensor_yaml();
-    record.text =
-        "# The camera is measured; target and springs are the paper's: change what differs.\n" +
-        paper.substr(paper.find('\n') + 1);
-    record.sensor = parse_sensor(record.text, "the built-in sensor");
-  }
+  record.sensor = parse_sensor(paper_sensor_yaml(), "the built-in sensor");
   std::error_code error;
-  if (!record.known && std::filesystem::is_regular_file(record.target, error)) {
+  if (fs::is_regular_file(record.fresh, error)) {
     throw ConfigError(fmt::format(
-        "{}: is there already, and --out makes a whole new sensor.yaml; write the camera into it "
+        "{}: is there already, and --out makes a whole new sensor.yaml; measure the camera for it "
         "with --sensor {}, or name a new file",
-        record.target, record.target));
+        record.fresh, record.fresh));
   }
-  check_replaceable(record.target);
-  check_editable(record.text, {camera_section(record.sensor.camera, {})},
-                 record.known ? options.sensor : record.target);
+  check_replaceable(record.fresh);
+  const fs::path folder = measured_folder(record.fresh);
+  if (fs::exists(folder, error)) {
+    throw ConfigError(fmt::format(
+        "--out {}: the folder {} is that of another sensor; name a file in another folder",
+        record.fresh, folder.string()));
+  }
   return record;
+}
+
+void write(const Record& record, const CameraFit& fit) {
+  if (record.known()) {
+    record.measured->make({});
+  } else {
+    write_atomically(record.fresh, paper_sensor_yaml(fit.camera));
+  }
+  const fs::path file = record.file();
+  write_measured(measured_folder(file) / kMeasuredCamera,
+                 camera_yaml(camera_file(file, fit), file.stem().string()));
 }
 
 /// The camera as known so far, for frames of this size.
 CameraModel camera_for(const Record& record, const SourceFormat& format) {
   CameraModel camera = record.sensor.camera;
-  if (record.known) {
+  if (record.known()) {
     if (camera.width_px == format.width && camera.height_px == format.height) return camera;
     throw ConfigError(fmt::format(
         "{}: frames are {}x{}, but sensor.yaml's camera is {}x{}; ask the camera for that size, or "
@@ -240,7 +247,7 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
                                               const BoardSpec& board, const Record& record,
                                               const UniqueFd& stop) {
   const Input input =
-      open_input({options.sensor, options.source, false, WrenchCalibration::ignore});
+      open_input({options.sensor, options.source, false, WrenchCalibration::without_camera});
   FrameSource& source = *input.source;
   log_info("source: " + source.format().description);
   log_info(
@@ -270,13 +277,17 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
   return collector;
 }
 
-/// What else in sensor.yaml was measured through the old camera.
-std::string stale(const SensorConfig& sensor) {
+/// What else was measured through the old camera.
+std::string stale(const Record& record) {
   std::vector<std::string> parts;
+  const SensorConfig& sensor = record.sensor;
   const auto placed = [](const Tag& tag) { return tag.platform_T_tag.has_value(); };
   if (std::any_of(sensor.target.tags.begin(), sensor.target.tags.end(), placed))
-    parts.emplace_back("the tags' places");
-  if (sensor.rest.camera_T_platform) parts.emplace_back("the rest pose");
+    parts.emplace_back("the tags' places in sensor.yaml");
+  if (sensor.rest.camera_T_platform) parts.emplace_back("its rest pose");
+  const fs::path target = measured_folder(record.file()) / kMeasuredTarget;
+  std::error_code error;
+  if (fs::exists(target, error)) parts.push_back(target.string());
   return listed(parts);
 }
 
@@ -307,14 +318,13 @@ void report(const CameraFit& fit, const std::vector<CameraView>& views, const Co
       coverage.largest_tilt() * 57.29578));
   if (const std::vector<std::string> missing = coverage.missing(); !missing.empty())
     log_info("it would be better still with " + listed(missing));
-  if (!record.known) return;
+  if (!record.known()) return;
   log_info(
       fmt::format("before: fx {:.2f} ({:+.2f} %), fy {:.2f} ({:+.2f} %), cx {:.2f}, cy {:.2f} px",
                   old.fx_px, 100 * (now.fx_px / old.fx_px - 1), old.fy_px,
                   100 * (now.fy_px / old.fy_px - 1), old.cx_px, old.cy_px));
-  if (const std::string parts = stale(record.sensor); !parts.empty())
-    log_info(fmt::format(
-        "{} in sensor.yaml came from the camera before: run `tagwrench calibrate target`", parts));
+  if (const std::string parts = stale(record); !parts.empty())
+    log_info(fmt::format("of the camera before: {}; run `tagwrench calibrate target`", parts));
 }
 
 std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
@@ -366,10 +376,12 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
     log_info("stopped; nothing was written");
     return kExitStopped;
   }
-  write_sensor(record.text, {camera_section(fit.camera, fit)}, record.target);
+  write(record, fit);
   report(fit, views, coverage, record);
-  log_info("written: " + record.target);
-  if (!record.sensor.calibration.empty())
+  const fs::path folder = measured_folder(record.file());
+  log_info(fmt::format("written: {}{}", record.known() ? "" : record.fresh + " and ",
+                       (folder / kMeasuredCamera).string()));
+  if (!record.sensor.calibration.empty() || is_measured(folder, kMeasuredWrench))
     log_info(
         "the calibration in newtons was made with the lens as it was described; run `tagwrench "
         "calibrate wrench` again");

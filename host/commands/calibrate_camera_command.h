@@ -1,4 +1,5 @@
-// `tagwrench calibrate camera`: pictures of a board in, the camera of a sensor.yaml out.
+// `tagwrench calibrate camera`: pictures of a board in, measured/camera.yaml beside a
+// sensor.yaml out.
 #pragma once
 
 #include <optional>
@@ -14,7 +15,7 @@ struct CalibrateCameraOptions {
   std::vector<std::string> folders;  ///< or folders, when source is empty
   std::string board;                 ///< board_spec.h
   std::string sensor;                ///< path; empty: the paper's sensor, and `out` is needed
-  std::string out;                   ///< path; empty: `sensor`
+  std::string out;                   ///< path of a new sensor.yaml; empty: `sensor`
   std::optional<int> views;
   std::optional<double> seconds;
   int events = -1;  ///< descriptor, see Events

@@ -38,7 +38,8 @@ CalibrateCommand::CalibrateCommand(command_line::Command program)
       .required();
   camera_.add_option("--sensor", camera_options_.sensor, "sensor.yaml whose camera this is");
   camera_.add_option("--out", camera_options_.out,
-                     "sensor.yaml to write; without it --sensor is edited in place");
+                     "a new sensor.yaml to make; what is found goes into measured/ beside it, "
+                     "without --out beside --sensor");
   camera_
       .add_option("--views", camera_options_.views,
                   "views of the board to use: as many at least from a camera, at most from folders")
@@ -52,8 +53,10 @@ CalibrateCommand::CalibrateCommand(command_line::Command program)
       .add_option("--source", target_options_.source,
                   source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}))
       .required();
-  target_.add_option("--out", target_options_.out,
-                     "sensor.yaml to write; without it --sensor is edited in place");
+  target_.add_option(
+      "--out", target_options_.out,
+      "a new sensor.yaml to make, in another folder; what is found goes into measured/ "
+      "beside it, without --out beside --sensor");
   target_.add_option("--frames", target_options_.frames, "use no more than N frames")
       .check(command_line::range(1, kMaxFrames));
   target_
@@ -80,7 +83,8 @@ void CalibrateCommand::declare_wrench() {
   wrench_.add_option("--plan", o.plan,
                      "a ready-made plan (--list-plans) or a plan file; of a recording, without it "
                      "its own");
-  wrench_.add_option("--out", o.out, "file to write; without it calibration.json beside --sensor");
+  wrench_.add_option("--out", o.out,
+                     "file to write; without it measured/wrench.json beside --sensor");
   wrench_.add_option("--notes", o.notes, "temperature, place, who: goes into the record");
   command_line::Option board = wrench_.add_option(
       "--board", o.board, "serial port of the board with the load cell, or auto");

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <filesystem>
 #include <limits>
-#include <system_error>
 
 #include "host/app/input.h"
 #include "host/app/sources.h"
@@ -13,15 +12,13 @@
 #include "host/calibration/target/verdict.h"
 #include "host/commands/events.h"
 #include "host/commands/exit_status.h"
-#include "host/commands/zero_command.h"
+#include "host/commands/measured_results.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
-#include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
-#include "host/sensor/appearance_file.h"
-#include "host/sensor/sensor_edit.h"
+#include "host/sensor/measured_files.h"
+#include "host/sensor/sensor_identity.h"
 #include "host/tracker/diagnostic_text.h"
-#include "host/tracker/rotation.h"
 
 namespace tagwrench {
 namespace {
@@ -110,89 +107,20 @@ bool watch(FrameSource& source, const CalibrateTargetOptions& options, const Uni
   return true;
 }
 
-std::string list(const Eigen::Vector3d& v, int digits) {
-  return fmt::format("[{:.{}f}, {:.{}f}, {:.{}f}]", v.x(), digits, v.y(), digits, v.z(), digits);
-}
-
-SectionEdit target_section(const TargetEstimate& estimate, const TargetDescription& target) {
-  const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+TargetFile found(const fs::path& sensor_file, const SensorConfig& sensor,
+                 const TargetEstimate& estimate) {
+  TargetFile out;
+  out.stamp = stamp_for(sensor_file);
+  out.target = sensor.target;
+  out.rest = rest_platform(estimate.camera_T_tag);
+  out.camera_sha256 = sha256_of(sensor.camera);
   const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
-  std::string tags;
-  for (std::size_t t = 0; t < target.tags.size(); ++t) {
-    const Eigen::Isometry3d pose = platform.inverse() * estimate.camera_T_tag[t];
-    tags += fmt::format(
-        "{}{{id: {}, position_mm: {}, rotation_rad: {},\n  position_sigma_mm: {}, "
-        "rotation_sigma_rad: {}}}",
-        t == 0 ? "[" : ",\n ", target.tags[t].id, list(pose.translation() * 1e3, 6),
-        list(rotation_to_vector(pose.linear()), 7), list(sigmas[t].head<3>() * 1e3, 6),
-        list(sigmas[t].tail<3>(), 7));
+  for (std::size_t t = 0; t < out.target.tags.size(); ++t) {
+    out.target.tags[t].platform_T_tag = out.rest.inverse() * estimate.camera_T_tag[t];
+    out.target.tags[t].sigma = sigmas[t];
   }
-  return {"target", {{"tags", tags + "]"}}};
-}
-
-/// Beside the sensor.yaml, whatever links to it. Not .png: the folder may be one of frames.
-fs::path appearance_of(const fs::path& sensor) {
-  std::error_code error;
-  fs::path real = fs::is_symlink(sensor, error) ? fs::weakly_canonical(sensor) : sensor;
-  return real += ".rest";
-}
-
-/// As sensor.yaml names it: relative to itself, unless it is known under a link elsewhere.
-std::string appearance_name(const fs::path& sensor, const fs::path& appearance) {
-  const bool beside = appearance.parent_path() == sensor.parent_path();
-  std::string name = "'";
-  for (const char c : (beside ? appearance.filename() : fs::absolute(appearance)).string())
-    name += c == '\'' ? std::string("''") : std::string(1, c);
-  return name + "'";
-}
-
-SectionEdit rest_section(const TargetEstimate& estimate, const ReferenceImage& image,
-                         const std::string& appearance) {
-  const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
-  return {"rest",
-          {{"frames", fmt::format("{}", image.frames)},
-           {"position_mm", list(platform.translation() * 1e3, 6)},
-           {"rotation_rad", "[0, 0, 0]"},
-           {"appearance", appearance}}};
-}
-
-SectionEdit camera_section(const TargetEstimate& estimate) {
-  return {"camera", {{"readout_ms", fmt::format("{:.1f}", estimate.readout * 1e3)}}};
-}
-
-/// The keys that may be written, before there are values.
-std::vector<SectionEdit> placeholders() {
-  return {{"camera", {{"readout_ms", "0"}}},
-          {"target", {{"tags", "[]"}}},
-          {"rest",
-           {{"frames", "1"}, {"position_mm", "[]"}, {"rotation_rad", "[]"}, {"appearance", "''"}}}};
-}
-
-/// Both files or neither: the picture belongs to the poses.
-void write(const fs::path& sensor, const std::string& text, const fs::path& appearance,
-           const TargetEstimate& estimate, const SensorConfig& described,
-           const ReferenceImage& image) {
-  std::error_code error;
-  std::optional<std::string> before;
-  if (fs::exists(appearance, error)) before = read_text(appearance);
-  save_reference_image(appearance, image);
-  std::vector<SectionEdit> edits = {
-      target_section(estimate, described.target),
-      rest_section(estimate, image, appearance_name(sensor, appearance))};
-  if (readout_is_clear(estimate)) edits.push_back(camera_section(estimate));
-  // What read at the old rest says nothing about the new one.
-  const std::vector<YamlEntry> no_zero = without_zero(described);
-  if (!no_zero.empty()) edits.push_back({"wrench", no_zero});
-  try {
-    write_sensor(text, edits, sensor);
-  } catch (...) {
-    if (before) {
-      write_atomically(appearance, *before);
-    } else {
-      fs::remove(appearance, error);
-    }
-    throw;
-  }
+  if (readout_is_clear(estimate)) out.readout = estimate.readout;
+  return out;
 }
 
 int stopped() {
@@ -203,14 +131,11 @@ int stopped() {
 }  // namespace
 
 int calibrate_target(const CalibrateTargetOptions& options) {
-  const fs::path sensor_file = options.out.empty() ? options.sensor : options.out;
-  const fs::path appearance = appearance_of(sensor_file);
-  const std::string text = read_text(options.sensor);
-  check_replaceable(sensor_file);
-  check_replaceable(appearance);
+  const MeasuredSensor measured(options.sensor, options.out,
+                                {kMeasuredTarget, kMeasuredPicture, kMeasuredZero});
   const UniqueFd stop = termination_fd();
-  const Input input = open_input({options.sensor, options.source, true, WrenchCalibration::ignore});
-  check_editable(text, placeholders(), options.sensor);
+  const Input input =
+      open_input({options.sensor, options.source, true, WrenchCalibration::without_target});
   check_size(input);
   const SensorConfig& sensor = input.sensor;
   Events events(options.events);
@@ -233,12 +158,16 @@ int calibrate_target(const CalibrateTargetOptions& options) {
       });
   if (termination_requested()) return stopped();
   check_estimate(estimate, sensor.camera);
-  write(sensor_file, text, appearance, estimate, sensor, record.at_rest().image);
+  measured.make({kMeasuredCamera});
+  write_measured_target(measured.folder(), found(measured.sensor(), sensor, estimate),
+                        record.at_rest().image);
+  void_zero(measured.sensor());
   for (const std::string& line : describe(record, estimate, sensor.target, sensor.camera))
     log_info(line);
-  if (readout_is_clear(estimate)) log_info("the shutter rolls: camera.readout_ms is written too");
-  log_info(fmt::format("written: {} and {}", sensor_file.string(), appearance.string()));
-  if (!sensor.calibration.empty())
+  if (readout_is_clear(estimate)) log_info("the shutter rolls: readout_ms is written too");
+  log_info(fmt::format("written: {} and {}", (measured.folder() / kMeasuredTarget).string(),
+                       (measured.folder() / kMeasuredPicture).string()));
+  if (!sensor.calibration.empty() || is_measured(measured.folder(), kMeasuredWrench))
     log_info(
         "the calibration in newtons was made with the target as it was; run `tagwrench calibrate "
         "wrench` again");

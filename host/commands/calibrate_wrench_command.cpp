@@ -20,13 +20,13 @@
 #include "host/commands/calibrate_wrench/result.h"
 #include "host/commands/calibrate_wrench/run.h"
 #include "host/commands/exit_status.h"
+#include "host/commands/measured_results.h"
 #include "host/commands/static_measurement.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
-#include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
 #include "host/core/sha256.h"
-#include "host/sensor/sensor_edit.h"
+#include "host/sensor/measured_files.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -107,11 +107,21 @@ Calibration calibration_of(const WrenchPlan& plan, const SensorConfig& sensor,
 /// What is calibrated, and where to.
 struct Subject {
   CalibrationFiles files;
-  std::string sensor_text;
   const SensorConfig& sensor;
   Matrix6 stiffness;  ///< known before
   Vector6 range;      ///< N and N m
 };
+
+fs::path measured_wrench(const CalibrateWrenchOptions& options) {
+  return measured_folder(options.sensor) / kMeasuredWrench;
+}
+
+/// Whether the next run takes the result: by its place, or because sensor.yaml names it.
+bool is_in_force(const CalibrateWrenchOptions& options, const CalibrationFiles& files) {
+  const SensorConfig now = load_sensor(options.sensor, WrenchCalibration::ignore);
+  std::error_code error;
+  return fs::equivalent(now.calibration, files.calibration, error);
+}
 
 void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject,
                    const WrenchPlan& plan, const Measured& measured) {
@@ -124,21 +134,24 @@ void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject
   const std::string poorer = what_is_lost(subject.files, fit);
   add_predictions(plan, fit, data);
   data.trial.sensor = sensor_sha256(subject.sensor);
-  write_calibration(subject.files, subject.sensor_text, options.sensor, subject.sensor, data,
-                    calibration_of(plan, subject.sensor, measured, data, fit));
+  write_calibration(subject.files, data, calibration_of(plan, subject.sensor, measured, data, fit));
   std::error_code none;
   fs::remove(subject.files.progress, none);
   for (const std::string& line :
        describe(plan, data, fit, subject.range, subject.sensor.wrench.range))
     log_info(line);
   if (!poorer.empty()) log_info(poorer);
-  log_info(fmt::format("written: {}, {} and wrench.calibration in {}",
-                       subject.files.calibration.string(), subject.files.data.string(),
-                       options.sensor));
+  log_info(fmt::format("written: {} and {}", subject.files.calibration.string(),
+                       subject.files.data.string()));
+  if (is_in_force(options, subject.files)) {
+    void_zero(options.sensor);
+  } else {
+    log_info(fmt::format("it is in force as soon as it is {}, or {} names it as wrench.calibration",
+                         measured_wrench(options).string(), options.sensor));
+  }
 }
 
-void check_sensor(const Input& input, const std::string& sensor_text, const std::string& file) {
-  check_editable(sensor_text, {{"wrench", {{"calibration", "''"}}}}, file);
+void check_sensor(const Input& input) {
   check_size(input);
   check_appearance(input);
 }
@@ -173,18 +186,16 @@ bool end_recording(CalibrationRecorder& recorder, const std::string& file) {
 int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles& files) {
   const std::string text = plan_text(options.plan);
   const WrenchPlan plan = parse_plan(text, options.plan);
-  const std::string sensor_text = read_text(options.sensor);
-  check_replaceable(options.sensor);
+  check_measurable(measured_folder(options.sensor), {kMeasuredZero});
   check_files(files, options);
   check_source(options);
   BenchInput at =
       open_at_bench({options.sensor, options.source, /*fast=*/options.emulated_cell.empty(),
                      WrenchCalibration::ignore});
   const SensorConfig& sensor = at.input.sensor;
-  check_sensor(at.input, sensor_text, options.sensor);
+  check_sensor(at.input);
 
-  const Subject subject{files, sensor_text, sensor, known_stiffness(sensor, options.sensor),
-                        full_load(sensor)};
+  const Subject subject{files, sensor, known_stiffness(sensor, options.sensor), full_load(sensor)};
   check_plan(plan, subject.range, options.require_all);
   const ProgressOf of{sha256_hex(text), sensor_sha256(sensor)};
   WrenchGuide guide(plan, {.stiffness = subject.stiffness,
@@ -270,8 +281,7 @@ Matrix6 stiffness_before(const SensorConfig& sensor, const record::RecordingRead
 /// The loads of an earlier calibration once more.
 int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFiles& files) {
   check_replay_options(options);
-  const std::string sensor_text = read_text(options.sensor);
-  check_replaceable(options.sensor);
+  check_measurable(measured_folder(options.sensor), {kMeasuredZero});
   check_files(files, options);
   record::RecordingReader recording(parse_source(options.source).argument);
   const RecordedCalibration recorded = calibration_in(recording.head());
@@ -280,15 +290,14 @@ int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFile
   Input input =
       open_input({options.sensor, options.source, /*fast=*/true, WrenchCalibration::ignore});
   const SensorConfig& sensor = input.sensor;
-  check_sensor(input, sensor_text, options.sensor);
+  check_sensor(input);
   const SensorConfig then =
       recorded_sensor(recording.head(), recording.path().string(), WrenchCalibration::ignore);
   const std::string other = difference(identity_of(then.camera, then.target, then.rest),
                                        identity_of(sensor.camera, sensor.target, sensor.rest));
   if (!other.empty())
     log_info(fmt::format("recorded with another sensor.yaml ({}); --sensor counts", other));
-  const Subject subject{files, sensor_text, sensor, stiffness_before(sensor, recording),
-                        full_load(sensor)};
+  const Subject subject{files, sensor, stiffness_before(sensor, recording), full_load(sensor)};
   check_plan(plan, subject.range, options.require_all);
   log_info("source: " + input.source->format().description);
   log_info(fmt::format("plan {}, {}: {} steps were accepted", plan.name, recorded.reference,
@@ -314,8 +323,7 @@ int calibrate_wrench(const CalibrateWrenchOptions& options) {
     return 0;
   }
   const CalibrationFiles files =
-      files_of(options.out.empty() ? fs::path(options.sensor).parent_path() / "calibration.json"
-                                   : fs::path(options.out));
+      files_of(options.out.empty() ? measured_wrench(options) : fs::path(options.out));
   return parse_source(options.source).is(SourceKind::recording) ? calibrate_again(options, files)
                                                                 : calibrate_live(options, files);
 }

@@ -1,5 +1,5 @@
-// `tagwrench calibrate wrench`: known loads, one after the other, in; a calibration.json, its data
-// and the key that names it in sensor.yaml, out.
+// `tagwrench calibrate wrench`: known loads, one after the other, in; measured/wrench.json, its
+// data and the key that names it in sensor.yaml, out.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ struct CalibrateWrenchOptions {
   std::string sensor;  ///< path
   std::string source;  ///< SRC
   std::string plan;    ///< of a ready-made plan, or path; of a recording empty: its own
-  std::string out;     ///< path; empty: calibration.json beside `sensor`
+  std::string out;     ///< path; empty: measured/wrench.json beside `sensor`
   std::string notes;   ///< environment, for the record
   std::optional<RecordOptions> record;
   bool resume = false;

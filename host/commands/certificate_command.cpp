@@ -20,7 +20,6 @@
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/sha256.h"
-#include "host/core/yaml/yaml_reader.h"
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/sensor_config.h"
 
@@ -32,16 +31,14 @@ namespace fs = std::filesystem;
 constexpr const char* kName = "certificate";  // where --out is a folder
 constexpr std::size_t kNumberLength = 12;     // hexadecimal digits
 
-/// The calibration that a sensor.yaml names. Throws ConfigError.
+/// The calibration in force, which belongs to this sensor. Throws ConfigError.
 fs::path calibration_of(const std::string& sensor) {
-  YamlReader root = YamlReader::from_file(sensor);
-  const std::string named =
-      root.has("wrench") ? root.child("wrench").text_or("calibration", "") : "";
-  if (named.empty()) {
+  fs::path file = load_sensor(sensor).calibration;
+  if (file.empty()) {
     throw ConfigError(fmt::format(
-        "{}: has no wrench.calibration; run `tagwrench calibrate wrench` first", sensor));
+        "{}: there is no calibration in newtons; run `tagwrench calibrate wrench` first", sensor));
   }
-  return fs::path(sensor).parent_path() / named;
+  return file;
 }
 
 CertificateData described(const fs::path& file) {
@@ -66,7 +63,8 @@ CertificateCommand::CertificateCommand(command_line::Command program)
   verb_.add_option("--out", out_, "folder, or the beginning of the three files' names").required();
   command_line::Option sensor = verb_.add_option(
       "--sensor", sensor_, "sensor.yaml: its calibration, after a check that it belongs to it");
-  verb_.add_option("--calibration", calibration_, "calibration.json").excludes(sensor);
+  verb_.add_option("--calibration", calibration_, "its file, such as measured/wrench.json")
+      .excludes(sensor);
   verb_.add_option(
       "data", data_,
       "FILE.data.csv ... as calibrations and `analyze --data` leave them, or recordings "
@@ -79,10 +77,7 @@ CertificateCommand::CertificateCommand(command_line::Command program)
 CertificateCommand::Subject CertificateCommand::subject() const {
   Subject subject;
   fs::path file = calibration_;
-  if (!sensor_.empty()) {
-    file = calibration_of(sensor_);
-    load_sensor(sensor_);  // refuses a calibration of another sensor
-  }
+  if (!sensor_.empty()) file = calibration_of(sensor_);
   if (!file.empty()) subject.calibration = read_calibration(file);
   subject.data = data_;
   if (!data_.empty()) return subject;

@@ -104,9 +104,7 @@ DesignCommand::DesignCommand(command_line::Command program)
                       "folder for what follows from --hardware: parameters.scad for the parts, "
                       "sensor.yaml, plan.yaml, scenario.yaml for the simulator")
           .needs(hardware);
-  verb_
-      .add_flag("--force", force_,
-                "what --export finds there and has been changed (calibrated, say) is replaced")
+  verb_.add_flag("--force", force_, "what --export finds there and has been changed is replaced")
       .needs(folder);
   check.excludes(hardware);
   range_given_ = verb_.add_option("--range-n", range_n_, "wanted, +- along each axis, N")

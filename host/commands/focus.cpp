@@ -235,7 +235,7 @@ int run_focus(const FocusOptions& options) {
   using Clock = std::chrono::steady_clock;
   const std::string source = options.source.empty() ? only_camera() : options.source;
   const UniqueFd stop = termination_fd();
-  Input input = open_input({options.sensor, source, false, WrenchCalibration::ignore});
+  Input input = open_input({options.sensor, source, false, WrenchCalibration::without_target});
   log_info("source: " + input.source->format().description);
   FocusView view(input.sensor);
   FocusScreen screen;

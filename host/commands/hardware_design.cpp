@@ -61,7 +61,7 @@ void check_unchanged(const std::filesystem::path& path, const std::string& text)
   if (!std::filesystem::exists(std::filesystem::symlink_status(path, error))) return;
   if (std::filesystem::is_regular_file(path, error) && read_text(path) == text) return;
   throw ConfigError(
-      fmt::format("{}: is there already and holds something else (a calibration or another design "
+      fmt::format("{}: is there already and holds something else (another design or a person "
                   "may have changed it); name another folder, or replace it with --force",
                   path.string()));
 }

@@ -56,9 +56,9 @@ void check_calibrated_rest(const SensorConfig& sensor, const std::string& verb) 
   if (rest_is_calibrated(sensor)) return;
   throw ConfigError(fmt::format(
       "--sensor: its rest is learned anew at every start, so `tagwrench {}` has nothing to compare "
-      "with; run `tagwrench calibrate target` once, which writes rest.position_mm, the tags' "
-      "places "
-      "and rest.appearance; newtons are calibrated after it",
+      "with; run `tagwrench calibrate target` once, which writes measured/target.yaml with rest "
+      "and "
+      "places, and its picture; newtons are calibrated after it",
       verb));
 }
 

@@ -119,7 +119,7 @@ void TagsCommand::add_board_options() {
 TagsCommand::Sheet TagsCommand::tags() const {
   TagSheet sheet;
   if (!sensor_.empty()) {
-    const TargetDescription target = load_sensor(sensor_, WrenchCalibration::ignore).target;
+    const TargetDescription target = load_sensor(sensor_, WrenchCalibration::without_camera).target;
     sheet.family = target.family;
     sheet.size_mm = in_mm(target.tag_size);
     sheet.border_mm = in_mm(target.border);

@@ -1,35 +1,23 @@
 #include "host/commands/zero_command.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <chrono>
-#include <ctime>
+#include <filesystem>
 
 #include "host/app/bench_input.h"
 #include "host/app/sources.h"
 #include "host/commands/check_text.h"
 #include "host/commands/events_option.h"
+#include "host/commands/measured_results.h"
 #include "host/commands/static_measurement.h"
-#include "host/commands/today.h"
 #include "host/core/log.h"
-#include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
+#include "host/sensor/sensor_identity.h"
 
 namespace tagwrench {
 namespace {
 
 constexpr int kRefused = 1;
-
-std::string list(const Eigen::Vector3d& v) {
-  return fmt::format("[{:.7f}, {:.7f}, {:.7f}]", v.x(), v.y(), v.z());
-}
-
-std::vector<YamlEntry> zero_entries(const Vector6& zero, const std::string& date) {
-  return {{"zero_n", list(zero.head<3>())},
-          {"zero_nm", list(zero.tail<3>())},
-          {"zero_date", "'" + date + "'"}};
-}
 
 std::string in_words(const Vector6& wrench) {
   return fmt::format("{:.4f} {:.4f} {:.4f} N, {:.3f} {:.3f} {:.3f} mN m", wrench[0], wrench[1],
@@ -59,16 +47,11 @@ std::string objection(const std::vector<InSituFinding>& findings) {
 
 }  // namespace
 
-std::vector<YamlEntry> without_zero(const SensorConfig& sensor) {
-  if (sensor.zero.date.empty() && sensor.zero.set.isZero()) return {};
-  return zero_entries(Vector6::Zero(), "");
-}
-
 ZeroCommand::ZeroCommand(command_line::Command program)
     : verb_(program.add_subcommand(
           "zero",
           "hands off: what the sensor reads now becomes its zero, written to "
-          "its sensor.yaml")) {
+          "measured/zero.yaml beside its sensor.yaml")) {
   verb_.add_option("--sensor", options_.sensor, "sensor.yaml of this sensor").required();
   verb_
       .add_option("--source", options_.source,
@@ -78,12 +61,11 @@ ZeroCommand::ZeroCommand(command_line::Command program)
 }
 
 int ZeroCommand::run() const {
-  const std::string yaml = read_text(options_.sensor);
-  check_replaceable(options_.sensor);
+  const MeasuredSensor measured(options_.sensor, "", {kMeasuredZero});
   const UniqueFd stop = termination_fd();
-  BenchInput at = open_at_bench({options_.sensor, options_.source, true});
+  BenchInput at =
+      open_at_bench({options_.sensor, options_.source, true, WrenchCalibration::zero_that_fits});
   const SensorConfig& sensor = at.input.sensor;
-  check_editable(yaml, {{"wrench", zero_entries(Vector6::Zero(), "")}}, options_.sensor);
   check_size(at.input);
   check_calibrated_rest(sensor, "zero");
   StaticMeasurement static_measurement(sensor);
@@ -102,15 +84,17 @@ int ZeroCommand::run() const {
     return kRefused;
   }
   const Vector6 zero = static_measurement.result().wrench + sensor.zero.set;
-  const std::string date = today();
-  write_sensor(yaml, {{"wrench", zero_entries(zero, date)}}, options_.sensor);
+  const std::filesystem::path file = measured.folder() / kMeasuredZero;
+  write_measured(file, zero_yaml({stamp_for(options_.sensor), zero,
+                                  sha256_of(identity_of(sensor.camera, sensor.target, sensor.rest)),
+                                  sha256_of(sensor.wrench)}));
   log_info(fmt::format("zero was {}{}", in_words(sensor.zero.set),
                        sensor.zero.date.empty() ? "" : ", since " + sensor.zero.date));
   log_info(fmt::format(
       "zero is  {}, from {} frames in {:.1f} s; no thermometer is read: let it warm up "
       "before, and zero again after",
       in_words(zero), static_measurement.result().frames, static_measurement.seconds()));
-  log_info("written: " + options_.sensor);
+  log_info("written: " + file.string());
   return 0;
 }
 

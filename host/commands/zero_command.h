@@ -1,12 +1,10 @@
-// `tagwrench zero`: what the sensor reads with hands off becomes its zero, in sensor.yaml.
+// `tagwrench zero`: what the sensor reads with hands off becomes its zero, in
+// measured/zero.yaml.
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "host/core/command_line/command_line.h"
-#include "host/sensor/sensor_config.h"
-#include "host/sensor/sensor_edit.h"
 
 namespace tagwrench {
 
@@ -15,10 +13,6 @@ struct ZeroCommandOptions {
   std::string source;  ///< SRC
   int events = -1;     ///< descriptor, see Events
 };
-
-/// Entries of `wrench:` that void a zero, for those who measure rest or wrench anew; empty where
-/// none was set.
-std::vector<YamlEntry> without_zero(const SensorConfig& sensor);
 
 /// Declares itself on the command line; must outlive the parsing.
 class ZeroCommand {

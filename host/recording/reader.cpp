@@ -211,6 +211,9 @@ void RecordingReader::read_head() {
       head_.appearance = std::move(content);
     } else if (role == "calibration") {
       head_.calibration = std::move(content);
+    } else if (role.starts_with(kMeasuredRole)) {
+      head_.measured.emplace_back(role.substr(std::string_view(kMeasuredRole).size()),
+                                  std::move(content));
     }
   }
 }

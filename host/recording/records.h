@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "host/core/types.h"
@@ -34,7 +35,8 @@ struct Head {
   std::string sensor_yaml;  ///< its text as loaded
   std::string appearance;   ///< bytes of its rest.appearance; empty: it has none
   std::string calibration;  ///< bytes of its wrench.calibration; empty: it has none
-  std::vector<std::pair<std::string, std::string>> more;  ///< key and value, for people
+  std::vector<std::pair<std::string, std::string>> measured;  ///< name and bytes of each file
+  std::vector<std::pair<std::string, std::string>> more;      ///< key and value, for people
   bool closed = false;  ///< the writer has ended well; set by the reader
 };
 

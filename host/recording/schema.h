@@ -48,6 +48,10 @@ namespace tagwrench::record {
 inline constexpr int kApplicationId = 0x54575243;  // "TWRC"
 inline constexpr int kSchemaVersion = 1;
 
+/// Of the sensor's files of measured/, before their names. Readers pass over roles they do not
+/// know.
+inline constexpr const char* kMeasuredRole = "measured/";
+
 inline constexpr const char* kSchema = R"(
 CREATE TABLE meta (key TEXT PRIMARY KEY, value) WITHOUT ROWID;
 CREATE TABLE files (role TEXT PRIMARY KEY, name TEXT, content BLOB);

@@ -127,6 +127,7 @@ void Sink::write_head(const Head& head) {
   put("sensor.yaml", head.sensor_name, head.sensor_yaml);
   if (!head.appearance.empty()) put("appearance", "", head.appearance);
   if (!head.calibration.empty()) put("calibration", "", head.calibration);
+  for (const auto& [called, content] : head.measured) put(kMeasuredRole + called, called, content);
 }
 
 void Sink::meta(std::string_view key, std::string_view value) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "host/tracker/camera_model.h"
 #include "host/tracker/target.h"
@@ -16,8 +17,8 @@ inline constexpr float kReferenceCountsPerLevel = 256.0F;
 /// PNG, damaged, not 16-bit grey, not of the camera's size.
 ReferenceImage load_reference_image(const std::filesystem::path& path, const CameraModel& camera);
 
-/// Replaces the file as a whole or not at all. Throws std::runtime_error if it cannot be written,
-/// std::invalid_argument for an image whose size and levels do not agree.
-void save_reference_image(const std::filesystem::path& path, const ReferenceImage& image);
+/// The bytes of the file. Throws std::invalid_argument for an image whose size and levels do not
+/// agree.
+std::string encode_reference_image(const ReferenceImage& image);
 
 }  // namespace tagwrench

@@ -4,13 +4,12 @@
 #include <stdexcept>
 #include <vector>
 
-#include "host/core/os/atomic_file.h"
 #include "host/core/png/png_write.h"
 #include "host/sensor/appearance_file.h"
 
 namespace tagwrench {
 
-void save_reference_image(const std::filesystem::path& path, const ReferenceImage& image) {
+std::string encode_reference_image(const ReferenceImage& image) {
   if (image.width <= 0 || image.height <= 0 ||
       image.level.size() !=
           static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
@@ -22,7 +21,7 @@ void save_reference_image(const std::filesystem::path& path, const ReferenceImag
         std::clamp(std::round(level * kReferenceCountsPerLevel), 0.0F, 65535.0F));
   });
   const std::vector<std::uint8_t> bytes = encode_png(counts.data(), image.width, image.height);
-  write_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace tagwrench

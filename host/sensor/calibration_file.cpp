@@ -329,6 +329,11 @@ std::string completed_axes(const std::filesystem::path& path) {
   return out;
 }
 
+std::string calibration_date(const std::filesystem::path& path) {
+  const CalibrationReader file(path);
+  return file.has("date") ? file.text(file.at("date"), "date") : std::string();
+}
+
 void load_calibration(const std::string& path, const CameraModel& camera,
                       const TargetDescription& target, const ReferenceOptions& rest,
                       WrenchModel& model) {
@@ -336,7 +341,9 @@ void load_calibration(const std::string& path, const CameraModel& camera,
   const std::string differs = difference(read_sensor(file), identity_of(camera, target, rest));
   if (!differs.empty()) {
     file.fail(fmt::format(
-        "was made for another sensor: {}; run `tagwrench calibrate wrench` for this one", differs));
+        "was made for another sensor: {}; run `tagwrench calibrate wrench` for this one, or remove "
+        "it",
+        differs));
   }
   WrenchModel read;
   read_model(file, read);

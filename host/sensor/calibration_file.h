@@ -72,6 +72,9 @@ Calibration read_calibration(const std::filesystem::path& path);
 /// ConfigError if it cannot be read.
 std::string completed_axes(const std::filesystem::path& path);
 
+/// When it was made; empty: it does not tell. Throws ConfigError if it cannot be read.
+std::string calibration_date(const std::filesystem::path& path);
+
 /// Replaces the file as a whole or not at all. Throws std::runtime_error.
 void save_calibration(const std::filesystem::path& path, const Calibration& calibration);
 

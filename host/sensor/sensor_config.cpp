@@ -11,7 +11,10 @@
 #include "host/core/yaml/yaml_reader.h"
 #include "host/sensor/appearance_file.h"
 #include "host/sensor/calibration_file.h"
-#include "host/tracker/projection.h"
+#include "host/sensor/lens_check.h"
+#include "host/sensor/measured.h"
+#include "host/sensor/measured_files.h"
+#include "host/sensor/pose_keys.h"
 #include "host/wrench/estimate.h"
 #include "host/wrench/spring_model.h"
 #include "host/wrench/zero.h"
@@ -20,69 +23,14 @@ namespace tagwrench {
 namespace {
 
 constexpr double kMm = 1e-3;
-constexpr double kMaxFocal_px = 1e6;
-constexpr double kFarthestCentre_px = 1e5;
 constexpr double kMinTag_mm = 0.01;
 constexpr double kMaxTag_mm = 10'000;
-
-Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
-
-Eigen::Matrix3d rotation(const Eigen::Vector3d& r) {
-  const double angle = r.norm();
-  if (angle == 0) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
-}
-
-/// position_mm and rotation_rad, both or neither.
-std::optional<Eigen::Isometry3d> optional_pose(YamlReader& node) {
-  const bool position = node.has("position_mm");
-  if (node.has("rotation_rad") != position) {
-    node.fail(position ? "position_mm" : "rotation_rad",
-              "position_mm and rotation_rad belong together; give both or neither");
-  }
-  if (!position) return std::nullopt;
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = vector3(node.numbers("position_mm", 3)) * kMm;
-  pose.linear() = rotation(vector3(node.numbers("rotation_rad", 3)));
-  return pose;
-}
-
-/// Standard deviations of a tag's pose, both or neither, and only where there is a pose.
-Vector6 optional_pose_sigma(YamlReader& node, bool has_pose) {
-  const bool position = node.has("position_sigma_mm");
-  if (node.has("rotation_sigma_rad") != position) {
-    node.fail(position ? "position_sigma_mm" : "rotation_sigma_rad",
-              "position_sigma_mm and rotation_sigma_rad belong together; give both or neither");
-  }
-  Vector6 sigma = Vector6::Zero();
-  if (!position) return sigma;
-  if (!has_pose) {
-    node.fail("position_sigma_mm",
-              "there is no pose that it could belong to; give position_mm and rotation_rad too, or "
-              "leave the sigmas out");
-  }
-  sigma << vector3(node.numbers("position_sigma_mm", 3)) * kMm,
-      vector3(node.numbers("rotation_sigma_rad", 3));
-  for (int i = 0; i < 6; ++i) {
-    if (sigma[i] < 0)
-      node.fail(i < 3 ? "position_sigma_mm" : "rotation_sigma_rad", "must not be negative");
-  }
-  return sigma;
-}
-
-bool is_date(const std::string& text) {
-  constexpr std::string_view kForm = "0000-00-00";
-  return text.size() == kForm.size() &&
-         std::equal(text.begin(), text.end(), kForm.begin(), [](char c, char form) {
-           return form == '0' ? c >= '0' && c <= '9' : c == form;
-         });
-}
 
 /// {date: YYYY-MM-DD, views: N, rms_px: x}
 CameraRecord read_camera_record(YamlReader node) {
   CameraRecord record;
-  record.date = node.text("date");
-  if (!is_date(record.date)) node.fail("date", fmt::format("'{}' is not YYYY-MM-DD", record.date));
+  record.date = optional_date(node, "date");
+  if (record.date.empty()) node.fail("date", "is missing; give YYYY-MM-DD");
   record.views = node.integer("views", 1, 100'000);
   record.rms_px = node.non_negative("rms_px");
   node.finish();
@@ -95,49 +43,6 @@ double read_ms(YamlReader& node, const char* key, double longest, const char* ze
   if (ms < 0 || ms > longest)
     node.fail(key, fmt::format("must be from 0 ({}) to {}, is {}", zero, longest, ms));
   return ms;
-}
-
-/// Where the distortion folds the image, px: looking outward, its pixels begin to show again what
-/// they have shown nearer to the centre. Empty where they never do.
-std::optional<Eigen::Vector2d> fold(const CameraModel& camera) {
-  constexpr int kSides = 16;  // places along each side of the image
-  constexpr int kSteps = 32;  // from the centre to each
-  constexpr int kWithin = 4;  // places in each step
-  constexpr int kNewton = 10;
-  constexpr double kClose_px = 1e-6;
-  const Eigen::Vector2d centre(camera.cx_px, camera.cy_px);
-  const auto folded = [&](const Eigen::Vector2d& ray) {
-    return !(project(camera, ray.homogeneous()).jacobian.leftCols<2>().determinant() > 0);
-  };
-  const auto fold_toward = [&](const Eigen::Vector2d& border) -> std::optional<Eigen::Vector2d> {
-    Eigen::Vector2d ray(0, 0);
-    for (int step = 1; step <= kSteps; ++step) {
-      const Eigen::Vector2d pixel = centre + (border - centre) * step / kSteps;
-      const Eigen::Vector2d before = ray;
-      double miss = 0;
-      for (int i = 0; i < kNewton; ++i) {
-        const ProjectedPoint at = project(camera, ray.homogeneous());
-        miss = (pixel - at.pixel).norm();
-        ray += at.jacobian.leftCols<2>().inverse() * (pixel - at.pixel);
-      }
-      if (!(miss < kClose_px)) return pixel;
-      for (int i = 1; i <= kWithin; ++i) {
-        if (folded(before + (ray - before) * i / kWithin)) return pixel;
-      }
-    }
-    return std::nullopt;
-  };
-  const double right = camera.width_px - 1;
-  const double bottom = camera.height_px - 1;
-  for (int i = 0; i <= kSides; ++i) {
-    const double part = static_cast<double>(i) / kSides;
-    for (const Eigen::Vector2d& border :
-         {Eigen::Vector2d(part * right, 0), Eigen::Vector2d(part * right, bottom),
-          Eigen::Vector2d(0, part * bottom), Eigen::Vector2d(right, part * bottom)}) {
-      if (const auto found = fold_toward(border)) return found;
-    }
-  }
-  return std::nullopt;
 }
 
 CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record, double& latency) {
@@ -195,7 +100,8 @@ std::filesystem::path beside(const YamlReader& node, const std::filesystem::path
   return std::filesystem::path(node.file()).parent_path() / written;
 }
 
-ReferenceOptions read_rest(YamlReader node, const CameraModel& camera) {
+/// Without `picture` the one that it names is not looked at.
+ReferenceOptions read_rest(YamlReader node, const CameraModel& camera, bool picture) {
   ReferenceOptions rest;
   rest.frames = node.integer_or("frames", 1, 1000, rest.frames);
   rest.camera_T_platform = optional_pose(node);
@@ -207,8 +113,10 @@ ReferenceOptions read_rest(YamlReader node, const CameraModel& camera) {
     }
     const std::string file = node.text("appearance");
     if (file.empty()) node.fail("appearance", "names no file; name one, or leave the key out");
-    rest.appearance = load_reference_image(beside(node, file), camera);
-    rest.appearance->frames = rest.frames;
+    if (picture) {
+      rest.appearance = load_reference_image(beside(node, file), camera);
+      rest.appearance->frames = rest.frames;
+    }
   }
   node.finish();
   return rest;
@@ -252,9 +160,7 @@ ZeroConfig read_zero(YamlReader& node) {
   }
   zero.set << vector3(node.numbers_or("zero_n", {0, 0, 0})),
       vector3(node.numbers_or("zero_nm", {0, 0, 0}));
-  zero.date = node.text_or("zero_date", "");
-  if (!zero.date.empty() && !is_date(zero.date))
-    node.fail("zero_date", fmt::format("'{}' is not YYYY-MM-DD", zero.date));
+  zero.date = optional_date(node, "zero_date");
   zero.follow = node.boolean_or("zero_tracking", zero.follow);
   if (node.has("zero_band_percent")) zero.band = node.within("zero_band_percent", 0, 10) * kPercent;
   if (node.has("zero_rate_percent_per_s"))
@@ -276,11 +182,11 @@ ReferenceLine read_reference(YamlReader node) {
 }
 
 /// Fills the wrench's part of `sensor`. A calibration wins over springs, which then complete the
-/// next one.
-WrenchModel read_wrench(YamlReader node, SensorConfig& sensor, WrenchCalibration use) {
+/// next one, and a measured one over one that sensor.yaml names.
+WrenchModel read_wrench(YamlReader node, SensorConfig& sensor, const Measured& measured) {
   WrenchModel model;
-  const bool calibrated = node.has("calibration");
-  if (!calibrated && !node.has("springs")) {
+  const bool named = node.has("calibration");
+  if (!named && !node.has("springs") && !measured.has_wrench()) {
     node.fail("calibration",
               "give either calibration: FILE or springs: {...}, so that displacement becomes "
               "newtons");
@@ -289,17 +195,23 @@ WrenchModel read_wrench(YamlReader node, SensorConfig& sensor, WrenchCalibration
     sensor.spring_stiffness = stiffness(read_springs(node.child("springs")));
     model.K = *sensor.spring_stiffness;
   }
-  if (calibrated) {
-    sensor.calibration = beside(node, node.text("calibration"));
-    if (use == WrenchCalibration::use) {
-      load_calibration(sensor.calibration, sensor.camera, sensor.target, sensor.rest, model);
-      sensor.completed_axes = completed_axes(sensor.calibration);
-    }
+  if (named) {
+    const std::string file = node.text("calibration");
+    sensor.calibration = beside(node, file).string();
+    sensor.wrench_from.file = file;
+  }
+  measured.name_wrench(sensor);
+  if (!sensor.calibration.empty() && measured.use < WrenchCalibration::ignore) {
+    load_calibration(sensor.calibration, sensor.camera, sensor.target, sensor.rest, model);
+    sensor.completed_axes = completed_axes(sensor.calibration);
+    sensor.wrench_from.date = calibration_date(sensor.calibration).substr(0, 10);
   }
   model.range = force_and_torque(node, "range_n", "range_nm", model.range);
   model.wrench_origin = vector3(node.numbers_or("origin_mm", {0, 0, 0})) * kMm;
-  model.camera_R_wrench_frame = rotation(vector3(node.numbers_or("frame_rotation_rad", {0, 0, 0})));
+  model.camera_R_wrench_frame =
+      rotation_of(vector3(node.numbers_or("frame_rotation_rad", {0, 0, 0})));
   sensor.zero = read_zero(node);
+  sensor.zero_from.date = sensor.zero.date;
   if (node.has("reference")) sensor.reference = read_reference(node.child("reference"));
   node.finish();
   return model;
@@ -371,13 +283,19 @@ HidIdentity read_identity(YamlReader node) {
   return identity;
 }
 
-SensorConfig read_sensor(YamlReader root, WrenchCalibration use) {
+SensorConfig read_sensor(YamlReader root, const Measured& measured) {
   SensorConfig sensor;
   sensor.camera =
       read_camera(root.child("camera"), sensor.camera_calibrated, sensor.camera_latency);
+  if (sensor.camera_calibrated) sensor.camera_from.date = sensor.camera_calibrated->date;
+  measured.take_camera(sensor);
   sensor.target = read_target(root.child("target"));
-  if (root.has("rest")) sensor.rest = read_rest(root.child("rest"), sensor.camera);
-  sensor.wrench = read_wrench(root.child("wrench"), sensor, use);
+  const bool its_picture =
+      measured.use < WrenchCalibration::without_target && !measured.has_target();
+  if (root.has("rest")) sensor.rest = read_rest(root.child("rest"), sensor.camera, its_picture);
+  measured.take_target(sensor);
+  sensor.wrench = read_wrench(root.child("wrench"), sensor, measured);
+  measured.take_zero(sensor);
   Eigen::Matrix3d hid_R_camera = sensor.shaping.hid_R_camera;
   if (root.has("mounting")) hid_R_camera = read_mounting(root.child("mounting"));
   const Vector6 range = range_through(WrenchEstimator(sensor.wrench).tool(), sensor.wrench.range);
@@ -391,11 +309,12 @@ SensorConfig read_sensor(YamlReader root, WrenchCalibration use) {
 }  // namespace
 
 SensorConfig load_sensor(const std::string& path, WrenchCalibration use) {
-  return read_sensor(YamlReader::from_file(path), use);
+  return read_sensor(YamlReader::from_file(path), {path, measured_folder(path), use});
 }
 
-SensorConfig parse_sensor(const std::string& text, const std::string& name, WrenchCalibration use) {
-  return read_sensor(YamlReader::from_text(text, name), use);
+SensorConfig parse_sensor(const std::string& text, const std::string& name, WrenchCalibration use,
+                          const std::filesystem::path& measured) {
+  return read_sensor(YamlReader::from_text(text, name), {name, measured, use});
 }
 
 }  // namespace tagwrench

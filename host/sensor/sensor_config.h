@@ -7,8 +7,10 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "host/motion/shaping.h"
 #include "host/sensor/reference_line.h"
@@ -24,14 +26,14 @@ struct HidIdentity {
   std::uint16_t product = 0xc62e;  ///< SpaceMouse Wireless: one combined 6-axis report
 };
 
-/// What `tagwrench calibrate camera` wrote about its work.
+/// How the camera was calibrated.
 struct CameraRecord {
   std::string date;  ///< YYYY-MM-DD
   int views = 0;
   double rms_px = 0;  ///< reprojection error
 };
 
-/// wrench.zero_...: what is taken off the wrench, and whether it may follow what the sensor reads
+/// What is taken off the wrench, and whether it may follow what the sensor reads
 /// at rest (host/wrench/zero.h).
 struct ZeroConfig {
   Vector6 set = Vector6::Zero();  ///< about the platform's origin, camera axes, N and N m
@@ -39,6 +41,12 @@ struct ZeroConfig {
   bool follow = true;
   double band = 0.02;        ///< of the range
   double rate = 0.5 / 3000;  ///< of the range a second
+};
+
+/// Which file tells something, for people.
+struct InForce {
+  std::string file = "sensor.yaml";  ///< or one of measured/, or another that sensor.yaml names
+  std::string date;                  ///< YYYY-MM-DD; empty: not told
 };
 
 struct SensorConfig {
@@ -49,23 +57,36 @@ struct SensorConfig {
   ReferenceOptions rest;
   WrenchModel wrench;
   std::optional<Matrix6> spring_stiffness;  ///< of wrench.springs, also where a calibration is used
-  std::string calibration;                  ///< path of wrench.calibration; empty: none
+  std::string calibration;                  ///< path of the one in force; empty: none
   std::string completed_axes;               ///< that it left to the spring model: "Fx Mz"
   ZeroConfig zero;
   std::optional<ReferenceLine> reference;  ///< a load cell that is there for good
   ShapingOptions shaping;
   HidIdentity spacemouse;
+  InForce camera_from, target_from, wrench_from, zero_from;
 };
 
-/// What becomes of wrench.calibration.
+/// How much of what was measured counts, for those who do not need it, or are about to replace it.
+/// Each leaves out what the one before it leaves out, too.
 enum class WrenchCalibration : std::uint8_t {
-  use,     ///< it must be there and belong to this sensor
-  ignore,  ///< for those who do not need newtons, or are about to replace it: the springs', or zero
+  use,             ///< all of it; it must belong together
+  zero_that_fits,  ///< a zero that belongs to another calibration is left out
+  ignore,          ///< no calibration in newtons, no zero: the springs', or nothing
+  without_target,  ///< nor places, rest and its picture: sensor.yaml's, without the picture
+  without_camera,  ///< nothing that lies in measured/
 };
 
-/// Throws ConfigError: "file:line: key: what is wrong and what to do".
+/// sensor.yaml and the files of measured/ beside it, which win over it. Throws ConfigError:
+/// "file:line: key: what is wrong and what to do".
 SensorConfig load_sensor(const std::string& path, WrenchCalibration use = WrenchCalibration::use);
+
+/// Of a text that stands for the file `name`. `measured`: the folder of what was measured; empty:
+/// nothing was.
 SensorConfig parse_sensor(const std::string& text, const std::string& name,
-                          WrenchCalibration use = WrenchCalibration::use);
+                          WrenchCalibration use = WrenchCalibration::use,
+                          const std::filesystem::path& measured = {});
+
+/// Lines for people: which file tells camera, target, wrench and zero, and of when.
+std::vector<std::string> in_force(const SensorConfig& sensor);
 
 }  // namespace tagwrench

@@ -76,8 +76,8 @@ std::string difference(const SensorIdentity& its, const SensorIdentity& ours) {
   }
   if (!its.target_sha256.empty() && !ours.target_sha256.empty() &&
       its.target_sha256 != ours.target_sha256) {
-    return "the places of its tags, its rest pose or its picture at rest are others than "
-           "sensor.yaml's, where the target was calibrated anew since";
+    return "the places of its tags, its rest pose or its picture at rest are others than those in "
+           "force, where the target was calibrated anew since";
   }
   return "";
 }
@@ -87,6 +87,21 @@ std::string sha256_of(const SensorIdentity& identity) {
       fmt::format("{} {}x{}", identity.target_sha256, identity.image_px[0], identity.image_px[1]);
   for (const double number : identity.lens_px.value_or(std::array<double, 4>{}))
     text += fmt::format(" {:.6f}", number);
+  return sha256_hex(text);
+}
+
+std::string sha256_of(const CameraModel& camera) {
+  std::string text = fmt::format("{}x{} {:.6f} {:.6f} {:.6f} {:.6f} {}", camera.width_px,
+                                 camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px,
+                                 camera.cy_px, camera.mirrored ? "mirrored" : "as it is");
+  for (const double number : camera.distortion) text += fmt::format(" {:.8f}", number);
+  return sha256_hex(text);
+}
+
+std::string sha256_of(const WrenchModel& model) {
+  std::string text;
+  for (const double number : model.K.reshaped()) text += fmt::format("{:.6g} ", number);
+  for (const double number : model.B) text += fmt::format("{:.6g} ", number);
   return sha256_hex(text);
 }
 

@@ -8,6 +8,7 @@
 
 #include "host/tracker/camera_model.h"
 #include "host/tracker/target.h"
+#include "host/wrench/estimate.h"
 
 namespace tagwrench {
 
@@ -18,7 +19,7 @@ struct SensorIdentity {
   std::array<int, 2> image_px{};
   // Absent in calibrations of older versions:
   std::optional<std::array<double, 4>> lens_px;  ///< fx fy cx cy
-  std::string target_sha256;  ///< of all that `tagwrench calibrate target` writes; empty: absent
+  std::string target_sha256;  ///< of all that `tagwrench calibrate target` finds; empty: absent
 };
 
 /// target_sha256 is taken over a text of fixed form, one line each: family, tag size, ids and,
@@ -33,5 +34,11 @@ std::string difference(const SensorIdentity& its, const SensorIdentity& ours);
 
 /// One name for all of it: equal for data of one sensor, camera and target unchanged.
 std::string sha256_of(const SensorIdentity& identity);
+
+/// Of what the camera shows: size, lens, mirroring; not of its timing.
+std::string sha256_of(const CameraModel& camera);
+
+/// Of stiffness and offset, to six digits.
+std::string sha256_of(const WrenchModel& model);
 
 }  // namespace tagwrench

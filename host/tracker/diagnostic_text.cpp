@@ -89,8 +89,8 @@ std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& d) {
     case Diagnostic::moved_while_learning:
       return "the platform moved while its rest pose was learned; let it rest for a moment";
     case Diagnostic::appearance_does_not_fit:
-      return "the target does not look like the picture in rest.appearance (light, focus, dirt or "
-             "another lens?); run `tagwrench calibrate target`, or remove that line";
+      return "the target does not look like its picture at rest (light, focus, dirt or another "
+             "lens?); run `tagwrench calibrate target`, or remove the picture";
     case Diagnostic::far_from_rest:
       return fmt::format(
           "the target stands still {} rest as sensor.yaml has it; if nothing presses on it, run "

@@ -60,40 +60,65 @@ class CalibrateCameraCommand : public testing::Test {
       EXPECT_NE(o.err.find(part), std::string::npos) << "no '" << part << "' in: " << o.err;
   }
 
+  /// The numbers of "d_m" in every sample.
+  static std::string displacements(const std::string& samples) {
+    std::string all;
+    for (std::size_t at = 0; (at = samples.find("\"d_m\":[", at)) != std::string::npos; ++at)
+      all += samples.substr(at, samples.find(']', at) - at);
+    return all;
+  }
+
   TemporaryFolder temporary_;
+  std::filesystem::path camera_ = temporary_ / "measured" / "camera.yaml";
 };
 
-TEST_F(CalibrateCameraCommand, EditsTheCameraAndNothingElse) {
+TEST_F(CalibrateCameraCommand, WritesCameraInfoThatRunUsesAndLeavesSensorYaml) {
   const std::filesystem::path file = sensor_file();
   const Outcome o = calibrate({"--images", pictures(), "--sensor", file});
   ASSERT_EQ(o.status, 0) << o.err;
   EXPECT_EQ(o.out, "");
-  const std::string now = read_file(file);
-  const std::size_t camera = kSensor.find("camera:");
-  const std::size_t comment = kSensor.find("  # by eye");
-  EXPECT_EQ(now.substr(0, camera), kSensor.substr(0, camera));
-  ASSERT_NE(now.find("  # by eye"), std::string::npos) << now;
-  EXPECT_EQ(now.substr(now.find("  # by eye")), kSensor.substr(comment));
-  const std::size_t fx = now.find("fx: ");
-  EXPECT_NEAR(std::stod(now.substr(fx + 4)), Lens{}.fx, 0.002 * Lens{}.fx) << now;
-  for (const char* part : {"mirrored: false", "calibrated: {date: 2", "views: ", "rms_px: 0."})
+  EXPECT_EQ(read_file(file), kSensor);
+  const std::string now = read_file(camera_);
+  const std::size_t fx = now.find("data: [");
+  EXPECT_NEAR(std::stod(now.substr(fx + 7)), Lens{}.fx, 0.002 * Lens{}.fx) << now;
+  for (const char* part : {"image_width: 640", "distortion_model: plumb_bob", "mirrored: false",
+                           "date: \"2", "views: ", "rms_px: 0.", "sensor: \"sensor.yaml\""})
     EXPECT_NE(now.find(part), std::string::npos) << now;
   for (const char* part : {"fx ", "+-", "reprojection error", "before: fx 900", "written: "})
     EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
-  EXPECT_EQ(run_bridge({"run", "--source", "sim", "--sensor", file, "--output", "jsonl:-",
-                        "--frames", "1", "--fast"})
-                .status,
-            0);
+  const auto run = [&] {
+    return run_bridge({"run", "--source", "sim", "--sensor", file, "--output", "jsonl:-",
+                       "--frames", "40", "--fast"});
+  };
+  const Outcome with = run();
+  EXPECT_EQ(with.status, 0) << with.err;
+  EXPECT_NE(with.err.find("camera: measured/camera.yaml, of 2"), std::string::npos) << with.err;
+  std::filesystem::rename(camera_, temporary_ / "elsewhere.yaml");
+  const Outcome without = run();
+  EXPECT_NE(without.err.find("camera: sensor.yaml"), std::string::npos) << without.err;
+  EXPECT_NE(displacements(with.out), displacements(without.out)) << "900 px are not what is so";
 }
 
 TEST_F(CalibrateCameraCommand, MakesAWholeNewFile) {
   const std::filesystem::path file = temporary_ / "new.yaml";
   const Outcome o = calibrate({"--source", "images:" + pictures().string(), "--out", file});
   ASSERT_EQ(o.status, 0) << o.err;
-  EXPECT_EQ(run_bridge({"run", "--source", "sim", "--sensor", file, "--output", "jsonl:-",
-                        "--frames", "1", "--fast"})
-                .status,
-            0);
+  EXPECT_TRUE(std::filesystem::exists(camera_));
+  const Outcome run = run_bridge({"run", "--source", "sim", "--sensor", file, "--output", "jsonl:-",
+                                  "--frames", "1", "--fast"});
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.err.find("camera: measured/camera.yaml"), std::string::npos) << run.err;
+}
+
+TEST_F(CalibrateCameraCommand, WithOutMeasuresForACopyInAnotherFolder) {
+  const std::filesystem::path file = sensor_file();
+  std::filesystem::create_directory(temporary_ / "other");
+  const std::filesystem::path copy = temporary_ / "other" / "it's mine.yaml";
+  const Outcome o = calibrate({"--images", pictures(), "--sensor", file, "--out", copy});
+  ASSERT_EQ(o.status, 0) << o.err;
+  EXPECT_EQ(read_file(copy), kSensor);
+  EXPECT_TRUE(std::filesystem::exists(temporary_ / "other" / "measured" / "camera.yaml"));
+  EXPECT_FALSE(std::filesystem::exists(temporary_ / "measured"));
 }
 
 TEST_F(CalibrateCameraCommand, LeavesTheFileAloneWhenItRefuses) {
@@ -114,15 +139,15 @@ TEST_F(CalibrateCameraCommand, LeavesTheFileAloneWhenItRefuses) {
                  {"/dev/null", "regular file"});
   expect_refused(calibrate({"--images", pictures(), "--out", file}),
                  {file.string(), "is there already", "--sensor"});
+  write_file(temporary_ / "mine.yaml", "# other words");
+  expect_refused(
+      calibrate({"--images", pictures(), "--sensor", file, "--out", temporary_ / "mine.yaml"}),
+      {"mine.yaml: is there already and says something else"});
+  expect_refused(
+      calibrate({"--images", pictures(), "--sensor", file, "--out", temporary_ / "beside.yaml"}),
+      {"beside.yaml: the folder measured/ beside it is that of", "another folder"});
   EXPECT_EQ(read_file(file), kSensor);
-}
-
-TEST_F(CalibrateCameraCommand, RefusesAFileThatCannotBeEditedBeforeItLooks) {
-  const std::string text = kSensor + "---\nb: 1\n";
-  const Outcome o = calibrate({"--images", pictures(), "--sensor", sensor_file(text)});
-  expect_refused(o, {"second document"});
-  EXPECT_EQ(lines_in(o.err), 1u) << o.err;
-  EXPECT_EQ(read_file(temporary_ / "sensor.yaml"), text);
+  EXPECT_FALSE(std::filesystem::exists(temporary_ / "measured"));
 }
 
 TEST_F(CalibrateCameraCommand, RefusesPicturesOfAnotherSize) {
@@ -147,6 +172,7 @@ TEST_F(CalibrateCameraCommand, CtrlCWritesNothing) {
   // Before the program has taken charge of signals, Ctrl-C ends it the ordinary way.
   EXPECT_TRUE(o.status == 1 || o.status == 128 + SIGINT) << o.status << o.err;
   EXPECT_EQ(read_file(file), kSensor);
+  EXPECT_FALSE(std::filesystem::exists(camera_));
 }
 
 }  // namespace

@@ -151,8 +151,8 @@ class CalibrateWrench : public testing::Test {
   std::filesystem::path scenario_ = temporary_ / "scenario.yaml";
   std::filesystem::path sensor_ = temporary_ / "sensor.yaml";
   std::filesystem::path plan_ = temporary_ / "plan.yaml";
-  std::filesystem::path out_ = temporary_ / "calibration.json";
-  std::filesystem::path partial_ = temporary_ / "calibration.json.partial";
+  std::filesystem::path out_ = temporary_ / "measured" / "wrench.json";
+  std::filesystem::path partial_ = temporary_ / "measured" / "wrench.json.partial";
   std::string before_;
 };
 
@@ -164,12 +164,10 @@ TEST_F(CalibrateWrench, OneKitchenWeightCalibratesAllSixAxesAndRunUsesIt) {
   for (const json& axis : calibration.at("axes")) EXPECT_EQ(axis.at("state"), "calibrated");
   EXPECT_EQ(calibration.at("plan"), "six_orientations");
   EXPECT_NEAR(calibration.at("K")[2][2].get<double>(), 2800, 40);  // N/m, described as 3200
-  EXPECT_TRUE(std::filesystem::exists(temporary_ / "calibration.data.csv"));
+  EXPECT_TRUE(std::filesystem::exists(temporary_ / "measured" / "wrench.data.csv"));
   EXPECT_FALSE(std::filesystem::exists(partial_));
 
-  const std::string after = read_file(sensor_);
-  EXPECT_EQ(after.rfind("# mine\n", 0), 0u);
-  EXPECT_NE(after.find("axial_n_per_mm: 0.8"), std::string::npos) << "the springs stay";
+  EXPECT_EQ(read_file(sensor_), before_);
   const SensorConfig sensor = load_sensor(sensor_);
   EXPECT_NEAR(sensor.wrench.K(2, 2), 2800, 40);
   EXPECT_TRUE(sensor.spring_stiffness);
@@ -178,6 +176,25 @@ TEST_F(CalibrateWrench, OneKitchenWeightCalibratesAllSixAxesAndRunUsesIt) {
                   "--frames", "60", "--output", "jsonl:-"});
   EXPECT_EQ(run.status, 0) << run.err;
   EXPECT_NE(run.out.find("\"status\":\"ok\""), std::string::npos);
+  EXPECT_NE(run.err.find("wrench: measured/wrench.json, of 2"), std::string::npos) << run.err;
+  std::filesystem::remove(out_);
+  EXPECT_NEAR(load_sensor(sensor_).wrench.K(2, 2), 3200, 1e-6) << "as the springs are described";
+}
+
+TEST_F(CalibrateWrench, ElsewhereItIsInForceWhenSensorYamlNamesIt) {
+  const std::string elsewhere = (temporary_ / "elsewhere.json").string();
+  const Outcome first = calibrate(plan_, {"--out", elsewhere});
+  ASSERT_EQ(first.status, 0) << first.err;
+  EXPECT_NE(first.err.find("it is in force as soon as it is"), std::string::npos) << first.err;
+  EXPECT_EQ(read_file(sensor_), before_);
+  EXPECT_EQ(load_sensor(sensor_).calibration, "");
+  std::string naming = before_;
+  replace(naming, "wrench:\n", "wrench:\n  calibration: elsewhere.json\n");
+  write_file(sensor_, naming);
+  EXPECT_EQ(load_sensor(sensor_).calibration, elsewhere);
+  const Outcome second = calibrate(plan_, {"--out", elsewhere});
+  ASSERT_EQ(second.status, 0) << second.err;
+  EXPECT_EQ(second.err.find("as soon as"), std::string::npos) << second.err;
 }
 
 TEST_F(CalibrateWrench, AxesThatNoStepReachesAreCompletedAndMarkedOrRefusedByName) {
@@ -295,7 +312,7 @@ TEST_F(CalibrateWrench, FromItsRecordingItGivesTheSameNewtons) {
   ASSERT_EQ(live.status, 0) << live.err;
   ASSERT_NE(live.err.find("to be done again: step"), std::string::npos) << live.err;
   const json first = json::parse(read_file(out_));
-  const std::string data = read_file(temporary_ / "calibration.data.csv");
+  const std::string data = read_file(temporary_ / "measured" / "wrench.data.csv");
   expect_refused_again(calibrate(plan_, {"--record", recording}), "replaces nothing");
 
   const Outcome again = recalibrate(recording);
@@ -303,7 +320,7 @@ TEST_F(CalibrateWrench, FromItsRecordingItGivesTheSameNewtons) {
   EXPECT_EQ(again.out, "");
   const json second = json::parse(read_file(out_));
   expect_same_newtons(first, second);
-  EXPECT_EQ(read_file(temporary_ / "calibration.data.csv"), data);
+  EXPECT_EQ(read_file(temporary_ / "measured" / "wrench.data.csv"), data);
   EXPECT_EQ(second.at("notes"), "21 degrees");
   EXPECT_EQ(second.at("plan"), first.at("plan"));
 
@@ -325,13 +342,13 @@ TEST_F(CalibrateWrench, ALoadCellsReadingsAreInTheRecordingToo) {
   const Outcome live = calibrate(plan_, {"--record", recording, "--keep", "region"});
   ASSERT_EQ(live.status, 0) << live.err;
   const json first = json::parse(read_file(out_));
-  const std::string data = read_file(temporary_ / "calibration.data.csv");
+  const std::string data = read_file(temporary_ / "measured" / "wrench.data.csv");
   const Outcome again = recalibrate(recording);
   ASSERT_EQ(again.status, 0) << again.err;
   const json second = json::parse(read_file(out_));
   expect_same_newtons(first, second);
   EXPECT_EQ(second.at("reference"), first.at("reference"));
-  EXPECT_EQ(read_file(temporary_ / "calibration.data.csv"), data);
+  EXPECT_EQ(read_file(temporary_ / "measured" / "wrench.data.csv"), data);
 }
 
 TEST_F(CalibrateWrench, ARecordingWithoutACalibrationIsRefused) {
@@ -367,6 +384,7 @@ TEST_F(CalibrateWrench, BadInputIsNamedAndNothingIsWritten) {
       run_bridge({"calibrate", "wrench", "--sensor", sensor_, "--source", "v4l2:/dev/video0",
                   "--plan", "load_cell", "--board", "/dev/null", "--emulated-cell", "pipe"}),
       "is for the simulated sensor");
+  std::filesystem::create_directory(out_.parent_path());
   write_file(out_, "a shopping list");
   const Outcome foreign = calibrate("paper");
   EXPECT_EQ(foreign.status, 2);

@@ -27,10 +27,10 @@ class CalibratedSensor {
   std::string yaml() const { return read_file(sensor()); }
   const std::string& scenario() const { return scenario_; }
 
-  /// The sensor.yaml as calibrated, in another folder, with its picture.
+  /// The sensor as calibrated, in another folder.
   std::filesystem::path copy_to(const TemporaryFolder& to) const {
     std::filesystem::copy(sensor(), to / "sensor.yaml");
-    std::filesystem::copy(sensor().string() + ".rest", to / "sensor.yaml.rest");
+    std::filesystem::copy(sensor().parent_path() / "measured", to / "measured");
     return to / "sensor.yaml";
   }
 
@@ -165,10 +165,7 @@ TEST_F(Check, AKnownMassTellsTheScale) {
 TEST_F(Check, CannotStartWithoutWhatItComparesWith) {
   const Outcome learned = check(default_sensor().sensor().parent_path() / "none.yaml", kDefault);
   EXPECT_EQ(learned.status, 2);
-  write_file(temporary_ / "fresh.yaml", [] {
-    std::string text = default_sensor().yaml();
-    return text.substr(0, text.find("rest:")) + text.substr(text.find("wrench:"));
-  }());
+  write_file(temporary_ / "fresh.yaml", default_sensor().yaml());
   const Outcome fresh = check(temporary_ / "fresh.yaml", kDefault);
   EXPECT_EQ(fresh.status, 2);
   EXPECT_EQ(lines_in(fresh.err), 1u) << fresh.err;
@@ -208,6 +205,7 @@ TEST_F(Zero, TakesOffWhatReadsWithHandsOff) {
   const Outcome outcome = zero(sensor, drifted);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(read_file(sensor), default_sensor().yaml());
   const SensorConfig after = load_sensor(sensor);
   EXPECT_NEAR(after.zero.set[2], -0.112, 0.004);  // N: 2.8 N/mm
   EXPECT_EQ(after.zero.date.size(), 10u);
@@ -216,6 +214,7 @@ TEST_F(Zero, TakesOffWhatReadsWithHandsOff) {
   // And back again: the zero counts from the calibration, not from the last one.
   ASSERT_EQ(zero(sensor, kDefault).status, 0);
   EXPECT_NEAR(load_sensor(sensor).zero.set[2], 0, 2e-3);  // N
+  EXPECT_TRUE(std::filesystem::exists(temporary_ / "measured" / "zero.yaml.before"));
 }
 
 TEST_F(Zero, RunTakesItOffToo) {
@@ -268,6 +267,7 @@ TEST_F(Zero, RefusesAFaultThatIsNoDriftAndWritesNothing) {
     EXPECT_NE(outcome.err.find(why), std::string::npos) << outcome.err;
     EXPECT_NE(outcome.err.find("nothing was written"), std::string::npos) << outcome.err;
     EXPECT_EQ(read_file(sensor), before);
+    EXPECT_FALSE(std::filesystem::exists(temporary_ / "measured" / "zero.yaml"));
   };
   refused(kDefault + "target: {rest_position_mm: [0.15, -0.1, 20.8]}\n", "too far for drift");
   refused(kDefault + slipped(0.03), "tag 2 has moved");
@@ -277,14 +277,30 @@ TEST_F(Zero, RefusesAFaultThatIsNoDriftAndWritesNothing) {
 
 TEST_F(Zero, ANewTargetCalibrationVoidsIt) {
   const std::filesystem::path sensor = default_sensor().copy_to(temporary_);
-  write_file(sensor,
-             read_file(sensor) +
-                 "  zero_n: [0.1, 0, 0]\n  zero_nm: [0, 0, 0]\n  zero_date: '2026-01-02'\n");
-  const Outcome target = run_bridge({"calibrate", "target", "--sensor", sensor, "--source",
-                                     "images:" + default_sensor().sensor().parent_path().string()});
-  ASSERT_EQ(target.status, 0) << target.err;
+  const auto calibrate = [&] {
+    const Outcome target =
+        run_bridge({"calibrate", "target", "--sensor", sensor, "--source",
+                    "images:" + default_sensor().sensor().parent_path().string()});
+    ASSERT_EQ(target.status, 0) << target.err;
+  };
+  ASSERT_EQ(zero(sensor, kDefault + "target: {rest_position_mm: [0.15, -0.1, 20.96]}\n").status, 0);
+  ASSERT_FALSE(load_sensor(sensor).zero.set.isZero());
+  calibrate();
   EXPECT_TRUE(load_sensor(sensor).zero.set.isZero());
   EXPECT_EQ(load_sensor(sensor).zero.date, "");
+  EXPECT_TRUE(std::filesystem::exists(temporary_ / "measured" / "zero.yaml.before"));
+
+  // One that stands in sensor.yaml, where no command writes, is overruled.
+  const std::string old = read_file(sensor) +
+                          "  zero_n: [0.1, 0, 0]\n  zero_nm: [0, 0, 0]\n  zero_date: "
+                          "'2026-01-02'\n";
+  write_file(sensor, old);
+  ASSERT_FALSE(load_sensor(sensor).zero.set.isZero());
+  calibrate();
+  EXPECT_TRUE(load_sensor(sensor).zero.set.isZero());
+  EXPECT_EQ(read_file(sensor), old);
+  std::filesystem::remove(temporary_ / "measured" / "zero.yaml");
+  EXPECT_FALSE(load_sensor(sensor).zero.set.isZero()) << "back to sensor.yaml's";
 }
 
 }  // namespace

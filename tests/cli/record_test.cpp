@@ -110,6 +110,40 @@ TEST_F(Record, ExportedFramesAreAFolderThatRunsTheSame) {
   EXPECT_NE(again.err.find("exists"), std::string::npos);
 }
 
+TEST_F(Record, ASensorYamlThatNamesItsCalibrationIsRecordedWithIt) {
+  ASSERT_EQ(run_bridge({"sim", "--scenario", file("small.yaml"), "--out", file("frames"),
+                        "--frames", "40"})
+                .status,
+            0);
+  const std::string sensor = file("frames/sensor.yaml");
+  const std::string text = read_file(sensor);
+  const auto number = [&](const std::string& key) {
+    return std::stoi(text.substr(text.find(key) + key.size()));
+  };
+  std::string rows;
+  for (int r = 0; r < 6; ++r) {
+    rows += r == 0 ? "[" : "],[";
+    for (int c = 0; c < 6; ++c) rows += std::string(c == 0 ? "" : ",") + (r == c ? "777" : "0");
+  }
+  write_file(file("frames/old.json"),
+             R"({"format":"tagwrench-calibration-1","sensor":{"family":"aruco_original",)"
+             R"("tag_ids":[5,2],"tag_size_mm":3.8,"image_px":[)" +
+                 std::to_string(number("width: ")) + "," + std::to_string(number("height: ")) +
+                 R"(]},"K":[)" + rows + R"(]],"B":[0,0,0,0,0,0],"range":[1,1,1,1,1,1]})");
+  write_file(sensor, std::string(text).replace(text.find("wrench:\n"), 8,
+                                               "wrench:\n  calibration: old.json\n"));
+  const Outcome live = record("images:" + file("frames"), {"--frames", "40"});
+  ASSERT_EQ(live.status, 0) << live.err;
+  ASSERT_EQ(run_bridge({"export", file("r.twr"), "--frames", file("out")}).status, 0);
+  fs::remove_all(file("frames"));
+  for (const std::string& source : {"recording:" + file("r.twr"), "images:" + file("out")}) {
+    const Outcome again = run_bridge({"run", "--source", source, "--fast", "--output", "jsonl:-"});
+    EXPECT_EQ(again.status, 0) << again.err;
+    EXPECT_EQ(without_latency(again.out), without_latency(read_file(file("live.jsonl")))) << source;
+    EXPECT_EQ(again.err.find("sensor.yaml's springs"), std::string::npos) << again.err;
+  }
+}
+
 TEST_F(Record, ExportedFramesRunWithTheAppearanceOfTheirSensor) {
   write_file(folder_ / "moving.yaml", std::string(kSmall) + "seed: 3\n");
   ASSERT_EQ(run_bridge({"sim", "--scenario", file("moving.yaml"), "--out", file("frames"),
@@ -120,7 +154,7 @@ TEST_F(Record, ExportedFramesRunWithTheAppearanceOfTheirSensor) {
   const Outcome learned = run_bridge(
       {"calibrate", "target", "--sensor", sensor, "--source", "images:" + file("frames")});
   ASSERT_EQ(learned.status, 0) << learned.err;
-  const std::string appearance = read_file(file("frames/sensor.yaml.rest"));
+  const std::string appearance = read_file(file("frames/measured/rest.png"));
   ASSERT_EQ(record("images:" + file("frames"), {"--frames", "30"}).status, 0);
   const Outcome exported =
       run_bridge({"export", file("r.twr"), "--frames", file("out"), "--csv", file("out.csv")});
@@ -128,7 +162,17 @@ TEST_F(Record, ExportedFramesRunWithTheAppearanceOfTheirSensor) {
   EXPECT_NE(exported.err.find("30 frames in " + file("out")), std::string::npos) << exported.err;
   EXPECT_NE(exported.err.find("30 samples in " + file("out.csv")), std::string::npos)
       << exported.err;
-  EXPECT_EQ(read_file(file("out/sensor.yaml.rest")), appearance);
+  EXPECT_EQ(read_file(file("out/measured/rest.png")), appearance);
+  EXPECT_EQ(read_file(file("out/measured/target.yaml")),
+            read_file(file("frames/measured/target.yaml")));
+  EXPECT_EQ(read_file(file("out/sensor.yaml")), read_file(sensor));
+  // The recording has them, whatever becomes of the folder.
+  fs::remove_all(file("frames/measured"));
+  const Outcome replayed = run_bridge(
+      {"run", "--source", "recording:" + file("r.twr"), "--fast", "--output", "jsonl:-"});
+  EXPECT_EQ(replayed.status, 0) << replayed.err;
+  EXPECT_EQ(replayed.out.find("acquiring"), std::string::npos) << "its rest is known";
+  EXPECT_NE(replayed.err.find("target: measured/target.yaml"), std::string::npos) << replayed.err;
   const Outcome ran = run_bridge({"run", "--source", "images:" + file("out"), "--fast", "--frames",
                                   "5", "--output", "jsonl:-"});
   EXPECT_EQ(ran.status, 0) << ran.err;

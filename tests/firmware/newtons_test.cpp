@@ -46,7 +46,7 @@ struct Newtons : testing::Test {
   TemporaryFolder folder;
   std::string scenario = (folder / "scenario.yaml").string();
   std::string sensor = (folder / "frames" / "sensor.yaml").string();
-  std::string calibration = (folder / "frames" / "calibration.json").string();
+  std::string calibration = (folder / "frames" / "measured" / "wrench.json").string();
 
   Newtons() {
     ::setenv("XDG_CONFIG_HOME", folder.path().c_str(), 1);

@@ -15,6 +15,7 @@
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/sensor/calibration_file.h"
+#include "host/sensor/measured_files.h"
 
 namespace tagwrench {
 
@@ -33,9 +34,14 @@ void check_plan(const WrenchPlan& plan, const Vector6& range, bool require_all) 
 }
 
 void check_files(const CalibrationFiles& files, const CalibrateWrenchOptions& options) {
-  for (const fs::path& file : {files.calibration, files.data, files.progress, files.before})
-    check_replaceable(file);
   std::error_code none;
+  const fs::path folder = files.calibration.parent_path();
+  if (folder.filename() == kMeasuredFolder && !fs::exists(folder, none)) {
+    check_measurable(folder, {});
+  } else {
+    for (const fs::path& file : {files.calibration, files.data, files.progress, files.before})
+      check_replaceable(file);
+  }
   const bool waits = fs::exists(files.progress, none);
   if (options.resume && !waits) {
     throw ConfigError(fmt::format("--resume: there is no {} to go on from; leave it out",

@@ -153,6 +153,9 @@ void save_progress(const std::filesystem::path& path, const ProgressOf& of,
                      {"sensor_sha256", of.sensor_sha256},
                      {"skipped", progress.skipped},
                      {"records", std::move(records)}};
+  std::error_code error;
+  std::filesystem::create_directory(path.parent_path(),
+                                    error);  // measured/, perhaps for the first time
   write_atomically(path, dump_json(root) + "\n");
 }
 

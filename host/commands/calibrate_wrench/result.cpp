@@ -6,11 +6,10 @@
 #include <string_view>
 
 #include "host/calibration/analysis/trial_csv.h"
-#include "host/commands/zero_command.h"
+#include "host/core/axis_names.h"
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/sha256.h"
-#include "host/sensor/sensor_edit.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -19,16 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kLittle = 0.5;  // of the range
-
-/// As sensor.yaml names it: relative to itself where they share a folder.
-std::string name_from(const fs::path& sensor, const fs::path& file) {
-  const fs::path folder = fs::absolute(sensor).lexically_normal().parent_path();
-  const fs::path full = fs::absolute(file).lexically_normal();
-  const fs::path written = full.parent_path() == folder ? full.filename() : full;
-  std::string name = "'";
-  for (const char c : written.string()) name += c == '\'' ? std::string("''") : std::string(1, c);
-  return name + "'";
-}
 
 /// How well the loads of the held-out predictions were known themselves, rms, N and N m.
 Vector6 known_to(const WrenchData& data, const WrenchFit& fit) {
@@ -127,15 +116,15 @@ std::string what_is_lost(const CalibrationFiles& files, const WrenchFit& fit) {
                      lost, files.before.string());
 }
 
-void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
-                       const fs::path& sensor_file, const SensorConfig& sensor,
-                       const WrenchData& data, Calibration calibration) {
+void write_calibration(const CalibrationFiles& files, const WrenchData& data,
+                       Calibration calibration) {
   const std::string csv = study::trial_to_csv(data.trial);
   calibration.record.data_file = files.data.filename().string();
   calibration.record.data_sha256 = sha256_hex(csv);
   const fs::path fresh = fs::path(files.calibration) += ".new";
-  save_calibration(fresh, calibration);
   std::error_code none;
+  fs::create_directory(files.calibration.parent_path(), none);  // who writes says what is wrong
+  save_calibration(fresh, calibration);
   try {
     read_calibration(fresh);
   } catch (const ConfigError& unusable) {
@@ -145,15 +134,12 @@ void write_calibration(const CalibrationFiles& files, const std::string& sensor_
         "stays; take the steps again, with --force",
         unusable.what()));
   }
-  std::vector<YamlEntry> entries = {{"calibration", name_from(sensor_file, files.calibration)}};
-  for (const YamlEntry& entry : without_zero(sensor)) entries.push_back(entry);
   if (fs::exists(files.calibration, none))
     write_atomically(files.before, read_text(files.calibration));
   if (fs::exists(files.data, none))
     write_atomically(fs::path(files.data) += ".before", read_text(files.data));
   write_atomically(files.data, csv);
   fs::rename(fresh, files.calibration);
-  write_sensor(sensor_text, {{"wrench", entries}}, sensor_file);
 }
 
 std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,

@@ -7,7 +7,6 @@
 
 #include "host/calibration/wrench/observations.h"
 #include "host/sensor/calibration_file.h"
-#include "host/sensor/sensor_config.h"
 #include "host/wrench/fit.h"
 
 namespace tagwrench {
@@ -19,7 +18,7 @@ struct CalibrationFiles {
   std::filesystem::path before;    ///< what was in `calibration` until now
 };
 
-/// calibration.json -> calibration.data.csv, calibration.json.partial, calibration.json.before.
+/// wrench.json -> wrench.data.csv, wrench.json.partial, wrench.json.before.
 CalibrationFiles files_of(const std::filesystem::path& calibration);
 
 /// Refuses a fit that knows no axis: springs as they were described are no calibration. Throws
@@ -30,12 +29,10 @@ void check_some_axis(const WrenchFit& fit);
 /// nothing, or there is none.
 std::string what_is_lost(const CalibrationFiles& files, const WrenchFit& fit);
 
-/// Writes data and calibration, and names it in sensor.yaml, whose text is `sensor_text`. An
-/// earlier calibration is kept as `before`, and its data likewise. Throws ConfigError or
-/// std::runtime_error; then the old calibration is in force.
-void write_calibration(const CalibrationFiles& files, const std::string& sensor_text,
-                       const std::filesystem::path& sensor_file, const SensorConfig& sensor,
-                       const WrenchData& data, Calibration calibration);
+/// Writes data and calibration. An earlier calibration is kept as `before`, and its data likewise.
+/// Throws ConfigError or std::runtime_error; then the old calibration is in force.
+void write_calibration(const CalibrationFiles& files, const WrenchData& data,
+                       Calibration calibration);
 
 /// One line per axis and one for each thing to be said. `range`: full load, N and N m; `known`:
 /// the sensor's own, beyond kUnknownRange where nobody has told it.

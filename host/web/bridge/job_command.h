@@ -25,7 +25,7 @@ struct JobPlace {
   SourceKind source_kind = SourceKind::simulator;
   std::string board;        ///< port; empty: there is none
   std::string cells;        ///< calibration of its load cells; may be empty
-  bool calibrated = false;  ///< sensor.yaml names a calibration
+  bool calibrated = false;  ///< there is a calibration in newtons
   bool kept = false;        ///< what the run writes to could not go on after a job
 };
 

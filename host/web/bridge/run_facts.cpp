@@ -3,9 +3,10 @@
 #include <Eigen/Core>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
 
 #include "host/core/axis_names.h"
-#include "host/sensor/calibration_file.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -32,13 +33,11 @@ json hello_of(const RunFacts& facts, const std::string& recordings) {
   const SensorConfig& sensor = facts.sensor;
   json calibrated = nullptr;
   json from_springs = json::array();
-  if (!sensor.calibration.empty()) {
-    const CalibrationRecord record = read_calibration(sensor.calibration).record;
-    if (!record.date.empty()) calibrated = record.date.substr(0, 10);
-    for (std::size_t i = 0; record.axis && i < kWrenchAxes.size(); ++i) {
-      if ((*record.axis)[i].state != AxisState::calibrated) from_springs.push_back(kWrenchAxes[i]);
-    }
-  } else {
+  if (!sensor.calibration.empty() && !sensor.wrench_from.date.empty())
+    calibrated = sensor.wrench_from.date;
+  std::istringstream completed(sensor.completed_axes);
+  for (std::string axis; completed >> axis;) from_springs.push_back(axis);
+  if (sensor.calibration.empty()) {
     for (const char* axis : kWrenchAxes) from_springs.push_back(axis);
   }
   const Vector6 range = shown_range(sensor);

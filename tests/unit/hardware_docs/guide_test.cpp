@@ -94,7 +94,7 @@ TEST_F(Guide, LeadsTheSimulatedSensorFromTheFirstZeroToTheFirstNewtons) {
     ++run;
   }
   EXPECT_GE(run, 8);
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "twin/calibration.json"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "twin/measured/wrench.json"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "twin/certificate.pdf"));
 }
 

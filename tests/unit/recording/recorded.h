@@ -45,6 +45,7 @@ inline Head head(Keep keep = Keep::raw) {
   head.sensor_name = "sensor.yaml";
   head.sensor_yaml = "camera: {}\n";
   head.appearance = std::string("\x89PNG\0\n", 6);
+  head.measured = {{"target.yaml", "format: x\n"}, {"rest.png", std::string("\x89\0", 2)}};
   head.more = {{"board", "none"}};
   return head;
 }
