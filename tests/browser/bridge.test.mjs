@@ -151,7 +151,7 @@ test('a recording begins, shows how it goes, ends and replays', { skip: lacks },
   assert.ok(String(replayed.stdout).trim().split('\n').length >= 20);
 });
 
-test('a calibration has the camera, changes sensor.yaml, and the sensor runs on with it', { skip: lacks }, async () => {
+test('a calibration has the camera, writes measured/, and the sensor runs on with it', { skip: lacks }, async () => {
   const sensor = at('sensor', 'sensor.yaml');
   const before = readFileSync(sensor, 'utf8');
   const { child, page } = await startBridge(['--sensor', sensor, '--output', `jsonl:${at('all.jsonl')}`]);
@@ -167,13 +167,14 @@ test('a calibration has the camera, changes sensor.yaml, and the sensor runs on 
   const { job } = await other.next(jobOver('target'));
   assert.equal(job.state, 'done', JSON.stringify(job.lines));
   assert.match(job.lines.at(-1).text, /^written: /);
-  assert.notEqual(readFileSync(sensor, 'utf8'), before);
+  assert.equal(readFileSync(sensor, 'utf8'), before);
+  assert.match(readFileSync(at('sensor', 'measured', 'target.yaml'), 'utf8'), /position_mm/);
   await other.nextNew(someSample((s) => s.status === 'ok'));
 
   await other.ask('job_close');
   await other.ask('job_start', { verb: 'zero' });
   assert.equal((await other.next(jobOver('zero'))).job.state, 'done');
-  assert.match(readFileSync(sensor, 'utf8'), /zero_date/);
+  assert.match(readFileSync(at('sensor', 'measured', 'zero.yaml'), 'utf8'), /zero_n/);
   await other.nextNew(someSample((s) => s.status === 'ok'));
   child.kill('SIGINT');
   assert.equal((await child.ended).code, 0);

@@ -1,9 +1,10 @@
 // The core of the tab against the program, on the very same pictures and sensor files: the same sources, compiled twice.
 import assert from 'node:assert/strict';
-import { readFileSync, writeFileSync } from 'node:fs';
+import { createHash } from 'node:crypto';
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { nodePackage, root, scratch } from './support/environment.mjs';
+import { root, scratch } from './support/environment.mjs';
 import { coreModules, coreReason, loadCore, readVectors, run } from './support/core_node.mjs';
 import { calibration, kFiles, kSensors } from './support/wrong_sensors.mjs';
 import { loadModule } from './support/typescript.mjs';
@@ -65,24 +66,33 @@ test('from one rest pose, given with its picture, the core reads what the progra
   const learning = vectors(['sequence', scenario('realistic'), '40', folder]);
   const core = await loadCore({ finder: true });
   compare(core, learning);
-  const yaml = core.sensorYaml().replace(/^rest:$/m, 'rest:\n  appearance: sensor.rest');
   const mean = new Float64Array(640 * 480);
   const pictures = readVectors(folder);
   for (let i = 0; i < 25; i++) pictures.frame(i).forEach((level, at) => (mean[at] += level / 25));
   pictures.close();
   const { encode } = await import(join(root, 'host/web/pages/node_modules/fast-png/lib/index.js'));
   const picture = encode({ width: 640, height: 480, data: Uint16Array.from(mean, (level) => Math.round(level * 256)), depth: 16, channels: 1 });
-  writeFileSync(join(folder, 'sensor.rest'), picture);
-  writeFileSync(join(folder, 'given.yaml'), yaml);
-  const native = vectors(['sequence', scenario('realistic'), `${kFrames}`, folder, 'given.yaml'], folder);
-  const info = core.open(yaml, 'sensor.yaml', undefined, picture);
+  const sha256 = createHash('sha256').update(picture).digest('hex');
+  const { 'target.yaml': learned } = core.learned('2026-05-02');
+  const target = `${learned}picture: {file: rest.png, frames: 25, sha256: ${sha256}}\n`;
+  mkdirSync(join(folder, 'measured'));
+  writeFileSync(join(folder, 'measured', 'rest.png'), picture);
+  writeFileSync(join(folder, 'measured', 'target.yaml'), target);
+  writeFileSync(join(folder, 'sensor.yaml'), learning.sensor);
+  const native = vectors(['sequence', scenario('realistic'), `${kFrames}`, folder, 'sensor.yaml'], folder);
+  const measured = { 'target.yaml': new TextEncoder().encode(target), 'rest.png': picture };
+  const info = core.open(learning.sensor, 'sensor.yaml', undefined, undefined, measured);
   assert.equal(info.rest_given, true);
   assert.equal(info.appearance, true);
-  const apart = compare(core, native, [undefined, picture]);
+  assert.equal(info.in_force[1], 'target: measured/target.yaml, of 2026-05-02');
+  assert.deepEqual(core.learned('2026-05-02'), {}, 'nothing had to be learned');
+  const apart = compare(core, native, [undefined, undefined, measured]);
   t.diagnostic(JSON.stringify(apart));
   assert.equal(apart.ok, kFrames);
   assertAgree(apart);
-  assert.equal(core.sensorYaml(), native.sensor);
+  measured['rest.png'] = picture.slice(0, -1);
+  assert.throws(() => core.open(learning.sensor, 'sensor.yaml', undefined, undefined, measured), /rest\.png: is not the picture/);
+  assert.equal(core.open(learning.sensor, 'sensor.yaml').rest_given, false, 'what was handed in counts once');
 });
 
 test('on the real picture, set in motion, the core reads what the program reads', { skip: coreReason('data') }, async (t) => {
@@ -152,7 +162,7 @@ test('without a finder the core asks for one and blames nobody', { skip: coreRea
 test('a picture of another size or nothing to open is told', { skip: coreReason() }, async () => {
   const core = await loadCore({ finder: true });
   assert.throws(() => core.track(new Uint8Array(16), 4, 4, 4, 0n, 0), /no sensor is open/);
-  assert.throws(() => core.sensorYaml(), /not known yet/);
+  assert.throws(() => core.learned('2026-05-02'), /not known yet/);
   core.open(kSensors['right.yaml'], 'right.yaml');
   assert.equal(core.track(new Uint8Array(16), 4, 4, 4, 0n, 0).status, 'acquiring');
 });
@@ -199,20 +209,37 @@ test('the page\'s grid_10x10 is the program\'s', { skip: coreReason() }, async (
   });
 });
 
-test('what was learned goes into sensor.yaml, and its comments stay', { skip: coreReason() }, async () => {
-  const { withLearned } = await loadModule('sensor/learned_rest.ts');
-  const text = '# mine\ncamera: {width: 640} # wide\ntarget:\n  tags:\n    - {id: 5} # upper\n    - {id: 2}\nwrench: {zero_n: [1, 2, 3], zero_nm: [0, 0, 0]}\n';
-  const pose = { position_mm: [1.23456789, 0, -2], rotation_rad: [0.1, 0.2, 0.3] };
-  const learned = { rest: pose, tags: [{ id: 5, ...pose }, { id: 2, ...pose }], given: false, zero_set: true };
-  const out = withLearned(text, learned);
-  assert.match(out, /^# mine\n/);
-  assert.match(out, /# wide/);
-  assert.match(out, /# upper/);
-  const { target, rest, wrench } = nodePackage('yaml').parse(out);
-  assert.deepEqual(target.tags[1], { id: 2, position_mm: [1.234568, 0, -2], rotation_rad: [0.1, 0.2, 0.3] });
-  assert.deepEqual(rest, { position_mm: [1.234568, 0, -2], rotation_rad: [0.1, 0.2, 0.3] });
-  assert.deepEqual(wrench, {});
-  assert.equal(withLearned(text, { ...learned, given: true }), text);
+test('what people choose is told apart by what it holds', { skip: coreReason() }, async () => {
+  const { withFiles } = await loadModule('sensor/sensor_files.ts');
+  const file = (name, text) => new File([text], name);
+  const sensor = { name: 'sensor.yaml', yaml: kSensors['right.yaml'] };
+  const camera = 'image_width: 640\ncamera_matrix: {rows: 3}\n';
+  const target = 'format: tagwrench-target-1\npicture: {file: "rest.png"}\n';
+  const all = await withFiles(sensor, [
+    file('ost.yaml', camera), file('target.yaml', target), file('zero.yaml', 'format: tagwrench-zero-1\n'),
+    file('rest.png', 'x'), file('wrench.json', '{}'), file('mine.yaml', kSensors['every_key.yaml']),
+  ]);
+  assert.equal(all.name, 'mine.yaml');
+  assert.equal(all.yaml, kSensors['every_key.yaml'], 'as it was');
+  assert.deepEqual(Object.keys(all.measured).sort(), ['camera.yaml', 'rest.png', 'target.yaml', 'wrench.json', 'zero.yaml']);
+  assert.equal(new TextDecoder().decode(all.measured['camera.yaml']), camera);
+  const more = await withFiles(sensor, [file('wrench.json', '{}')]);
+  assert.equal(more.yaml, sensor.yaml);
+  assert.deepEqual(Object.keys(more.measured), ['wrench.json']);
+  const old = await withFiles(sensor, [file('old.yaml', kSensors['calibrated.yaml']), file('right.json', '{}')]);
+  assert.equal(old.calibration, '{}');
+  assert.equal(old.measured, undefined);
+  await assert.rejects(withFiles(sensor, [file('other.png', 'x')]), /no picture that target\.yaml or sensor\.yaml names/);
+  await assert.rejects(withFiles(sensor, [file('a.txt', 'x')]), /not a sensor's file/);
+});
+
+test('a change in the form drops what was measured of what was changed', { skip: coreReason() }, async () => {
+  const { readKeys, stillMeasured } = await loadModule('sensor/sensor_keys.ts');
+  const keys = readKeys(kSensors['right.yaml']);
+  const measured = { 'camera.yaml': new Uint8Array(1), 'target.yaml': new Uint8Array(2) };
+  assert.deepEqual(stillMeasured(measured, keys, keys), measured);
+  assert.deepEqual(Object.keys(stillMeasured(measured, keys, { ...keys, ids: '5, 3' })), ['camera.yaml']);
+  assert.deepEqual(stillMeasured(measured, keys, { ...keys, mirrored: true }), {});
 });
 
 test('a browser that cannot run the core is told so, and what to do', { skip: coreReason() }, async () => {

@@ -21,7 +21,7 @@ const kStill = 1e-4;
 
 const kLongWords = '/home/u/tagwrench/sensor.yaml:12: tags: family aruco_originl is none of aruco_original, aruco_4x4_50';
 const kRecording = { file: 'push.twr', seconds: 9, bytes: 9e5, frames: 99, dropped: 0, disk_left_s: 86_000 };
-const kWritten = { kind: 'note', text: 'written: /home/u/.config/tagwrench/sensor.yaml and /home/u/.config/tagwrench/sensor.yaml.rest' };
+const kWritten = { kind: 'note', text: 'written: /home/u/.config/tagwrench/measured/target.yaml and /home/u/.config/tagwrench/measured/rest.png' };
 
 /** Each one after the other: [what is told, how]. */
 const kTold = [

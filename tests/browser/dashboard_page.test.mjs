@@ -310,13 +310,13 @@ onBridge('a wizard runs from its start to its end, and survives a reload', async
   bridge.tellJob({
     ...job,
     state: 'done',
-    lines: [...lines, { kind: 'note', text: 'written: /home/u/calibration.json' }],
+    lines: [...lines, { kind: 'note', text: 'written: /home/u/measured/wrench.json' }],
     keys: [],
   });
   await page.getByText('Next: make the certificate').waitFor();
   await page.locator('.job-task').getByText('Wrench calibration written', { exact: true }).waitFor();
-  await page.locator('.job-live').getByText('/home/u/calibration.json', { exact: true }).waitFor();
-  await page.locator('.newest.good').getByText('Wrench calibration written: /home/u/calibration.json').waitFor();
+  await page.locator('.job-live').getByText('/home/u/measured/wrench.json', { exact: true }).waitFor();
+  await page.locator('.newest.good').getByText('Wrench calibration written: /home/u/measured/wrench.json').waitFor();
   await page.getByRole('button', { name: 'Close' }).click();
   await asked(bridge, page, 'job_close');
   bridge.tellJob(null);

@@ -104,12 +104,13 @@ test('the downloaded table has the columns of the bridge\'s, whole time stamps a
 
 test('the saved sensor has what was learned, and with it nothing need be learned', { skip }, async () => {
   const { page } = opened;
-  const text = await savedSensor(page);
-  assert.match(text, /position_mm/);
-  assert.match(text, /# The simulated sensor as its owner knows it/);
-  const file = join(scratch('saved'), 'saved.yaml');
-  writeFileSync(file, text);
-  await load(page, file);
+  const saved = await savedSensor(page, 'sensor.yaml', 'target.yaml');
+  assert.equal(saved['sensor.yaml'], readFileSync(join(folder, 'sensor.yaml'), 'utf8'), 'as its owner wrote it');
+  assert.match(saved['target.yaml'], /position_mm/);
+  const to = scratch('saved');
+  writeFileSync(join(to, 'saved.yaml'), saved['sensor.yaml']);
+  writeFileSync(join(to, 'target.yaml'), saved['target.yaml']);
+  await load(page, join(to, 'saved.yaml'), join(to, 'target.yaml'));
   await page.locator('.sensor-panel p').first().filter({ hasText: 'saved.yaml' }).waitFor();
   assert.match(await page.locator('.sensor-panel p').first().textContent(), /rest as calibrated/);
   await reached(page, 'ok');

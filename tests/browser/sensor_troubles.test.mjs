@@ -158,11 +158,13 @@ test('a mirrored camera is noticed, and one button sets it right; then the zero 
   assert.ok(await page.getByRole('button', { name: 'My camera is mirrored' }).isHidden());
 
   // As if the camera had sunk by 0.04 mm since: four springs of 0.7 N/mm read 0.112 N at rest.
-  const sunk = (await savedSensor(page))
+  const saved = await savedSensor(page, 'sensor.yaml', 'target.yaml');
+  const sunk = saved['target.yaml']
     .replace(/(rest:[^]*?position_mm: \[[^,]*,[^,]*,)([^\]]*)/, (_, before, z) => `${before} ${Number(z) + 0.04}`);
-  const file = join(scratch('sunk'), 'sunk.yaml');
-  writeFileSync(file, sunk);
-  await load(page, file);
+  const to = scratch('sunk');
+  writeFileSync(join(to, 'sunk.yaml'), saved['sensor.yaml']);
+  writeFileSync(join(to, 'target.yaml'), sunk);
+  await load(page, join(to, 'sunk.yaml'), join(to, 'target.yaml'));
   await page.locator('.sensor-panel p').first().filter({ hasText: 'sunk.yaml' }).waitFor();
   const reads = (newtons) => page.waitForFunction((wanted) => {
     const cell = document.querySelectorAll('.readings tbody tr')[2].querySelector('.now');

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <map>
 #include <memory>
 #include <new>
 #include <string>
@@ -16,6 +17,7 @@ struct PageCore {
   std::unique_ptr<Session> session;
   std::string text;  ///< the last one handed out
   std::vector<std::uint8_t> pixels;
+  std::map<std::string, tagwrench::Session::Bytes> measured;  ///< for the next sensor
 };
 
 }  // namespace tagwrench
@@ -26,6 +28,12 @@ extern "C" {
 
 PageCore* tagwrench_create() { return new (std::nothrow) PageCore; }
 
+/// One of the files of measured/, for the sensor that is opened next.
+void tagwrench_measured(PageCore* core, const char* name, const std::uint8_t* bytes,
+                        std::size_t size) {
+  core->measured[name].assign(bytes, bytes + size);
+}
+
 /// 1: open. 0: not, and tagwrench_text() says why; what was open before stays open. `calibration`
 /// and `appearance` may be null.
 int tagwrench_open(PageCore* core, const char* yaml, const char* name, const char* calibration,
@@ -34,8 +42,9 @@ int tagwrench_open(PageCore* core, const char* yaml, const char* name, const cha
     tagwrench::Session::Files files;
     if (calibration != nullptr) files.calibration = calibration;
     if (appearance != nullptr) files.appearance = {appearance, appearance_size};
+    files.measured = std::exchange(core->measured, {});
     auto session =
-        std::make_unique<tagwrench::Session>(tagwrench::Session::read(yaml, name, files));
+        std::make_unique<tagwrench::Session>(tagwrench::Session::read(yaml, name, files), name);
     core->text = session->description();
     core->session = std::move(session);
     return 1;
@@ -82,9 +91,9 @@ const char* tagwrench_diagnostic(PageCore* core) {
   return core->session ? core->session->diagnostic().c_str() : "";
 }
 
-const char* tagwrench_learned(PageCore* core) {
+const char* tagwrench_learned(PageCore* core, const char* date) {
   if (!core->session) return "null";
-  core->text = core->session->learned();
+  core->text = core->session->learned(date);
   return core->text.c_str();
 }
 }

@@ -4,15 +4,17 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <list>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "host/core/json/json_text.h"
 #include "host/core/yaml/yaml_reader.h"
-#include "host/sensor/calibration_file.h"
+#include "host/sensor/measured_files.h"
+#include "host/sensor/sensor_identity.h"
 #include "host/sensor/zero_options.h"
 #include "host/tracker/diagnostic_text.h"
 #include "host/tracker/diagnostics.h"
-#include "host/tracker/rotation.h"
 #include "host/wrench/zero_text.h"
 
 namespace tagwrench {
@@ -24,10 +26,10 @@ using nlohmann::json;
 /// A file in the core's own memory, where those who read files find it; gone with this object.
 class MemoryFile {
  public:
-  MemoryFile(const std::string& sensor, const std::string& named,
+  MemoryFile(const fs::path& folder, const std::string& named,
              std::span<const std::uint8_t> bytes) {
     if (named.empty() || bytes.empty()) return;
-    path_ = fs::path(sensor).parent_path() / named;
+    path_ = folder / named;
     std::error_code error;
     if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), error);
     std::ofstream(path_, std::ios::binary)
@@ -63,17 +65,10 @@ std::span<const std::uint8_t> bytes_of(const std::string& text) {
 
 json numbers(const Vector6& v, int first) { return {v[first], v[first + 1], v[first + 2]}; }
 
-json numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 /// 0: not known.
 json known_range(Vector6 range, int first) {
   for (double& value : range) value = value < kUnknownRange ? value : 0;
   return numbers(range, first);
-}
-
-json pose(const Eigen::Isometry3d& pose) {
-  return {{"position_mm", numbers(pose.translation() * 1e3)},
-          {"rotation_rad", numbers(rotation_to_vector(pose.linear()))}};
 }
 
 void copy(const Vector6& from, std::array<double, 6>& to) {
@@ -83,14 +78,23 @@ void copy(const Vector6& from, std::array<double, 6>& to) {
 }  // namespace
 
 SensorConfig Session::read(const std::string& yaml, const std::string& name, const Files& files) {
-  const MemoryFile calibration(name, named(yaml, "wrench", "calibration"),
+  const fs::path beside = fs::path(name).parent_path();
+  const MemoryFile calibration(beside, named(yaml, "wrench", "calibration"),
                                bytes_of(files.calibration));
-  const MemoryFile appearance(name, named(yaml, "rest", "appearance"), files.appearance);
-  return parse_sensor(yaml, name);
+  const MemoryFile appearance(beside, named(yaml, "rest", "appearance"), files.appearance);
+  if (files.measured.empty()) return parse_sensor(yaml, name);
+  const fs::path folder = measured_folder(name);
+  std::list<MemoryFile> measured;
+  for (const auto& [file, bytes] : files.measured) {
+    if (std::find(kMeasuredFiles.begin(), kMeasuredFiles.end(), file) != kMeasuredFiles.end())
+      measured.emplace_back(folder, file, bytes);
+  }
+  return parse_sensor(yaml, name, WrenchCalibration::use, folder);
 }
 
-Session::Session(const SensorConfig& sensor)
+Session::Session(const SensorConfig& sensor, std::string name)
     : sensor_(sensor),
+      name_(std::move(name)),
       tracker_(sensor.camera, sensor.target, sensor.rest),
       rest_given_(tracker_.rest().known),
       wrench_(sensor.wrench),
@@ -162,35 +166,45 @@ std::string Session::description() const {
   for (const Tag& tag : sensor_.target.tags) ids.push_back(tag.id);
   const Vector6 range = range_through(wrench_.tool(), sensor_.wrench.range);
   const CameraModel& camera = sensor_.camera;
-  return dump_json(json{{"camera",
-                         {{"width", camera.width_px},
-                          {"height", camera.height_px},
-                          {"mirrored", camera.mirrored},
-                          {"readout_ms", camera.readout * 1e3}}},
-                        {"family", name(sensor_.target.family)},
-                        {"tag_ids", ids},
-                        {"tag_size_mm", sensor_.target.tag_size * 1e3},
-                        {"rest_frames", sensor_.rest.frames},
-                        {"rest_given", rest_given_},
-                        {"appearance", sensor_.rest.appearance.has_value()},
-                        {"calibration", sensor_.calibration},
-                        {"range_n", known_range(range, 0)},
-                        {"range_nm", known_range(range, 3)}});
+  return dump_json(
+      json{{"camera",
+            {{"width", camera.width_px},
+             {"height", camera.height_px},
+             {"mirrored", camera.mirrored},
+             {"readout_ms", camera.readout * 1e3}}},
+           {"family", name(sensor_.target.family)},
+           {"tag_ids", ids},
+           {"tag_size_mm", sensor_.target.tag_size * 1e3},
+           {"rest_frames", sensor_.rest.frames},
+           {"rest_given", rest_given_},
+           {"appearance", sensor_.rest.appearance.has_value()},
+           {"calibration", sensor_.calibration.empty() ? "" : sensor_.wrench_from.file},
+           {"in_force", in_force(sensor_)},
+           {"range_n", known_range(range, 0)},
+           {"range_nm", known_range(range, 3)}});
 }
 
-std::string Session::learned() const {
+std::string Session::learned(const std::string& date) const {
   const KnownReference& rest = tracker_.rest();
   if (!rest.known) return "null";
-  json tags = json::array();
-  for (std::size_t t = 0; t < sensor_.target.tags.size(); ++t) {
-    json tag = pose(rest.platform_T_tag[t]);
-    tag["id"] = sensor_.target.tags[t].id;
-    tags.push_back(tag);
+  json files = json::object();
+  if (rest_given_) return dump_json(files);
+  SensorConfig now = sensor_;
+  for (std::size_t t = 0; t < now.target.tags.size(); ++t) {
+    now.target.tags[t].platform_T_tag = rest.platform_T_tag[t];
+    now.target.tags[t].sigma.setZero();  // of another measurement, if there was one
   }
-  return dump_json(json{{"rest", pose(rest.camera_T_platform)},
-                        {"tags", tags},
-                        {"given", rest_given_},
-                        {"zero_set", !sensor_.zero.date.empty() || !sensor_.zero.set.isZero()}});
+  now.rest.camera_T_platform = rest.camera_T_platform;
+  now.rest.appearance.reset();
+  const MeasuredStamp stamp{date, "tagwrench in a browser", fs::path(name_).filename().string()};
+  files[kMeasuredTarget] = target_yaml({stamp, now.target, rest.camera_T_platform,
+                                        sha256_of(now.camera), std::nullopt, std::nullopt});
+  if (!now.zero.set.isZero()) {  // found at another rest: overruled
+    files[kMeasuredZero] =
+        zero_yaml({stamp, Vector6::Zero(), sha256_of(identity_of(now.camera, now.target, now.rest)),
+                   sha256_of(now.wrench)});
+  }
+  return dump_json(files);
 }
 
 }  // namespace tagwrench

@@ -9,8 +9,10 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "host/sensor/sensor_config.h"
 #include "host/tracker/tracker.h"
@@ -39,14 +41,17 @@ struct PageSample {
 
 class Session {
  public:
-  /// Throws ConfigError. `files` as the sensor's text names them, beside it; empty: not given.
+  using Bytes = std::vector<std::uint8_t>;
+  /// What goes with the sensor's text; empty: not given.
   struct Files {
-    std::string calibration;
-    std::span<const std::uint8_t> appearance;
+    std::string calibration;                   ///< as the text names it, beside it
+    std::span<const std::uint8_t> appearance;  ///< alike
+    std::map<std::string, Bytes> measured;     ///< by name
   };
+  /// Throws ConfigError.
   static SensorConfig read(const std::string& yaml, const std::string& name, const Files& files);
 
-  explicit Session(const SensorConfig& sensor);
+  Session(const SensorConfig& sensor, std::string name);
 
   const PageSample& track(const Frame& frame) noexcept;
   void ask_zero() noexcept { zero_.ask(); }
@@ -55,14 +60,16 @@ class Session {
   const std::string& diagnostic() const noexcept { return diagnostic_; }
   /// What there is to know about the sensor, as JSON.
   std::string description() const;
-  /// The rest and the tags' places as they are known by now, as JSON; "null" before.
-  std::string learned() const;
+  /// What was learned at rest, as files of measured/: a JSON object of names and texts. Empty where
+  /// nothing had to be learned; "null" while it is not known. `date`: YYYY-MM-DD.
+  std::string learned(const std::string& date) const;
 
  private:
   void note(const Track& track) noexcept;
   void fill(const Track& track, const Sample& sample) noexcept;
 
   SensorConfig sensor_;
+  std::string name_;
   Tracker tracker_;
   bool rest_given_;  ///< together with the places of all tags
   WrenchEstimator wrench_;

@@ -24,7 +24,7 @@ export const kJobs = {
     state: 'done',
     lines: [
       task('move the platform slowly in all six directions'),
-      { kind: 'result', text: 'sensor.yaml is written; 18 key frames fit to 0.021 px' },
+      { kind: 'result', text: 'measured/target.yaml is written; 18 key frames fit to 0.021 px' },
     ],
     coverage: { range: [4e-4, 3e-4, 2e-4, 0.04, 0.03, 0.05], keyframes: 18, wanted: 20 },
     progress: 1,

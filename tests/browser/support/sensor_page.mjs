@@ -3,7 +3,7 @@
 //   await started(page)                    the camera runs (pressing Start unless it was allowed before and runs by itself)
 //   await reached(page, 'ok')              its status is this one
 //   await load(page, ...paths)             files are chosen; the tracker takes or refuses them after that
-//   const yaml = await savedSensor(page)   what `Save sensor.yaml` gives
+//   const files = await savedSensor(page, ...names)   what `Save sensor.yaml` gives, by name, once these are among it
 //   const rows = await record(page, rows)  as many samples, by way of the CSV that people download
 import { readFileSync } from 'node:fs';
 import { parseTable } from './clip.mjs';
@@ -22,9 +22,17 @@ export async function load(page, ...paths) {
   await page.locator('.sensor-panel input[type=file]').setInputFiles(paths);
 }
 
-export async function savedSensor(page) {
-  const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', { name: 'Save sensor.yaml' }).click()]);
-  return readFileSync(await download.path(), 'utf8');
+export async function savedSensor(page, ...names) {
+  const files = {};
+  const seen = [];
+  const take = (download) => seen.push(download);
+  page.on('download', take);
+  await page.getByRole('button', { name: 'Save sensor.yaml' }).click();
+  const there = () => names.every((name) => seen.some((download) => download.suggestedFilename() === name));
+  for (let i = 0; i < 100 && !there(); i++) await page.waitForTimeout(100);
+  page.off('download', take);
+  for (const download of seen) files[download.suggestedFilename()] = readFileSync(await download.path(), 'utf8');
+  return files;
 }
 
 export async function record(page, rows) {

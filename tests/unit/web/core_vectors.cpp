@@ -61,8 +61,8 @@ json as_json(const Sample& sample, const Track& track, const Vector6& truth, dou
           {"track_us", track_us}};
 }
 
-void write_vectors(const std::string& sensor_yaml, const NextFrame& next, const fs::path& out) {
-  const SensorConfig sensor = parse_sensor(sensor_yaml, "sensor.yaml");
+void write_vectors(const std::string& sensor_yaml, const SensorConfig& sensor,
+                   const NextFrame& next, const fs::path& out) {
   Tracker tracker(sensor.camera, sensor.target, sensor.rest);
   WrenchEstimator wrench(sensor.wrench);
   ZeroTracking zero(zero_options(sensor, wrench.tool(), true));
@@ -103,8 +103,11 @@ int simulate(const std::string& scenario_file, int count, const fs::path& out,
     truth = source.truth().displacement;
     return true;
   };
-  write_vectors(sensor_file.empty() ? sim::sensor_yaml(scenario) : read_text(sensor_file), next,
-                out);
+  const std::string text =
+      sensor_file.empty() ? sim::sensor_yaml(scenario) : read_text(sensor_file);
+  write_vectors(text,
+                sensor_file.empty() ? parse_sensor(text, "sensor.yaml") : load_sensor(sensor_file),
+                next, out);
   return 0;
 }
 
@@ -125,7 +128,8 @@ int semi_real(int count, const fs::path& out) {
     frame.sequence = static_cast<std::uint64_t>(at++);
     return true;
   };
-  write_vectors(renderer.sensor_yaml(false), next, out);
+  const std::string text = renderer.sensor_yaml(false);
+  write_vectors(text, parse_sensor(text, "sensor.yaml"), next, out);
   return 0;
 }
 

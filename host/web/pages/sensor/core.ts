@@ -5,7 +5,7 @@ import createModule from '@core/core.mjs';
 import wasmUrl from '@core/core.wasm?url';
 import type { Status, ZeroState } from '../common/sample';
 import { AT, TAG_NUMBERS, type CoreModule, type CorePage, type TagFinder } from './core_memory';
-import { withLearned, type Learned } from './learned_rest';
+import type { MeasuredFiles } from './messages';
 import { checkWebAssembly } from './wasm_support';
 
 export type { TagFinder } from './core_memory';
@@ -57,6 +57,8 @@ export interface SensorInfo {
   /** +- N and N m; 0: not known. */
   range_n: number[];
   range_nm: number[];
+  /** Which file tells camera, target, wrench and zero, and of when. */
+  in_force: string[];
   /** All of it, in a few words. */
   words: string;
 }
@@ -95,7 +97,6 @@ function words(d: Description): string {
 
 export class Core {
   private readonly core: number;
-  private yaml = '';
   private finderMissed = false;
 
   private constructor(
@@ -115,10 +116,11 @@ export class Core {
 
   /**
    * Throws an Error with one line that says what is wrong, where, and what to do; what was open stays open then.
-   * The other files are those that the text names as wrench.calibration and rest.appearance.
+   * The other files are those that the text names as wrench.calibration and rest.appearance, and those of measured/ beside it.
    */
-  open(sensorYaml: string, name: string, calibrationJson?: string, appearance?: Uint8Array): SensorInfo {
+  open(sensorYaml: string, name: string, calibrationJson?: string, appearance?: Uint8Array, measured: MeasuredFiles = {}): SensorInfo {
     const m = this.module;
+    for (const [file, bytes] of Object.entries(measured)) this.putMeasured(file, bytes);
     const places = [sensorYaml, name, calibrationJson].map((text) => (text === undefined ? 0 : this.put(text)));
     const picture = appearance && appearance.length > 0 ? m._malloc(appearance.length) : 0;
     if (appearance && picture !== 0) m.HEAPU8.set(appearance, picture);
@@ -127,7 +129,6 @@ export class Core {
     for (const place of [...places, picture]) m._free(place);
     const text = m.UTF8ToString(m._tagwrench_text(this.core));
     if (opened === 0) throw new Error(text);
-    this.yaml = sensorYaml;
     const { camera, ...rest } = JSON.parse(text) as Description;
     const { width, height, mirrored } = camera;
     return { ...rest, width, height, mirrored, name, words: words({ camera, ...rest }) };
@@ -166,15 +167,31 @@ export class Core {
     return this.module.UTF8ToString(this.module._tagwrench_diagnostic(this.core));
   }
 
-  /** The sensor.yaml that was opened, with the rest pose and the tags' places that were learned since. */
-  sensorYaml(): string {
-    const learned = this.module.UTF8ToString(this.module._tagwrench_learned(this.core));
-    return withLearned(this.yaml, JSON.parse(learned) as Learned | null);
+  /**
+   * What was learned at rest, as files of measured/: none where rest and places were given. Throws an Error while nothing is known.
+   * `date`: YYYY-MM-DD.
+   */
+  learned(date: string): Record<string, string> {
+    const at = this.put(date);
+    const text = this.module.UTF8ToString(this.module._tagwrench_learned(this.core, at));
+    this.module._free(at);
+    const files = JSON.parse(text) as Record<string, string> | null;
+    if (!files) throw new Error('the rest pose is not known yet; let the platform stand still before the camera');
+    return files;
   }
 
   /** Of the tracker, picture included. */
   get memoryBytes(): number {
     return this.module.HEAPU8.byteLength;
+  }
+
+  private putMeasured(file: string, bytes: Uint8Array): void {
+    const name = this.put(file);
+    const at = this.module._malloc(Math.max(1, bytes.length));
+    this.module.HEAPU8.set(bytes, at);
+    this.module._tagwrench_measured(this.core, name, at, bytes.length);
+    this.module._free(at);
+    this.module._free(name);
   }
 
   private put(text: string): number {

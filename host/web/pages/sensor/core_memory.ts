@@ -39,6 +39,7 @@ export interface CoreModule {
   _malloc(bytes: number): number;
   _free(at: number): void;
   _tagwrench_create(): number;
+  _tagwrench_measured(core: number, name: number, at: number, bytes: number): void;
   _tagwrench_open(
     core: number,
     yaml: number,
@@ -59,7 +60,7 @@ export interface CoreModule {
   ): number;
   _tagwrench_zero(core: number): void;
   _tagwrench_diagnostic(core: number): number;
-  _tagwrench_learned(core: number): number;
+  _tagwrench_learned(core: number, date: number): number;
 }
 
 /** Places in a sample, counted in numbers. */

@@ -2,12 +2,18 @@
 import type { Sample } from '../common/sample';
 import type { CoreSample, SensorInfo } from './core';
 
+/** The files of the folder measured/ that the core reads, by name. */
+export type MeasuredFiles = Partial<Record<MeasuredName, Uint8Array>>;
+export const MEASURED_NAMES = ['camera.yaml', 'target.yaml', 'rest.png', 'wrench.json', 'zero.yaml'] as const;
+export type MeasuredName = (typeof MEASURED_NAMES)[number];
+
 /** What describes a sensor; `name` is what people call it, mostly a file's name. */
 export interface SensorFiles {
   name: string;
   yaml: string;
   calibration?: string;
   appearance?: Uint8Array;
+  measured?: MeasuredFiles;
 }
 
 /** How pictures come: their luminance untouched, computed from colours, or by way of a canvas. */
@@ -35,7 +41,7 @@ export type ToWorker =
   | { kind: 'bitmap'; bitmap: ImageBitmap; time_us: number }
   | { kind: 'stop' }
   | { kind: 'zero' }
-  | { kind: 'learned'; id: number }
+  | { kind: 'learned'; id: number; date: string }
   | { kind: 'pictures'; on: boolean };
 
 export type FromWorker =
@@ -47,7 +53,7 @@ export type FromWorker =
   | { kind: 'hint'; text: string }
   | { kind: 'finder'; state: 'loading' | 'ready' | 'failed'; text: string }
   | { kind: 'picture'; bitmap: ImageBitmap; scale: number; corners: CoreSample['corners']; status: Sample['status'] }
-  | { kind: 'learned'; id: number; yaml: string }
+  | { kind: 'learned'; id: number; files: Record<string, string> }
   | { kind: 'took' }
   | { kind: 'unreadable'; text: string }
   | { kind: 'ended' };

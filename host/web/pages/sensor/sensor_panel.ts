@@ -3,21 +3,21 @@ import { button, field, make, panel, present, say } from '../common/elements';
 import type { SensorInfo } from './core';
 import { download } from '../common/download';
 import type { SensorFiles } from './messages';
-import { FAMILIES, type SensorKeys, readKeys, writeKeys } from './sensor_edit';
 import { withFiles } from './sensor_files';
+import { FAMILIES, type SensorKeys, readKeys, stillMeasured, writeKeys } from './sensor_keys';
 
 export interface SensorPanelOptions {
   /** Puts it in force, or throws an Error with one line. */
   onFiles: (files: SensorFiles) => Promise<void>;
   onExample: () => Promise<void>;
-  /** sensor.yaml with what was learned at rest. */
-  learned: () => Promise<string>;
+  /** What was learned at rest, as files of measured/. */
+  learned: () => Promise<Record<string, string>>;
 }
 
 export class SensorPanel {
   private readonly words = make('p');
   private readonly trouble = make('p', { class: 'error', role: 'alert', hidden: true });
-  private readonly chooser = make('input', { type: 'file', multiple: true, accept: '.yaml,.yml,.json,.png', class: 'unseen', tabindex: -1, 'aria-hidden': 'true' });
+  private readonly chooser = make('input', { type: 'file', multiple: true, accept: '.yaml,.yml,.json,.png,.rest', class: 'unseen', tabindex: -1, 'aria-hidden': 'true' });
   private readonly form = make('form', { class: 'fields' });
   private files: SensorFiles | null = null;
   private shown = (): void => {};
@@ -27,8 +27,10 @@ export class SensorPanel {
   });
 
   constructor(parent: HTMLElement, private readonly options: SensorPanelOptions) {
-    const load = button('Load files', () => this.chooser.click(), { title: 'sensor.yaml, calibration.json, or both; dropping them on the page does too' });
-    const save = button('Save sensor.yaml', () => void this.save(), { title: 'With the rest pose and the tags\' places, once they are learned' });
+    const load = button('Load files', () => this.chooser.click(), { title: 'sensor.yaml, the files of its folder measured/, or both; dropping them on the page does too' });
+    const save = button('Save sensor.yaml', () => void this.save(), {
+      title: 'And the files of its folder measured/: the rest pose and the tags\' places among them, once they are learned',
+    });
     const example = button('Published sensor', () => void this.attempt(options.onExample), { title: 'The example that is built in' });
     const edit = make('details', {}, make('summary', {}, 'Change tags, focal length, mirroring'), this.form);
     this.chooser.addEventListener('change', () => {
@@ -67,7 +69,7 @@ export class SensorPanel {
     const { files } = this;
     if (!files) return;
     const before = readKeys(files.yaml);
-    await this.attempt(() => this.options.onFiles({ ...files, yaml: writeKeys(files.yaml, before, { ...before, mirrored }) }));
+    await this.attempt(() => this.options.onFiles(SensorPanel.changed(files, before, { ...before, mirrored })));
   }
 
   private async attempt(what: () => Promise<void>): Promise<void> {
@@ -83,9 +85,16 @@ export class SensorPanel {
 
   private async save(): Promise<void> {
     await this.attempt(async () => {
-      download('sensor.yaml', new Blob([await this.options.learned()], { type: 'text/yaml' }));
       const { files } = this;
-      if (files?.calibration) download('calibration.json', new Blob([files.calibration], { type: 'application/json' }));
+      if (!files) return;
+      const learned = await this.options.learned();
+      const save = (name: string, content: BlobPart): void => download(name, new Blob([content]));
+      save('sensor.yaml', files.yaml);
+      if (files.calibration) save('calibration.json', files.calibration);
+      for (const [name, text] of Object.entries(learned)) save(name, text);
+      for (const [name, bytes] of Object.entries(files.measured ?? {})) {
+        if (!(name in learned)) save(name, bytes.slice());
+      }
     });
   }
 
@@ -116,7 +125,12 @@ export class SensorPanel {
       family: text('family'), ids: text('ids'), tag_size_mm: Number(text('tag_size_mm')), focal_px: Number(text('focal_px')),
       width: Number(text('width')), height: Number(text('height')), mirrored: said.has('mirrored'),
     };
-    await this.attempt(() => this.options.onFiles({ ...files, yaml: writeKeys(files.yaml, readKeys(files.yaml), now) }));
+    await this.attempt(() => this.options.onFiles(SensorPanel.changed(files, readKeys(files.yaml), now)));
+  }
+
+  private static changed(files: SensorFiles, before: SensorKeys, now: SensorKeys): SensorFiles {
+    const measured = stillMeasured(files.measured ?? {}, before, now);
+    return { ...files, yaml: writeKeys(files.yaml, before, now), measured };
   }
 
   private acceptDrops(): void {

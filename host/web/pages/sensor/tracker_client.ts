@@ -36,10 +36,13 @@ export class TrackerClient {
     throw new Error(answer.kind === 'refused' ? answer.text : 'no answer');
   }
 
-  /** The sensor's file with what was learned at rest written into it. */
-  async learned(): Promise<string> {
-    const answer = await this.ask((id) => ({ kind: 'learned', id }));
-    if (answer.kind === 'learned') return answer.yaml;
+  /** What was learned at rest, as files of measured/. */
+  async learned(): Promise<Record<string, string>> {
+    const now = new Date();
+    const two = (value: number): string => String(value).padStart(2, '0');
+    const date = `${now.getFullYear()}-${two(now.getMonth() + 1)}-${two(now.getDate())}`;
+    const answer = await this.ask((id) => ({ kind: 'learned', id, date }));
+    if (answer.kind === 'learned') return answer.files;
     throw new Error(answer.kind === 'refused' ? answer.text : 'no answer');
   }
 

@@ -37,7 +37,7 @@ class TrackingWorker {
       case 'zero':
         return this.core.zero();
       case 'learned':
-        return this.sayLearned(message.id);
+        return this.sayLearned(message.id, message.date);
       case 'pictures':
         this.pictures = message.on;
         if (this.tracking) this.tracking.picturesWanted = message.on;
@@ -48,7 +48,7 @@ class TrackingWorker {
   private open(id: number, files: SensorFiles): void {
     let info: SensorInfo;
     try {
-      info = this.core.open(files.yaml, files.name, files.calibration, files.appearance);
+      info = this.core.open(files.yaml, files.name, files.calibration, files.appearance, files.measured);
     } catch (error) {
       tell({ kind: 'refused', id, text: words(error) });
       return;
@@ -99,9 +99,9 @@ class TrackingWorker {
     if (mine === this.stream) tell({ kind: 'ended' });
   }
 
-  private sayLearned(id: number): void {
+  private sayLearned(id: number, date: string): void {
     try {
-      tell({ kind: 'learned', id, yaml: this.core.sensorYaml() });
+      tell({ kind: 'learned', id, files: this.core.learned(date) });
     } catch (error) {
       tell({ kind: 'refused', id, text: words(error) });
     }

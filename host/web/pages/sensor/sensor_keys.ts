@@ -1,6 +1,7 @@
-// The few keys of sensor.yaml that people need without an editor: tags, their size, focal length, picture size, mirroring.
-// Everything else in the file, comments included, stays as it is.
+// The few keys of sensor.yaml that people decide in the page's form: tags, their size, focal length, picture size, mirroring.
+// Everything else in the file, comments included, stays as it is. Nothing that was measured is written here.
 import { isMap, isSeq, parseDocument } from 'yaml';
+import type { MeasuredFiles } from './messages';
 
 export interface SensorKeys {
   family: string;
@@ -34,7 +35,16 @@ export function readKeys(yaml: string): SensorKeys {
   };
 }
 
-/** What was changed, and only that. Another picture size or other tags make what was learned or measured of the old ones void. */
+/** Of what was measured that which holds after the change: nothing of another camera, the camera alone of other tags. */
+export function stillMeasured(measured: MeasuredFiles, before: SensorKeys, now: SensorKeys): MeasuredFiles {
+  const same = (...keys: (keyof SensorKeys)[]): boolean => keys.every((key) => before[key] === now[key]);
+  if (!same('focal_px', 'width', 'height', 'mirrored')) return {};
+  if (same('family', 'ids', 'tag_size_mm')) return measured;
+  const camera = measured['camera.yaml'];
+  return camera ? { 'camera.yaml': camera } : {};
+}
+
+/** What was changed, and only that. */
 export function writeKeys(yaml: string, before: SensorKeys, now: SensorKeys): string {
   const document = parseDocument(yaml);
   const set = (path: string[], value: unknown): void => document.setIn(path, value);
