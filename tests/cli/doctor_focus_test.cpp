@@ -140,6 +140,30 @@ TEST_F(DoctorFocus, GoesOnUntilItIsStopped) {
   EXPECT_NE(outcome.out.find("sharpest so far"), std::string::npos) << outcome.out;
 }
 
+TEST_F(DoctorFocus, WithoutFocusItSaysWhatIsInForceForASensor) {
+  const std::string folder = temporary_ / "sensor";
+  ASSERT_EQ(run_bridge({"sim", "--out", folder, "--frames", "1"}).status, 0);
+  const std::string sensor = folder + "/sensor.yaml";
+  std::string out = run_bridge({"doctor", "--sensor", sensor}).out;
+  for (const char* line : {"ok  camera: sensor.yaml\n", "ok  target: sensor.yaml; its rest",
+                           "ok  wrench: sensor.yaml's springs\n", "ok  zero: none is set\n"})
+    EXPECT_NE(out.find(line), std::string::npos) << line << out;
+  std::filesystem::create_directory(folder + "/measured");
+  write_file(
+      folder + "/measured/camera.yaml",
+      "image_width: 640\nimage_height: 480\ndistortion_model: plumb_bob\n"
+      "camera_matrix: {rows: 3, cols: 3, data: [800., 0., 320., 0., 800., 240., 0., 0., 1.]}\n"
+      "distortion_coefficients: {rows: 1, cols: 5, data: [0., 0., 0., 0., 0.]}\n"
+      "tagwrench: {date: 2026-05-02}\n");
+  out = run_bridge({"doctor", "--sensor", sensor}).out;
+  EXPECT_NE(out.find("ok  camera: measured/camera.yaml, of 2026-05-02\n"), std::string::npos)
+      << out;
+  write_file(folder + "/measured/camera.yaml", "image_width: wide\n");
+  out = run_bridge({"doctor", "--sensor", sensor}).out;
+  EXPECT_NE(out.find("!!  " + folder + "/measured/camera.yaml:1: image_width"), std::string::npos)
+      << out;
+}
+
 TEST_F(DoctorFocus, WrongUseIsRefusedInOneLine) {
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
            {"doctor", "--source", "sim"},

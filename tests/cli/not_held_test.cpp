@@ -40,8 +40,8 @@ class NotHeld : public testing::Test {
                     "--output", "jsonl:" + (temporary_ / "out.jsonl").string(), "--fast"});
     EXPECT_EQ(run.status, 0) << run.err;
     EXPECT_EQ(run.out, "");
-    EXPECT_EQ(lines_in(run.err), 3U) << "source, cause, summary: " << run.err;
-    const std::size_t cause = run.err.find('\n') + 1;
+    EXPECT_EQ(lines_in(run.err), 7U) << "source, what is in force, cause, summary: " << run.err;
+    const std::size_t cause = run.err.find('\n', run.err.find("zero: none is set")) + 1;
     const std::size_t summary = run.err.find('\n', cause) + 1;
     for (const std::string& part : parts) {
       EXPECT_LT(run.err.find(part, cause), summary) << "no '" << part << "' in: " << run.err;
