@@ -16,7 +16,7 @@ import { FakeBridge } from '../tests/browser/support/fake_bridge.mjs';
 
 const kOut = resolve(process.argv[2] ?? join(root, 'docs/moving.webp'));
 const kFps = 25;
-const kEvery = 2; // of the camera's pictures one is shown
+const kEvery = 3; // of the camera's pictures one is shown
 const kPushFrames = 32;
 const kLearnFrames = 40; // at rest, before the first push
 const kAxes = [
@@ -28,7 +28,7 @@ const kAxes = [
   ['mz', -0.0075],
 ];
 const kShown_s = 20; // of the dashboard's traces
-const kQuality = 75; // of WebP; a whole picture now and then wipes away what lossy differences leave
+const kQuality = 60; // of WebP; a whole picture now and then wipes away what lossy differences leave
 const kWidth = 920;
 const kHeight = 540;
 
@@ -189,6 +189,6 @@ await bridge.stop();
 if (faults.length > 0) throw new Error(faults.join('\n'));
 const keep = process.env.TAGWRENCH_KEEP_FRAMES;
 if (keep) for (const shot of shots) copyFileSync(shot, join(keep, basename(shot)));
-const forEach = ['-lossy', '-q', String(kQuality), '-m', '4', '-d', String((1000 * kEvery) / kFps)];
+const forEach = ['-lossy', '-q', String(kQuality), '-m', '6', '-d', String((1000 * kEvery) / kFps)];
 run('img2webp', ['-loop', '0', '-kmin', '3', '-kmax', '9', ...forEach, ...shots, '-o', kOut]);
 console.log(`${kOut}: ${shots.length} pictures, ${(readFileSync(kOut).length / 1024).toFixed(0)} KiB`);
