@@ -1,5 +1,6 @@
 // The core of the tab against the program, on the very same pictures and sensor files: the same sources, compiled twice.
 import assert from 'node:assert/strict';
+import { File } from 'node:buffer'; // no global of node 18
 import { createHash } from 'node:crypto';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
