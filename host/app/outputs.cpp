@@ -13,14 +13,12 @@
 #include "host/app/input.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
-#include "host/output/csv.h"
 #include "host/output/gadget_output.h"
 #include "host/output/joystick.h"
-#include "host/output/jsonl.h"
-#include "host/output/spacemouse.h"
+#include "host/output/line_outputs.h"
 #include "host/output/terminal.h"
 #include "host/output/udp.h"
-#include "host/output/wrench_hid.h"
+#include "host/output/uhid_outputs.h"
 #include "host/web/server/web_place.h"
 
 namespace tagwrench {

@@ -8,7 +8,7 @@
 #include "host/app/input.h"
 #include "host/core/os/unique_fd.h"
 #include "host/output/output.h"
-#include "host/recording/frame_recorder.h"
+#include "host/recording/writer.h"
 
 namespace tagwrench {
 

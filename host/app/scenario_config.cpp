@@ -7,9 +7,9 @@
 
 #include "host/core/config_error.h"
 #include "host/core/yaml/yaml_section.h"
-#include "host/source/simulator/bench_config.h"
-#include "host/source/simulator/disturbance_config.h"
-#include "host/tools/design/hardware_config.h"
+#include "host/source/simulator/bench_settings.h"
+#include "host/source/simulator/disturbances.h"
+#include "host/tools/design/parameters.h"
 
 namespace tagwrench {
 namespace {

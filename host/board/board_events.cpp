@@ -1,7 +1,6 @@
-#include "host/board/board_events.h"
-
 #include <fmt/format.h>
 
+#include "host/board/board_session.h"
 #include "protocol/codec.h"
 
 namespace tagwrench::link {

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "host/board/board_session.h"
+#include "host/board/serial_places.h"
 #include "host/board/serial_port.h"
-#include "host/board/usb_identity.h"
 #include "host/core/os/unique_fd.h"
 
 namespace tagwrench::link {

@@ -1,11 +1,22 @@
 #include "host/board/cell_calibration.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "host/core/config_error.h"
+#include "host/core/json/json_text.h"
+#include "host/core/os/config_folder.h"
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench::link {
 namespace {
@@ -80,6 +91,164 @@ CellCalibration fit_cell(const std::vector<CellPoint>& points, double gravity) {
   out.zero_scale_covariance_n = scatter * wx / determinant / (slope * slope);
   if (freedom > 0) out.residual_n = std::sqrt(squares / freedom) / std::abs(slope);
   return out;
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr const char* kFormat = "tagwrench-cells-1";
+constexpr std::uintmax_t kMaxBytes = 1 << 20;
+constexpr double kMaxNumber = 1e12;  ///< far beyond any cell; its square and products are finite
+constexpr std::size_t kMaxShown = 40;
+
+/// The file, and what to do if it is none.
+struct Source {
+  const std::string& path;
+  const std::string& remedy;
+};
+
+[[noreturn]] void refuse(const Source& source, const std::string& why) {
+  throw ConfigError(fmt::format("{}: {}; {}", source.path, why, source.remedy));
+}
+
+[[noreturn]] void not_readable(const std::string& path, const std::string& why) {
+  throw ConfigError(fmt::format(
+      "{}: cannot be read: {}; make it readable, or give another file with --cells", path, why));
+}
+
+/// A stranger's words: no control codes to a terminal.
+std::string printable(const std::string& text) {
+  std::string out = text.substr(0, kMaxShown);
+  for (char& c : out) {
+    if (c < 0x20 || c > 0x7E) c = '?';
+  }
+  return text.size() > kMaxShown ? out + "..." : out;
+}
+
+double number(const Source& source, const json& cell, const char* key) {
+  const auto found = cell.find(key);
+  if (found == cell.end() || !found->is_number())
+    refuse(source, fmt::format("\"{}\" is missing or no number", key));
+  const double value = found->get<double>();
+  if (!(std::abs(value) <= kMaxNumber))
+    refuse(source, fmt::format("\"{}\" is beyond {:.0e}", key, kMaxNumber));
+  return value;
+}
+
+void read_cell(const Source& source, const json& cell, CellCalibrations& out) {
+  if (!cell.is_object()) refuse(source, "\"cells\" holds something that is no cell");
+  const double channel = number(source, cell, "channel");
+  if (channel < 0 || channel >= kMaxChannels || channel != std::floor(channel))
+    refuse(source, fmt::format("channel {} does not exist", channel));
+  CellCalibration& to = out[static_cast<std::size_t>(channel)];
+  if (to.calibrated) refuse(source, fmt::format("channel {} is in it twice", channel));
+  to.newtons_per_count = number(source, cell, "newtons_per_count");
+  to.newtons_per_count_sigma = number(source, cell, "newtons_per_count_sigma");
+  to.zero_counts = number(source, cell, "zero_counts");
+  to.zero_sigma_counts = number(source, cell, "zero_sigma_counts");
+  to.noise_counts = number(source, cell, "noise_counts");
+  if (cell.contains("zero_scale_covariance_n"))
+    to.zero_scale_covariance_n = number(source, cell, "zero_scale_covariance_n");
+  to.residual_n = number(source, cell, "residual_n");
+  if (to.newtons_per_count == 0) refuse(source, "\"newtons_per_count\" is 0");
+  if (to.newtons_per_count_sigma < 0 || to.zero_sigma_counts < 0 || to.noise_counts < 0 ||
+      to.residual_n < 0)
+    refuse(source, "a standard deviation or the residual is negative");
+  to.calibrated = true;
+}
+
+[[noreturn]] void not_written(const std::string& path, int error) {
+  throw ConfigError(fmt::format("{}: cannot be written: {}; give another file with --cells", path,
+                                std::strerror(error)));
+}
+
+void write_whole(const std::string& path, const std::string& text) {
+  const std::string beside = fmt::format("{}.{}", path, ::getpid());
+  UniqueFd fd(::open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
+  if (!fd) not_written(path, errno);
+  errno = ENOSPC;
+  const bool written =
+      ::write(fd.get(), text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+      ::fsync(fd.get()) == 0 && ::rename(beside.c_str(), path.c_str()) == 0;
+  if (written) return;
+  const int error = errno;
+  ::unlink(beside.c_str());
+  not_written(path, error);
+}
+
+}  // namespace
+
+std::string id_text(const UniqueId& id) {
+  std::string out;
+  for (std::size_t i = 0; i < id.count && i < kIdBytes; ++i)
+    out += fmt::format("{:02x}", id.bytes[i]);
+  return out;
+}
+
+std::string cell_file_path(const std::string& board_id) {
+  const fs::path folder = config_folder();
+  if (folder.empty()) {
+    throw ConfigError(
+        "board: neither XDG_CONFIG_HOME nor HOME says where calibrations are kept; give --cells "
+        "FILE");
+  }
+  return (folder / fmt::format("board-{}.json", board_id)).string();
+}
+
+CellCalibrations load_cells(const std::string& path, const std::string& board_id,
+                            const std::string& remedy) {
+  const Source source{path, remedy};
+  CellCalibrations out;
+  std::error_code error;
+  const fs::file_type type = fs::status(path, error).type();
+  if (type == fs::file_type::not_found) return out;
+  if (error) not_readable(path, error.message());
+  if (!fs::is_regular_file(path, error) || fs::file_size(path, error) > kMaxBytes)
+    refuse(source, "is no calibration of load cells");
+  errno = 0;
+  std::ifstream in(path);
+  if (!in) not_readable(path, std::strerror(errno));
+  std::ostringstream content;
+  if (!(content << in.rdbuf())) refuse(source, "is empty");
+  const json root = parse_json(content.str());
+  if (!root.is_object() || root.value("format", json()) != kFormat)
+    refuse(source, fmt::format("is not of the format \"{}\"", kFormat));
+  const json owner = root.value("board", json());
+  if (!owner.is_null() && !owner.is_string()) refuse(source, "\"board\" is no text");
+  if (!board_id.empty() && owner.is_string() && owner != "" && owner != board_id) {
+    throw ConfigError(fmt::format(
+        "{}: belongs to the board {}, this one is {}; calibrate this board's cells, or give "
+        "another --cells",
+        path, printable(owner.get<std::string>()), board_id));
+  }
+  const json cells = root.value("cells", json());
+  if (!cells.is_array()) refuse(source, "\"cells\" is missing");
+  for (const json& cell : cells) read_cell(source, cell, out);
+  return out;
+}
+
+void save_cells(const std::string& path, const std::string& board_id,
+                const CellCalibrations& cells) {
+  json list = json::array();
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const CellCalibration& cell = cells[i];
+    if (!cell.calibrated) continue;
+    list.push_back({{"channel", i},
+                    {"newtons_per_count", cell.newtons_per_count},
+                    {"newtons_per_count_sigma", cell.newtons_per_count_sigma},
+                    {"zero_counts", cell.zero_counts},
+                    {"zero_sigma_counts", cell.zero_sigma_counts},
+                    {"zero_scale_covariance_n", cell.zero_scale_covariance_n},
+                    {"noise_counts", cell.noise_counts},
+                    {"residual_n", cell.residual_n}});
+  }
+  std::error_code error;
+  const fs::path folder = fs::path(path).parent_path();
+  if (!folder.empty()) fs::create_directories(folder, error);
+  write_whole(
+      path, dump_json(json({{"format", kFormat}, {"board", board_id}, {"cells", list}}), 2) + "\n");
 }
 
 }  // namespace tagwrench::link

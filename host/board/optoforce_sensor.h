@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/board/counter_clock.h"
+#include "host/board/clock_sync.h"
 #include "host/board/optoforce.h"
 #include "host/board/ring.h"
 #include "host/board/serial_port.h"

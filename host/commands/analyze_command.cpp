@@ -9,7 +9,7 @@
 #include <system_error>
 #include <vector>
 
-#include "host/calibration/analysis/analysis_report.h"
+#include "host/calibration/analysis/analysis.h"
 #include "host/calibration/analysis/trial_csv.h"
 #include "host/commands/recorded_trial.h"
 #include "host/core/config_error.h"

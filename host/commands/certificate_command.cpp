@@ -10,7 +10,6 @@
 
 #include "host/calibration/analysis/analysis.h"
 #include "host/calibration/analysis/trial_csv.h"
-#include "host/calibration/certificate/files.h"
 #include "host/calibration/certificate/render.h"
 #include "host/commands/certificate_facts.h"
 #include "host/commands/recorded_trial.h"

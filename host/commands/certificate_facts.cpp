@@ -8,7 +8,7 @@
 
 #include "host/calibration/analysis/analysis_warnings.h"
 #include "host/calibration/analysis/metrics.h"
-#include "host/calibration/certificate/quantity.h"
+#include "host/calibration/certificate/certificate.h"
 #include "host/core/axis_names.h"
 
 namespace tagwrench {

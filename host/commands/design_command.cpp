@@ -13,7 +13,7 @@
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/sensor/sensor_config.h"
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 #include "host/tracker/tag_patterns.h"
 #include "host/wrench/spring_model.h"
 

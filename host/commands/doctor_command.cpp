@@ -10,7 +10,6 @@
 #include "host/core/os/config_folder.h"
 #include "host/sensor/sensor_config.h"
 #include "host/tools/doctor/doctor.h"
-#include "host/tools/doctor/report.h"
 
 namespace tagwrench {
 namespace {

@@ -1,6 +1,7 @@
 #include "host/commands/events.h"
 
 #include <fcntl.h>
+#include <openssl/evp.h>
 #include <turbojpeg.h>
 #include <unistd.h>
 
@@ -21,17 +22,9 @@ constexpr Duration kPictureEventEvery = std::chrono::milliseconds(200);
 constexpr int kPictureQuality = 70;
 
 std::string base64(std::span<const std::uint8_t> bytes) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t three = 0;
-    for (std::size_t j = 0; j < 3; ++j) three = three << 8 | (j < left ? bytes[i + j] : 0U);
-    for (std::size_t j = 0; j < 4; ++j)
-      text += j <= left ? kDigits[three >> (18 - 6 * j) & 63U] : '=';
-  }
+  std::string text((bytes.size() + 2) / 3 * 4, '\0');  // and a zero, where a string has its own
+  EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), bytes.data(),
+                  static_cast<int>(bytes.size()));
   return text;
 }
 

@@ -15,7 +15,7 @@
 #include "host/source/simulator/folder_export.h"
 #include "host/tools/design/checks.h"
 #include "host/tools/design/drawing.h"
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 #include "host/tracker/tag_patterns.h"
 
 namespace tagwrench {

@@ -8,7 +8,7 @@
 
 #include "host/calibration/wrench/plan_config.h"
 #include "host/core/config_error.h"
-#include "host/tools/design/load_points.h"
+#include "host/tools/design/drawing.h"
 
 namespace tagwrench {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/calibration/analysis/trial.h"
+#include "host/calibration/analysis/trial_csv.h"
 
 namespace tagwrench {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "host/app/input.h"
-#include "host/calibration/light/reading.h"
+#include "host/calibration/light/control.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/tracker/acquire.h"

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <optional>
 
+#include "host/calibration/print/drawing.h"
 #include "host/calibration/print/sheets.h"
-#include "host/calibration/print/vector_file.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/sensor/sensor_config.h"
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 
 namespace tagwrench {
 namespace {

@@ -8,7 +8,7 @@
 #include <exception>
 
 #include "host/core/os/unique_fd.h"
-#include "host/motion/focus_source.h"
+#include "host/motion/focus_watch.h"
 #include "host/motion/i3_ipc.h"
 
 namespace tagwrench {

@@ -12,7 +12,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/runtime_folder.h"
-#include "host/motion/focus_source.h"
+#include "host/motion/focus_watch.h"
 
 namespace tagwrench {
 namespace {

@@ -2,8 +2,6 @@
 
 #include <cstdlib>
 
-#include "host/motion/focus_source.h"
-
 namespace tagwrench {
 
 FocusWatch::FocusWatch(std::unique_ptr<FocusSource> source) : source_(std::move(source)) {}

@@ -7,7 +7,7 @@
 #include <exception>
 #include <string_view>
 
-#include "host/motion/focus_source.h"
+#include "host/motion/focus_watch.h"
 
 namespace tagwrench {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/core/json/json_text.h"
-#include "host/motion/focus_source.h"
+#include "host/motion/focus_watch.h"
 
 namespace tagwrench {
 namespace {

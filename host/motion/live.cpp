@@ -1,9 +1,9 @@
-#include "host/motion/live.h"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+
+#include "host/motion/profile_manager.h"
 
 namespace tagwrench {
 namespace {

@@ -20,13 +20,28 @@
 #include "host/motion/control_socket.h"
 #include "host/motion/focus_watch.h"
 #include "host/motion/gestures.h"
-#include "host/motion/live.h"
 #include "host/motion/profile_files.h"
 #include "host/motion/shaping.h"
 #include "host/wrench/zero.h"
 #include "host/wrench/zero_text.h"
 
 namespace tagwrench {
+
+// What the sensor reads at this moment, as one line of text: for who watches while a profile is
+// tuned.
+
+struct LiveReading {
+  Status status = Status::acquiring;
+  Vector6 wrench = Vector6::Zero();  ///< N, N m
+  Vector6 motion = Vector6::Zero();  ///< -1..1 per HID axis
+  std::uint32_t buttons = 0;
+  bool on_trial = false;  ///< of who asks: his profile is in force
+};
+
+/// "ok: STATUS, wrench, motion, buttons, 0 or 1", separated by blanks.
+std::string live_text(const LiveReading& reading);
+/// Nothing, if the text is none of live_text().
+std::optional<LiveReading> parse_live(std::string_view text) noexcept;
 
 class ProfileManager {
  public:

@@ -9,11 +9,8 @@
 
 #include "host/core/types.h"
 #include "host/motion/axis_filter.h"
-#include "host/motion/dead_zone.h"
 #include "host/motion/motion_extrapolator.h"
-#include "host/motion/noise_floor.h"
 #include "host/motion/response_curve.h"
-#include "host/motion/ringdown_suppressor.h"
 
 namespace tagwrench {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "host/output/gadget_face.h"
+#include "host/output/gadget_tree.h"
 
 namespace tagwrench {
 

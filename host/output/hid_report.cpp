@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "host/output/shown.h"
+#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
-#include "host/output/shown.h"
+#include "host/output/output.h"
 #include "host/output/uhid_device.h"
 
 namespace tagwrench {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "host/output/shown.h"
+#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {

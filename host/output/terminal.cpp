@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "host/output/output.h"
 #include "host/output/sample_text.h"
-#include "host/output/shown.h"
 
 namespace tagwrench {
 namespace {

@@ -6,7 +6,7 @@
 #include <iterator>
 
 #include "host/core/axis_names.h"
-#include "host/output/shown.h"
+#include "host/output/output.h"
 #include "host/output/terminal.h"
 
 namespace tagwrench {

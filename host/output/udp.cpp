@@ -10,7 +10,6 @@
 #include <memory>
 
 #include "host/core/config_error.h"
-#include "host/output/shown.h"
 
 namespace tagwrench {
 namespace {

@@ -9,7 +9,6 @@
 
 #include "host/core/config_error.h"
 #include "host/recording/database.h"
-#include "host/recording/rows.h"
 #include "host/recording/schema.h"
 
 namespace tagwrench::record {

@@ -1,5 +1,3 @@
-#include "host/recording/rows.h"
-
 #include <fmt/format.h>
 #include <sqlite3.h>
 
@@ -7,6 +5,8 @@
 #include <bit>
 #include <cstring>
 #include <limits>
+
+#include "host/recording/reader.h"
 
 namespace tagwrench::record {
 

@@ -9,8 +9,8 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/unique_fd.h"
+#include "host/recording/database.h"
 #include "host/recording/schema.h"
-#include "host/recording/trouble.h"
 
 namespace tagwrench::record {
 namespace {

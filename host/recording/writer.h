@@ -13,8 +13,10 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <thread>
 
+#include "host/core/frame_log.h"
 #include "host/recording/byte_ring.h"
 #include "host/recording/records.h"
 
@@ -131,6 +133,31 @@ class RecordingWriter {
   bool stop_ = false;
   std::string failure_;  ///< guarded by mutex_
   std::thread thread_;
+};
+
+// What a pipeline tells of each frame, into a recording.
+
+class FrameRecorder : public FrameLog {
+ public:
+  /// Makes the file. Throws ConfigError.
+  FrameRecorder(const WriterOptions& options, const Head& head) : writer_(options, head) {}
+
+  // The loop's thread.
+  void frame(const LoggedFrame& all) noexcept override;
+  void missing(const Sample& sample) noexcept override;
+  void disconnected(std::string_view detail) noexcept override;
+  void reconnected(std::string_view detail) noexcept override;
+  /// What people were told; an empty line is nothing.
+  void note(std::string_view line) noexcept;
+
+  RecordingWriter& writer() noexcept { return writer_; }
+  const RecordingWriter& writer() const noexcept { return writer_; }
+
+ private:
+  TimePoint now_of_frames() const noexcept;
+
+  RecordingWriter writer_;
+  Duration clock_{};  ///< of the frames less CLOCK_MONOTONIC
 };
 
 }  // namespace tagwrench::record

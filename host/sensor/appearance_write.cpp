@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "host/core/png/png_write.h"
+#include "host/core/png/png.h"
 #include "host/sensor/appearance_file.h"
 
 namespace tagwrench {

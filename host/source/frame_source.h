@@ -8,14 +8,37 @@
 // interface.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "host/core/types.h"
-#include "host/source/camera_light.h"
 
 namespace tagwrench {
 
 enum class SourceKind : std::uint8_t { simulator, camera, images, recording };
+
+/// How long and with what gain a camera exposes, where that can be set while it streams.
+class CameraLight {
+ public:
+  /// Equal ends where it cannot be set.
+  struct Range {
+    double least = 0;
+    double most = 0;
+  };
+  CameraLight() = default;
+  CameraLight(const CameraLight&) = delete;
+  CameraLight& operator=(const CameraLight&) = delete;
+  virtual ~CameraLight() = default;
+  /// What the camera exposes with at least and at most without lowering its frame rate, us.
+  virtual Range exposure_range_us() const noexcept = 0;
+  virtual double exposure_us() const noexcept = 0;
+  /// Sets the nearest exposure that the camera has; of one of the next pictures on. False: refused.
+  virtual bool set_exposure_us(double exposure_us) noexcept = 0;
+  /// In the camera's own units: more is brighter, not always in proportion.
+  virtual Range gain_range() const noexcept = 0;
+  virtual double gain() const noexcept = 0;
+  virtual bool set_gain(double gain) noexcept = 0;
+};
 
 struct SourceFormat {
   int width = 0;
@@ -27,14 +50,16 @@ struct SourceFormat {
 enum class ReadStatus : std::uint8_t {
   frame,         ///< the Frame argument is filled
   nothing,       ///< woken for nothing (a corrupt or stale frame was skipped); poll again
-  disconnected,  ///< the device went away or stalled; detail() says so. Reported once; keep polling
+  disconnected,  ///< the device went away or stalled; detail() says so. Reported once; keep
+                 ///< polling
   reconnected,   ///< it is back; detail() says so
   missing,       ///< a recording says that here no frame had come in time; of the Frame argument
                  ///< only recorded_latency is filled
   end,           ///< no more frames will come
 };
 
-/// Setup (the constructors of implementations) throws ConfigError; the running loop gets statuses.
+/// Setup (the constructors of implementations) throws ConfigError; the running loop gets
+/// statuses.
 class FrameSource {
  public:
   FrameSource() = default;
@@ -45,8 +70,8 @@ class FrameSource {
   /// Fixed for the source's lifetime, reconnections included.
   virtual const SourceFormat& format() const noexcept = 0;
 
-  /// Readable when read() is worth calling; -1 when it always is (a source that runs as fast as it
-  /// can). May change after any read(), so ask again before every poll.
+  /// Readable when read() is worth calling; -1 when it always is (a source that runs as fast as
+  /// it can). May change after any read(), so ask again before every poll.
   virtual int poll_fd() const noexcept = 0;
 
   /// Takes the newest frame, never a stale one. Never blocks, never throws. The frame is valid
@@ -61,8 +86,8 @@ class FrameSource {
   /// damaged, and the frame is as it was.
   virtual bool complete(Frame& /*frame*/) noexcept { return true; }
 
-  /// The frame that the last read() delivered, as it was before it was decoded; no bytes where the
-  /// source has none. Valid until the next read().
+  /// The frame that the last read() delivered, as it was before it was decoded; no bytes where
+  /// the source has none. Valid until the next read().
   virtual RawFrame raw() const noexcept { return {}; }
 
   /// Exposure and gain, where the source has them; owned by it. Valid for its lifetime.
@@ -74,7 +99,8 @@ class FrameSource {
     return false;
   }
 
-  /// One line about the frames that were delivered but could not be used; empty if there were none.
+  /// One line about the frames that were delivered but could not be used; empty if there were
+  /// none.
   virtual std::string unusable() const { return {}; }
 
   /// One line about the last disconnected or reconnected status.

@@ -3,14 +3,26 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host/core/os/unique_fd.h"
+#include "host/core/types.h"
 #include "host/source/frame_source.h"
 #include "host/source/raw_decoder.h"
 
 namespace tagwrench {
+
+// frames.csv of a recorded folder: one line a picture, `file,t_ns`. Pure.
+
+/// The times of `files` (names without folder, in the order of playing) from the text of a
+/// frames.csv. The first line may be the header. Throws ConfigError that names `source` and the
+/// line: a line that is not `file,t_ns`, a file that does not exist or is named twice, a file
+/// without a time, times that do not increase in the order of playing.
+std::vector<Duration> parse_frame_times(std::string_view text, const std::string& source,
+                                        std::span<const std::string> files);
 
 class ImagesSource final : public FrameSource {
  public:

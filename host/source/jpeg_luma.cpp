@@ -1,18 +1,19 @@
 #include "host/source/jpeg_luma.h"
 
-// jpeglib.h uses FILE and size_t, but does not include what declares them.
-#include <cstddef>
-#include <cstdio>
-// clang-format off
-#include <jpeglib.h>
 #include <jerror.h>
-// clang-format on
+#include <jpeglib.h>
 
 #include <csetjmp>
+#include <cstddef>
+#include <cstdio>
+#include <cstring>
 #include <type_traits>
 
 #include "host/core/config_error.h"
-#include "host/source/jpeg_restart.h"
+
+// jpeglib.h uses FILE and size_t, but does not include what declares them.
+// clang-format off
+// clang-format on
 
 namespace tagwrench {
 namespace {
@@ -211,6 +212,26 @@ std::optional<Region> JpegLuma::decode(std::span<const std::uint8_t> jpeg, const
   }
   jpeg_abort_decompress(&state.jpeg);
   return written;
+}
+
+std::optional<std::size_t> after_restart_markers(std::span<const std::uint8_t> data,
+                                                 std::int64_t count) noexcept {
+  constexpr std::uint8_t kPrefix = 0xFF, kStuffed = 0x00, kFirst = 0xD0;
+  const std::uint8_t* at = data.data();
+  const std::uint8_t* const end = at + data.size();
+  for (std::int64_t seen = 0; seen < count;) {
+    if (at == end) return std::nullopt;
+    at = static_cast<const std::uint8_t*>(
+        std::memchr(at, kPrefix, static_cast<std::size_t>(end - at)));
+    if (at == nullptr || end - at < 2) return std::nullopt;
+    const std::uint8_t code = *++at;
+    if (code == kPrefix) continue;  // fill bytes may precede a marker
+    ++at;
+    if (code == kStuffed) continue;
+    if (code != kFirst + seen % 8) return std::nullopt;
+    ++seen;
+  }
+  return static_cast<std::size_t>(at - data.data());
 }
 
 }  // namespace tagwrench

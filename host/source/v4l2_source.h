@@ -8,7 +8,6 @@
 #include <string>
 
 #include "host/core/os/unique_fd.h"
-#include "host/source/camera_light.h"
 #include "host/source/frame_source.h"
 #include "host/source/v4l2_capture_queue.h"
 #include "host/source/v4l2_controls.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "host/core/config_error.h"
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 #include "tests/bench/hardware_variant.h"
 #include "tests/bench/table.h"
 

@@ -4,7 +4,7 @@
 
 #include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
-#include "host/source/simulator/rigid_pose.h"
+#include "host/source/simulator/geometry.h"
 #include "host/tracker/rotation.h"
 #include "host/tracker/tracker.h"
 #include "tests/bench/tracker_bound.h"

@@ -12,7 +12,7 @@
 #include "host/source/simulator/mechanics.h"
 #include "host/tools/design/design.h"
 #include "host/tools/design/geometry.h"
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 #include "tests/bench/hardware_loop.h"
 #include "tests/bench/tracker_bound.h"
 

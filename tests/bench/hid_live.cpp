@@ -15,7 +15,7 @@
 #include <string>
 
 #include "host/app/pipeline.h"
-#include "host/output/jsonl.h"
+#include "host/output/line_outputs.h"
 #include "host/output/spnav_output.h"
 #include "host/sensor/default_profile.h"
 #include "tests/bench/hid_clip.h"

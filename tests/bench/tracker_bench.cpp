@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "host/app/scenario_config.h"
-#include "host/source/simulator/tag_print.h"
+#include "host/source/simulator/prints.h"
 #include "tests/bench/tracker_case.h"
 #include "tests/support/hard_run.h"
 

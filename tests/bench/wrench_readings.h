@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "host/calibration/analysis/trial.h"
+#include "host/calibration/analysis/trial_csv.h"
 #include "host/source/simulator/scenario.h"
 #include "tests/bench/wrench_reference.h"
 

@@ -13,6 +13,7 @@
 
 #include "host/recording/writer.h"
 #include "tests/cli/bridge.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::test {
 namespace {
@@ -22,12 +23,6 @@ using nlohmann::json;
 
 class Analyze : public ::testing::Test {
  protected:
-  Analyze() {
-    std::string name = fs::temp_directory_path() / "tagwrench-analyze-XXXXXX";
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~Analyze() override { fs::remove_all(folder_); }
-
   /// Two columns of readings that are twice the loads Fx and Mz, in mm and degrees, semicolons.
   fs::path readings(int rows = 400) const {
     const fs::path file = folder_ / "other.csv";
@@ -54,7 +49,8 @@ class Analyze : public ::testing::Test {
     return Bridge(arguments).finish();
   }
 
-  fs::path folder_;
+  test::TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 void expect_refused(const Outcome& outcome, const std::string& part) {

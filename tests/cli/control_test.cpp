@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/cli/bridge.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::test {
 namespace {
@@ -9,8 +10,6 @@ namespace {
 class Control : public testing::Test {
  protected:
   Control() {
-    std::string name = (std::filesystem::temp_directory_path() / "control-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
     ::setenv("XDG_RUNTIME_DIR", folder_.c_str(), 1);
     // Windows of whoever runs this choose nothing here.
     for (const char* desktop : {"SWAYSOCK", "I3SOCK", "WAYLAND_DISPLAY", "DISPLAY"})
@@ -18,7 +17,6 @@ class Control : public testing::Test {
     // It stays at rest, so that a zero can be had.
     std::ofstream(folder_ / "still.yaml") << "trajectory: {motion: rest}\n";
   }
-  ~Control() override { std::filesystem::remove_all(folder_); }
 
   std::vector<std::string> run(const std::vector<std::string>& more) const {
     std::vector<std::string> all = {"run", "--source", "sim:" + path("still.yaml"), "--seconds",
@@ -27,7 +25,8 @@ class Control : public testing::Test {
     return all;
   }
   std::string path(const std::string& name) const { return folder_ / name; }
-  std::filesystem::path folder_;
+  test::TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path();
 };
 
 TEST_F(Control, ChangesProfileAndZeroOfTheSensorThatRuns) {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "host/board/counter_clock.h"
+#include "host/board/clock_sync.h"
 #include "tests/fuzz/expect.h"
 
 namespace {

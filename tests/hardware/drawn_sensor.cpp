@@ -7,7 +7,7 @@
 #include <regex>
 #include <sstream>
 
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 
 namespace tagwrench::test {
 namespace {

@@ -1,6 +1,5 @@
 // From frame to text without the heap.
-#include "host/output/csv.h"
-#include "host/output/jsonl.h"
+#include "host/output/line_outputs.h"
 #include "tests/sim/played.h"
 #include "tests/support/heap_count.h"
 

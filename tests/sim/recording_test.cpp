@@ -9,6 +9,7 @@
 #include "host/recording/writer.h"
 #include "host/sensor/default_profile.h"
 #include "tests/sim/played.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::test {
 namespace {
@@ -49,12 +50,6 @@ class Log final : public FrameLog {
 
 class RecordedLoop : public PipelineLoop {
  protected:
-  RecordedLoop() {
-    std::string name = (std::filesystem::temp_directory_path() / "tagwrench-XXXXXX").string();
-    if (::mkdtemp(name.data()) != nullptr) folder_ = name;
-  }
-  ~RecordedLoop() override { std::filesystem::remove_all(folder_); }
-
   /// Until the target is lost or the source ends.
   std::vector<Sample> samples_of(FrameSource& source, FrameLog* log) {
     outputs_.clear();
@@ -90,7 +85,8 @@ class RecordedLoop : public PipelineLoop {
     }
   }
 
-  std::filesystem::path folder_;
+  test::TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path();
 };
 
 TEST_F(RecordedLoop, FramesComeAgainAsTheSameSamples) {

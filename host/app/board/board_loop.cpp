@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "host/app/input.h"
-#include "host/board/cell_file.h"
+#include "host/board/cell_calibration.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "host/app/board/board_output.h"
-#include "host/board/cell_file.h"
+#include "host/board/cell_calibration.h"
 #include "host/calibration/light/settle.h"
 #include "host/core/log.h"
 #include "host/wrench/zero.h"

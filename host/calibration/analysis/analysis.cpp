@@ -8,10 +8,8 @@
 
 #include "host/calibration/analysis/analysis_warnings.h"
 #include "host/calibration/analysis/cross_validation.h"
+#include "host/calibration/analysis/lag.h"
 #include "host/calibration/analysis/metrics.h"
-#include "host/calibration/analysis/regression.h"
-#include "host/calibration/analysis/smoothing.h"
-#include "host/calibration/analysis/trial_check.h"
 #include "host/core/config_error.h"
 
 namespace tagwrench::study {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "host/calibration/analysis/lag.h"
-#include "host/calibration/analysis/trial.h"
+#include "host/calibration/analysis/trial_csv.h"
 #include "host/core/axis_names.h"
 
 namespace tagwrench::study {
@@ -102,5 +102,14 @@ struct Analysis {
 /// Throws ConfigError: fewer readings than unknowns, times that do not grow, no overlap in time,
 /// trials whose features differ.
 Analysis analyze(const std::vector<Trial>& trials, const AnalysisOptions& options);
+
+// An Analysis for people and for programs.
+
+/// A page of text, lines of at most 100 characters but for warnings.
+std::string analysis_text(const Analysis& analysis);
+
+/// One JSON object, format "tagwrench-analysis-1": SI units, numbers that are not known null. The
+/// held-out series is in it only if asked for.
+std::string analysis_json(const Analysis& analysis, bool with_series);
 
 }  // namespace tagwrench::study

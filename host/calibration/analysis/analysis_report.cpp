@@ -1,5 +1,3 @@
-#include "host/calibration/analysis/analysis_report.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "host/calibration/analysis/analysis.h"
 #include "host/core/axis_names.h"
 #include "host/core/json/json_text.h"
 

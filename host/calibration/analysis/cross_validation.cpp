@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "host/calibration/analysis/smoothing.h"
+#include "host/calibration/analysis/lag.h"
 #include "host/core/config_error.h"
 
 namespace tagwrench::study {

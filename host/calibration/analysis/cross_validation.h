@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "host/calibration/analysis/analysis.h"
-#include "host/calibration/analysis/regression.h"
+#include "host/calibration/analysis/metrics.h"
 
 namespace tagwrench::study {
 

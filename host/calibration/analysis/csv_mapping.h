@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/calibration/analysis/trial.h"
+#include "host/calibration/analysis/trial_csv.h"
 #include "host/core/axis_names.h"
 
 namespace tagwrench::study {

@@ -1,6 +1,6 @@
 #include <nlohmann/json.hpp>
 
-#include "host/calibration/analysis/analysis_report.h"
+#include "host/calibration/analysis/analysis.h"
 #include "host/calibration/certificate/certificate.h"
 #include "host/core/json/json_text.h"
 

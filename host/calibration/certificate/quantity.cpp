@@ -1,9 +1,9 @@
-#include "host/calibration/certificate/quantity.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "host/calibration/certificate/certificate.h"
 
 namespace tagwrench {
 namespace {

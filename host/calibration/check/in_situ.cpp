@@ -4,11 +4,10 @@
 #include <cmath>
 
 #include "host/core/algebra/decompositions.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 namespace {
-
-constexpr double kMaxRange = 1e8;  // beyond, nobody has told it
 
 Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -163,7 +162,7 @@ InSituFinding judge_zero(const AtRest& rest, const InSituLimits& limits) {
   InSituFinding finding{.subject = Subject::zero};
   bool known = false;
   for (int i = 0; i < 6; ++i) {
-    if (!(rest.range[i] > 0 && rest.range[i] < kMaxRange)) continue;
+    if (!(rest.range[i] > 0 && rest.range[i] < kUnknownRange)) continue;
     known = true;
     const double share = rest.wrench[i] / rest.range[i];
     if (std::abs(share) < std::abs(finding.amount)) continue;
@@ -210,7 +209,7 @@ InSituFinding judge(const ProofLoad& load, const InSituLimits& limits) {
       (load.known_covariance + load.measured_covariance).diagonal().cwiseMax(0).cwiseSqrt();
   double worst = limits.off_line;
   for (int i = 0; i < 6; ++i) {
-    if (!(load.range[i] > 0 && load.range[i] < kMaxRange)) continue;
+    if (!(load.range[i] > 0 && load.range[i] < kUnknownRange)) continue;
     const double share = std::abs(rest[i]) / load.range[i];
     if (share <= worst || std::abs(rest[i]) <= limits.sigmas * sigma[i]) continue;
     worst = share;

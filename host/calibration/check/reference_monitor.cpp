@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/wrench/zero.h"
+
 namespace tagwrench {
 namespace {
 
-constexpr double kMaxRange = 1e8;  // beyond, nobody has told it
-constexpr double kMaxGap = 1;      // s that one pair may stand for
-constexpr double kMin = 20;        // independent pairs before a line is drawn
-constexpr double kHuber = 2.5;     // standard deviations
+constexpr double kMaxGap = 1;   // s that one pair may stand for
+constexpr double kMin = 20;     // independent pairs before a line is drawn
+constexpr double kHuber = 2.5;  // standard deviations
 constexpr double kNever = 1e300;
 
 }  // namespace
@@ -51,7 +52,7 @@ ReferenceFault ReferenceMonitor::add(TimePoint time, const Vector6& wrench, cons
                                      const Vector6& range, double force) noexcept {
   Vector6 u = Vector6::Zero(), m = Vector6::Zero();
   for (int i = 0; i < 6; ++i) {
-    if (!(range[i] > 0 && range[i] < kMaxRange)) continue;
+    if (!(range[i] > 0 && range[i] < kUnknownRange)) continue;
     u[i] = line[i] / range[i];
     m[i] = wrench[i] / range[i];
   }

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "host/calibration/light/control.h"
-#include "host/calibration/light/reading.h"
 #include "host/core/os/unique_fd.h"
 #include "host/source/frame_source.h"
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -41,5 +42,12 @@ struct Drawing {
   std::vector<Line> lines;
   std::vector<Text> texts;
 };
+
+// A drawing -> a PDF or SVG file, true to scale. Uses cairo.
+
+/// Writes to a file beside and renames it, so that `path` is never half-written. The name's ending,
+/// .pdf or .svg, says which. Throws ConfigError for another ending or a folder that takes no file,
+/// std::runtime_error if writing fails later.
+void write_vector_file(const Drawing& drawing, const std::filesystem::path& path);
 
 }  // namespace tagwrench

@@ -1,5 +1,3 @@
-#include "host/calibration/print/vector_file.h"
-
 #include <cairo-pdf.h>
 #include <cairo-svg.h>
 #include <fcntl.h>
@@ -16,6 +14,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "host/calibration/print/drawing.h"
 #include "host/core/config_error.h"
 #include "host/core/os/unique_fd.h"
 

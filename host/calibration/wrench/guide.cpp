@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "host/calibration/wrench/load.h"
-#include "host/calibration/wrench/reference_check.h"
+#include "host/calibration/wrench/reference.h"
 
 namespace tagwrench {
 namespace {

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "host/calibration/wrench/coverage.h"
-#include "host/calibration/wrench/hold.h"
 #include "host/calibration/wrench/plan.h"
 #include "host/calibration/wrench/record.h"
 #include "host/core/types.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/calibration/analysis/lag.h"
-#include "host/calibration/analysis/trial.h"
+#include "host/calibration/analysis/trial_csv.h"
 #include "host/calibration/wrench/plan.h"
 #include "host/calibration/wrench/record.h"
 #include "host/wrench/fit.h"

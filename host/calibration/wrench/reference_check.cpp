@@ -1,5 +1,3 @@
-#include "host/calibration/wrench/reference_check.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 
 #include "host/calibration/analysis/lag.h"
 #include "host/calibration/wrench/load.h"
+#include "host/calibration/wrench/reference.h"
 
 namespace tagwrench {
 namespace {

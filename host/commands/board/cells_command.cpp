@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "host/app/board/board_loop.h"
-#include "host/board/cell_file.h"
+#include "host/board/cell_calibration.h"
 #include "host/commands/board/options.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"

@@ -15,7 +15,6 @@
 
 #include "host/app/board/board_loop.h"
 #include "host/board/serial_places.h"
-#include "host/board/usb_identity.h"
 #include "host/commands/board/options.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/app/board/board_loop.h"
-#include "host/board/cell_file.h"
+#include "host/board/cell_calibration.h"
 #include "host/commands/board/options.h"
 #include "host/core/json/json_text.h"
 #include "host/core/log.h"

@@ -1,7 +1,7 @@
 // `tagwrench board watch` and `tagwrench board log`.
 #include <fmt/format.h>
 
-#include "host/board/cell_file.h"
+#include "host/board/cell_calibration.h"
 #include "host/commands/board/options.h"
 #include "host/commands/board/text.h"
 #include "host/core/log.h"

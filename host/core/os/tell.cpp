@@ -3,7 +3,6 @@
 #include <string>
 
 #include "host/core/log.h"
-#include "host/core/os/write_soon.h"
 
 namespace tagwrench {
 

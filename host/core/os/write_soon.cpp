@@ -1,5 +1,3 @@
-#include "host/core/os/write_soon.h"
-
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -10,6 +8,7 @@
 #include <cerrno>
 #include <charconv>
 
+#include "host/core/log.h"
 #include "host/core/os/unique_fd.h"
 
 namespace tagwrench {

@@ -202,9 +202,6 @@ std::size_t YamlReader::one_of(const std::string& key, const std::vector<std::st
 double YamlReader::number_or(const std::string& key, double fallback) {
   return has(key) ? number(key) : fallback;
 }
-double YamlReader::positive_or(const std::string& key, double fallback) {
-  return has(key) ? positive(key) : fallback;
-}
 double YamlReader::non_negative_or(const std::string& key, double fallback) {
   return has(key) ? non_negative(key) : fallback;
 }

@@ -48,7 +48,6 @@ class YamlReader {
 
   // With a default where the key is absent.
   double number_or(const std::string& key, double fallback);
-  double positive_or(const std::string& key, double fallback);
   double non_negative_or(const std::string& key, double fallback);
   int integer_or(const std::string& key, int lowest, int highest, int fallback);
   bool boolean_or(const std::string& key, bool fallback);

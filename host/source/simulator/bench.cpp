@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/source/simulator/geometry.h"
 #include "host/source/simulator/random.h"
-#include "host/source/simulator/rigid_pose.h"
 
 namespace tagwrench::sim {
 namespace {

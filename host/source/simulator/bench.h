@@ -12,8 +12,8 @@
 #include <optional>
 #include <vector>
 
-#include "host/source/simulator/applied_load.h"
 #include "host/source/simulator/bench_settings.h"
+#include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/trajectory.h"
 
 namespace tagwrench::sim {

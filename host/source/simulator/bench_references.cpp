@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/source/simulator/rigid_pose.h"
+#include "host/source/simulator/geometry.h"
 
 namespace tagwrench::sim {
 namespace {

@@ -9,8 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/source/simulator/applied_load.h"
-#include "host/source/simulator/desk_settings.h"
+#include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/scenario.h"
 
 namespace tagwrench::sim {

@@ -5,9 +5,7 @@
 #include <cmath>
 
 #include "host/core/config_error.h"
-#include "host/source/simulator/dirt_print.h"
-#include "host/source/simulator/platform_print.h"
-#include "host/source/simulator/tag_print.h"
+#include "host/source/simulator/prints.h"
 
 namespace tagwrench::sim {
 namespace {

@@ -11,12 +11,10 @@
 #include <vector>
 
 #include "host/source/simulator/disturbance_player.h"
-#include "host/source/simulator/led_light.h"
-#include "host/source/simulator/lens.h"
+#include "host/source/simulator/geometry.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/random.h"
 #include "host/source/simulator/scenario.h"
-#include "host/source/simulator/target_geometry.h"
 #include "host/source/simulator/texture.h"
 
 namespace tagwrench::sim {

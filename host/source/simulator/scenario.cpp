@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-#include "host/source/simulator/tag_print.h"
+#include "host/source/simulator/prints.h"
 
 namespace tagwrench::sim {
 namespace {

@@ -17,10 +17,18 @@
 #include <vector>
 
 #include "host/source/simulator/bench_settings.h"
-#include "host/source/simulator/desk_settings.h"
 #include "host/source/simulator/disturbances.h"
 
 namespace tagwrench::sim {
+
+// How an hour at the desk goes (desk_use.h); used where trajectory.motion is `desk`.
+
+struct DeskSettings {
+  double length = 3600;        ///< s, after the first rest; then nothing happens any more
+  double gesture_share = 0.2;  ///< of what the person does
+  double wander = 0.015;       ///< largest way of the zero, of the range
+  double knock = 5.0;          ///< m/s^2, largest acceleration of the table; most are far smaller
+};
 
 /// Four equal helical springs between base and platform, axes along z. Seen from its elastic centre
 /// (mid-length), a fixed-fixed spring is uncoupled: three forces against three translations, three

@@ -6,11 +6,8 @@
 #include <vector>
 
 #include "host/core/os/unique_fd.h"
-#include "host/source/camera_light.h"
 #include "host/source/frame_source.h"
-#include "host/source/simulator/applied_load.h"
-#include "host/source/simulator/image_file.h"
-#include "host/source/simulator/led_light.h"
+#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/renderer.h"
 #include "host/source/simulator/scenario.h"

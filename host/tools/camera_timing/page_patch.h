@@ -7,11 +7,34 @@
 #include <string>
 
 #include "host/core/os/unique_fd.h"
-#include "host/tools/camera_timing/page_clock.h"
+#include "host/core/types.h"
 #include "host/tools/camera_timing/screen_measurement.h"
 #include "host/web/server/web_server.h"
 
 namespace tagwrench {
+
+// A page's clock on the host's. Pure: times are passed in.
+
+class PageClock {
+ public:
+  /// The page was asked at `sent`, read `page_ms` (performance.now(), ms), and its answer was here
+  /// at `received`, host clock. What cannot be a clock's reading is left out, and false.
+  bool exchange(TimePoint sent, double page_ms, TimePoint received) noexcept;
+
+  int exchanges() const noexcept { return exchanges_; }
+  /// Nothing before the first exchange, or if `page_ms` is none of a clock's readings.
+  std::optional<TimePoint> host_time(double page_ms) const noexcept;
+  /// By how much host_time() may be wrong about what is now: half the shortest way there and back,
+  /// and what both clocks have drifted apart since.
+  Duration error() const noexcept;
+
+ private:
+  int exchanges_ = 0;
+  Duration offset_{};  ///< host less page
+  Duration half_{};    ///< of the way there and back
+  TimePoint measured_{};
+  TimePoint last_{};
+};
 
 /// Serves host/web/pages/flip and tells it when to flip; the page tells when it has, by its own
 /// clock, which exchanges of messages put on the host's. Messages: host/web/README.md.

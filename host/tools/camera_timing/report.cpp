@@ -1,5 +1,3 @@
-#include "host/tools/camera_timing/report.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/core/json/json_text.h"
+#include "host/tools/camera_timing/measurement.h"
 
 namespace tagwrench {
 namespace {

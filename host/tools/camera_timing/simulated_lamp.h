@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "host/source/simulator/led_light.h"
+#include "host/source/simulator/mechanics.h"
 #include "host/tools/camera_timing/pattern_lamp.h"
 #include "host/tools/camera_timing/screen_measurement.h"
 

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/tools/design/part_checks.h"
-
 namespace tagwrench::hardware {
 namespace {
 

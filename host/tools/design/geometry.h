@@ -88,4 +88,15 @@ Vector6 range(const Parameters& parameters, const Geometry& geometry);
 /// about each axis, and what the largest force or torque along each axis does, both ways.
 std::vector<Vector6> travel_corners(const Parameters& parameters, const Geometry& geometry);
 
+// When what moves meets what stands still: the stop screws in their slots, the hood and the cover.
+
+/// Whether something has met under this displacement (m, rotation vector in rad), turned in full:
+/// at 5 degrees what small angles leave out is as much as a twentieth of the travel.
+bool stopped(const Parameters& parameters, const Geometry& geometry, const Vector6& displacement);
+
+/// The part of the travel that a displacement takes: 1 where, on its way from rest or on the way
+/// opposite, something is about to be met.
+double share_of_travel(const Parameters& parameters, const Geometry& geometry,
+                       const Vector6& displacement);
+
 }  // namespace tagwrench::hardware

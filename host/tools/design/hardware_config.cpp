@@ -1,5 +1,3 @@
-#include "host/tools/design/hardware_config.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "host/core/config_error.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/tools/design/checks.h"
+#include "host/tools/design/parameters.h"
 #include "host/tracker/target.h"
 
 namespace tagwrench {

@@ -1,5 +1,3 @@
-#include "host/tools/doctor/cad_programs.h"
-
 #include <fmt/format.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -15,6 +13,7 @@
 #include "host/core/config_error.h"
 #include "host/core/os/unique_fd.h"
 #include "host/output/spnav_link.h"
+#include "host/tools/doctor/doctor.h"
 
 namespace tagwrench {
 namespace {

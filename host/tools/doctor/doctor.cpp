@@ -18,10 +18,6 @@
 
 #include "host/board/serial_places.h"
 #include "host/source/v4l2_nodes.h"
-#include "host/tools/doctor/access.h"
-#include "host/tools/doctor/bridges.h"
-#include "host/tools/doctor/cad_programs.h"
-#include "host/tools/doctor/report.h"
 
 namespace tagwrench {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string_view>
 
-#include "host/tools/packaging/option_values.h"
+#include "host/tools/packaging/man_page.h"
 
 namespace tagwrench {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "host/core/types.h"
-#include "host/tools/reading/hid_sysfs.h"
+#include "host/tools/reading/hid_list.h"
 
 namespace tagwrench {
 

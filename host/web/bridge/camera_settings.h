@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -43,5 +44,25 @@ nlohmann::json settings_json(const std::vector<CameraSetting>& settings);
 
 /// The nearest value that the setting can have.
 std::int32_t nearest(const CameraSetting& setting, std::int64_t value);
+
+// Which programs read our virtual devices: the kernel tells by their open files.
+
+struct DeviceReader {
+  std::string program;
+  std::string by;  ///< "hidraw" or "evdev"
+  bool operator==(const DeviceReader&) const = default;
+};
+
+/// Where the kernel tells it.
+struct KernelFolders {
+  std::filesystem::path processes = "/proc";
+  std::filesystem::path hidraw = "/sys/class/hidraw";
+  std::filesystem::path input = "/sys/class/input";
+};
+
+/// Of devices whose serial number is `serial`, or whose name begins with "tagwrench": programs of
+/// the same user, but not this one, in the order of their names.
+std::vector<DeviceReader> device_readers(const std::string& serial,
+                                         const KernelFolders& folders = {});
 
 }  // namespace tagwrench

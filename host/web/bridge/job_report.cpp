@@ -1,5 +1,7 @@
 #include "host/web/bridge/job_report.h"
 
+#include <openssl/evp.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -12,12 +14,8 @@ using nlohmann::json;
 
 constexpr int kMaxPicture_px = 16'384;
 
-int digit_of(char c) {
-  if (c >= 'A' && c <= 'Z') return c - 'A';
-  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-  if (c >= '0' && c <= '9') return c - '0' + 52;
-  return c == '+' ? 62 : c == '/' ? 63 : -1;
-}
+constexpr std::string_view kDigits =
+    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 const char* state_name(JobReport::State state) {
   switch (state) {
@@ -129,22 +127,15 @@ void JobReport::add(std::string kind, std::string text) {
 }
 
 std::optional<std::vector<std::uint8_t>> from_base64(std::string_view text) {
-  if (text.size() % 4 != 0) return {};
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(text.size() / 4 * 3);
-  for (std::size_t i = 0; i < text.size(); i += 4) {
-    const bool last = i + 4 == text.size();
-    const std::size_t padding =
-        !last ? 0 : (text[i + 3] == '=' ? (text[i + 2] == '=' ? 2U : 1U) : 0U);
-    std::uint32_t four = 0;
-    for (std::size_t j = 0; j < 4; ++j) {
-      const int digit = j >= 4 - padding ? 0 : digit_of(text[i + j]);
-      if (digit < 0) return {};
-      four = four << 6 | static_cast<std::uint32_t>(digit);
-    }
-    for (std::size_t j = 0; j < 3 - padding; ++j)
-      bytes.push_back(static_cast<std::uint8_t>(four >> (16 - 8 * j)));
-  }
+  std::string_view digits = text;
+  while (digits.size() + 2 > text.size() && digits.ends_with('=')) digits.remove_suffix(1);
+  // libcrypto takes padding and white space for digits.
+  if (text.size() % 4 != 0 || digits.find_first_not_of(kDigits) != std::string_view::npos)
+    return {};
+  std::vector<std::uint8_t> bytes(text.size() / 4 * 3);
+  EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(text.data()),
+                  static_cast<int>(text.size()));
+  bytes.resize(bytes.size() - (text.size() - digits.size()));
   return bytes;
 }
 

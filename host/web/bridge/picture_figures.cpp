@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/calibration/light/reading.h"
+#include "host/calibration/light/control.h"
 #include "host/tracker/edge_width.h"
 #include "host/tracker/picture_quality.h"
 

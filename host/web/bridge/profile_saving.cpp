@@ -9,7 +9,7 @@
 #include "host/core/os/atomic_file.h"
 #include "host/core/yaml/yaml_edit.h"
 #include "host/motion/profile_config.h"
-#include "host/motion/profile_edit.h"
+#include "host/motion/profile_files.h"
 #include "host/sensor/default_profile.h"
 #include "host/web/bridge/job_command.h"
 #include "host/web/bridge/recording_folder.h"

@@ -1,11 +1,15 @@
 // The folder in which pages keep recordings: what is in it, and what a new one may be called.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
+
+#include "host/recording/writer.h"
 
 namespace tagwrench {
 
@@ -34,5 +38,36 @@ class RecordingFolder {
 
 /// 1 to 64 letters, digits, '-', '_' and '.', the first none of the last three.
 bool is_recording_name(std::string_view name);
+
+// A recording that a page began and a page ends, while the sensor runs. The file is that of
+// `tagwrench record`.
+
+class RunRecording final : public record::FrameRecorder {
+ public:
+  /// Makes the file. Throws ConfigError.
+  RunRecording(const std::filesystem::path& file, const record::Head& head);
+
+  // The loop's thread.
+  void frame(const LoggedFrame& all) noexcept override;
+
+  // Any one thread.
+  std::string name() const { return file_.filename().string(); }
+  /// {"file","seconds","bytes","frames","dropped","disk_left_s"}
+  nlohmann::json progress() const;
+  bool failed() const noexcept { return writer().state().failed; }
+  std::string failure() const { return writer().failure(); }
+  /// Once the loop has let go of it. May take as long as the disk does. One line about what there
+  /// is now, or what went wrong.
+  struct Ending {
+    bool whole = false;
+    std::string line;
+  };
+  Ending finish() noexcept;
+
+ private:
+  std::filesystem::path file_;
+  TimePoint start_;
+  std::atomic<std::uint64_t> dropped_{0};
+};
 
 }  // namespace tagwrench

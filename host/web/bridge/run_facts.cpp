@@ -14,15 +14,13 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kNoRange = 1e8;
-
 /// Full scale per axis, as samples have it: what the calibration vouches for, else what the
 /// sensor's shaping takes for full.
 Vector6 shown_range(const SensorConfig& sensor) {
   const WrenchEstimator wrench(sensor.wrench);
   Vector6 range = range_through(wrench.tool(), sensor.wrench.range);
   for (int i = 0; i < 6; ++i) {
-    if (!(range[i] > 0 && range[i] < kNoRange)) range[i] = 1.5 * sensor.shaping.full_scale[i];
+    if (!(range[i] > 0 && range[i] < kUnknownRange)) range[i] = 1.5 * sensor.shaping.full_scale[i];
   }
   return range;
 }

@@ -17,7 +17,6 @@
 #include "host/core/os/unique_fd.h"
 #include "host/web/bridge/camera_settings.h"
 #include "host/web/bridge/control_link.h"
-#include "host/web/bridge/device_readers.h"
 #include "host/web/bridge/jobs.h"
 #include "host/web/bridge/picture_figures.h"
 #include "host/web/bridge/recording_folder.h"
@@ -25,7 +24,7 @@
 #include "host/web/bridge/run_facts.h"
 #include "host/web/bridge/web_bridge.h"
 #include "host/web/bridge/web_output.h"
-#include "host/web/server/page_request.h"
+#include "host/web/server/page_message.h"
 #include "host/web/server/server_timer.h"
 #include "host/web/server/web_server.h"
 

@@ -5,7 +5,9 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/core/frame_log.h"
@@ -14,13 +16,32 @@
 #include "host/source/region_source.h"
 #include "host/tracker/tracker.h"
 #include "host/web/bridge/board_control.h"
-#include "host/web/bridge/latest.h"
+#include "host/web/bridge/recording_folder.h"
 #include "host/web/bridge/run_control.h"
-#include "host/web/bridge/run_recording.h"
 #include "host/web/server/live_feed.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
+
+// The newest value of something, from one thread that must not wait to another that may.
+
+template <typename Value>
+class Latest {
+ public:
+  /// Leaves it out if somebody reads just now.
+  void put(const Value& value) noexcept {
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (lock) value_ = value;
+  }
+  Value get() const {
+    const std::lock_guard lock(mutex_);
+    return value_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  Value value_{};
+};
 
 /// What is seen now, besides the sample.
 struct SeenNow {

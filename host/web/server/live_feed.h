@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
@@ -86,6 +87,33 @@ class LiveFeed {
   std::unique_ptr<Buffer[]> buffers_;
   std::atomic<Duration::rep> interval_;
   TimePoint last_picture_{};  ///< the frame loop's
+};
+
+// How the frame loop runs, from the samples of the last second.
+
+struct LiveFigures {
+  double rate_hz = 0;  ///< samples handed to outputs
+  std::int64_t latency_median_us = 0;
+  std::int64_t latency_p99_us = 0;
+  std::int64_t jitter_us = 0;  ///< standard deviation of the time between two hand-overs
+  std::uint64_t frames = 0;    ///< since the feed began
+  std::uint64_t dropped = 0;   ///< frames that the source lost, since then
+};
+
+class LiveWindow {
+ public:
+  void add(TimePoint output_time, std::int64_t latency_us);
+  LiveFigures figures(TimePoint now) const;
+  void clear() { entries_.clear(); }
+
+ private:
+  static constexpr Duration kSpan = std::chrono::seconds(1);
+  static constexpr std::size_t kMax = 2000;
+  struct Entry {
+    TimePoint output_time;
+    std::int64_t latency_us;
+  };
+  std::deque<Entry> entries_;
 };
 
 }  // namespace tagwrench

@@ -2,6 +2,8 @@
 // it does.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -9,6 +11,8 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "host/core/types.h"
 
 namespace tagwrench {
 
@@ -31,6 +35,27 @@ class Outbox {
   std::deque<std::shared_ptr<const std::string>> kept_;
   std::deque<std::pair<std::string, std::shared_ptr<const std::string>>> latest_;
   std::shared_ptr<const std::vector<std::uint8_t>> picture_;
+};
+
+// Counts what comes in a second. Pure.
+
+template <std::size_t kMax>
+class MessageRate {
+ public:
+  /// False: it is more than kMax in the last second.
+  bool count(TimePoint now) noexcept {
+    TimePoint& oldest = times_[next_];
+    const bool too_many = full_ && now - oldest < std::chrono::seconds(1);
+    oldest = now;
+    next_ = (next_ + 1) % kMax;
+    full_ = full_ || next_ == 0;
+    return !too_many;
+  }
+
+ private:
+  std::array<TimePoint, kMax> times_{};
+  std::size_t next_ = 0;
+  bool full_ = false;
 };
 
 }  // namespace tagwrench

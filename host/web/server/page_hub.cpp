@@ -5,7 +5,6 @@
 
 #include "host/core/json/json_text.h"
 #include "host/web/server/page_message.h"
-#include "host/web/server/page_request.h"
 
 namespace tagwrench {
 namespace {

@@ -6,7 +6,6 @@
 #include <boost/beast/websocket.hpp>
 #include <utility>
 
-#include "host/web/server/message_rate.h"
 #include "host/web/server/outbox.h"
 #include "host/web/server/page_upgrade.h"
 #include "host/web/server/web_server.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "host/output/output.h"
 #include "host/output/sample_text.h"
-#include "host/output/shown.h"
 
 namespace tagwrench {
 namespace {

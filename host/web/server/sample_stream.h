@@ -7,7 +7,6 @@
 #include <string>
 
 #include "host/web/server/live_feed.h"
-#include "host/web/server/live_figures.h"
 
 namespace tagwrench {
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "host/web/server/content_type.h"
+#include <utility>
 
 namespace tagwrench {
 namespace {
@@ -22,6 +22,33 @@ constexpr std::string_view kNotBuilt =
     "<h1>The pages are not built</h1>"
     "<p>The bridge runs. What you wanted to see needs node, which builds the pages: run "
     "<code>./run web</code> in tagwrench's source folder, then load this page again.</p></html>\n";
+
+/// What a file's name says about its content.
+constexpr std::string_view content_type(std::string_view name) noexcept {
+  constexpr std::pair<std::string_view, std::string_view> kTypes[] = {
+      {".html", "text/html; charset=utf-8"},
+      {".js", "text/javascript; charset=utf-8"},
+      {".mjs", "text/javascript; charset=utf-8"},
+      {".css", "text/css; charset=utf-8"},
+      {".json", "application/json"},
+      {".map", "application/json"},
+      {".webmanifest", "application/manifest+json"},
+      {".wasm", "application/wasm"},
+      {".svg", "image/svg+xml"},
+      {".png", "image/png"},
+      {".jpg", "image/jpeg"},
+      {".ico", "image/x-icon"},
+      {".woff2", "font/woff2"},
+      {".pdf", "application/pdf"},
+      {".txt", "text/plain; charset=utf-8"},
+      {".csv", "text/csv; charset=utf-8"},
+      {".yaml", "text/plain; charset=utf-8"},
+  };
+  for (const auto& [ending, type] : kTypes)
+    if (name.size() > ending.size() && name.substr(name.size() - ending.size()) == ending)
+      return type;
+  return "application/octet-stream";
+}
 
 bool is_html(std::string_view name) { return name.ends_with(".html"); }
 bool is_script(std::string_view name) { return name.ends_with(".js") || name.ends_with(".mjs"); }

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "host/core/types.h"
-#include "host/web/server/live_figures.h"
+#include "host/web/server/live_feed.h"
 #include "host/web/server/web_options.h"
 
 namespace boost::asio {

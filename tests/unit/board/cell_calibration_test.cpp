@@ -9,8 +9,8 @@
 #include <fstream>
 #include <random>
 
-#include "host/board/cell_file.h"
 #include "host/core/config_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::link {
 namespace {
@@ -79,13 +79,6 @@ TEST(CellCalibrationTest, PointsOffTheLineAreSaidAndWidenTheSigma) {
 
 class CellFileTest : public ::testing::Test {
  protected:
-  CellFileTest() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-cells-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    folder = name;
-  }
-  ~CellFileTest() override { fs::remove_all(folder); }
-
   std::string write(const std::string& text) const {
     const fs::path path = folder / "cells.json";
     std::ofstream(path) << text;
@@ -101,7 +94,8 @@ class CellFileTest : public ::testing::Test {
     return {};
   }
 
-  fs::path folder;
+  test::TemporaryFolder temporary_;
+  fs::path folder = temporary_.path();
 };
 
 TEST_F(CellFileTest, WhatIsSavedIsLoaded) {

@@ -1,9 +1,9 @@
-#include "host/board/counter_clock.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
+
+#include "host/board/clock_sync.h"
 
 namespace tagwrench::link {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "board_model.h"
 #include "host/board/board_link.h"
-#include "host/board/counter_clock.h"
+#include "host/board/clock_sync.h"
 #include "host/board/optoforce.h"
 #include "host/board/sample_history.h"
 #include "optoforce_frames.h"

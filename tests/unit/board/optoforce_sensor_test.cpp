@@ -7,6 +7,7 @@
 #include "host/core/config_error.h"
 #include "optoforce_frames.h"
 #include "pty.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::link {
 namespace {
@@ -15,13 +16,7 @@ namespace fs = std::filesystem;
 
 class OptoforceSensorTest : public ::testing::Test {
  protected:
-  OptoforceSensorTest() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-force-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    folder = name;
-    plug();
-  }
-  ~OptoforceSensorTest() override { fs::remove_all(folder); }
+  OptoforceSensorTest() { plug(); }
   void plug() {
     device.open();
     fs::remove(port());
@@ -48,7 +43,8 @@ class OptoforceSensorTest : public ::testing::Test {
     return false;
   }
 
-  fs::path folder;
+  test::TemporaryFolder temporary_;
+  fs::path folder = temporary_.path();
   Pty device;
   std::uint16_t counter = 0;
 };

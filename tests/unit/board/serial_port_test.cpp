@@ -12,6 +12,7 @@
 #include "host/board/serial_places.h"
 #include "host/core/config_error.h"
 #include "pty.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::link {
 namespace {
@@ -172,12 +173,6 @@ TEST(SerialPortTest, NoPermissionOnARealPort) {
 
 class PlacesTest : public ::testing::Test {
  protected:
-  PlacesTest() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-ports-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    folder = name;
-  }
-  ~PlacesTest() override { fs::remove_all(folder); }
   std::string add(const std::string& name) const {
     fs::create_symlink("/dev/null", folder / name);
     return (folder / name).string();
@@ -189,7 +184,8 @@ class PlacesTest : public ::testing::Test {
       return e.what();
     }
   }
-  fs::path folder;
+  test::TemporaryFolder temporary_;
+  fs::path folder = temporary_.path();
 };
 
 TEST_F(PlacesTest, TheOnlyPortIsTaken) {

@@ -1,12 +1,12 @@
-#include "host/board/usb_identity.h"
-
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
 #include <filesystem>
 #include <fstream>
 
+#include "host/board/serial_places.h"
 #include "host/core/config_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::link {
 namespace {
@@ -35,13 +35,7 @@ TEST(UsbIdentityTest, KnownBoardsHaveNames) {
 /// A sysfs of our own: tty class links into device folders, as the kernel lays them out.
 class UsbTreeTest : public ::testing::Test {
  protected:
-  UsbTreeTest() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-sysfs-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    root = name;
-    fs::create_directories(root / "class/tty");
-  }
-  ~UsbTreeTest() override { fs::remove_all(root); }
+  UsbTreeTest() { fs::create_directories(root / "class/tty"); }
 
   void plug(const std::string& bus_port, const std::string& vendor, const std::string& product,
             const std::string& serial, const std::string& tty) const {
@@ -54,7 +48,8 @@ class UsbTreeTest : public ::testing::Test {
     fs::create_symlink(interface, interface / "tty" / tty / "device");
     fs::create_symlink(interface / "tty" / tty, root / "class/tty" / tty);
   }
-  fs::path root;
+  test::TemporaryFolder temporary_;
+  fs::path root = temporary_.path();
 };
 
 TEST_F(UsbTreeTest, TheNodeIsFoundByVendorProductAndSerial) {

@@ -9,7 +9,7 @@
 
 #include "documents.h"
 #include "host/tools/design/geometry.h"
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 
 namespace tagwrench {
 namespace {

@@ -7,7 +7,7 @@
 #include "documents.h"
 #include "firmware/app/led.h"
 #include "host/tools/design/geometry.h"
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 
 namespace tagwrench {
 namespace {

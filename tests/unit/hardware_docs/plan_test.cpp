@@ -7,8 +7,8 @@
 
 #include "host/calibration/wrench/plan_config.h"
 #include "host/commands/hardware_plan.h"
-#include "host/tools/design/hardware_config.h"
-#include "host/tools/design/load_points.h"
+#include "host/tools/design/drawing.h"
+#include "host/tools/design/parameters.h"
 
 namespace tagwrench {
 namespace {

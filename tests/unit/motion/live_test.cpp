@@ -1,6 +1,6 @@
-#include "host/motion/live.h"
-
 #include <gtest/gtest.h>
+
+#include "host/motion/profile_manager.h"
 
 namespace tagwrench {
 namespace {

@@ -1,10 +1,9 @@
-#include "host/motion/profile_edit.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
 
+#include "host/motion/profile_files.h"
 #include "tests/unit/motion/own_profile.h"
 
 namespace tagwrench {

@@ -11,17 +11,12 @@
 
 #include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::test {
 
 class ProfileFolder : public testing::Test {
  protected:
-  ProfileFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "desk-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~ProfileFolder() override { std::filesystem::remove_all(folder_); }
-
   std::string path(const std::string& name) const { return folder_ / name; }
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(path(name)) << text;
@@ -30,7 +25,8 @@ class ProfileFolder : public testing::Test {
   SensorConfig sensor_ = parse_sensor(sim::sensor_yaml(sim::Scenario{}), "the simulated sensor");
 
  private:
-  std::filesystem::path folder_;
+  test::TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path();
 };
 
 }  // namespace tagwrench::test

@@ -12,8 +12,7 @@
 
 #include "host/core/config_error.h"
 #include "host/output/joystick.h"
-#include "host/output/spacemouse.h"
-#include "host/output/wrench_hid.h"
+#include "host/output/uhid_outputs.h"
 #include "samples.h"
 
 namespace tagwrench {

@@ -8,20 +8,18 @@
 #include <fstream>
 #include <string>
 
-namespace test {
+#include "tests/support/temporary_folder.h"
+
+namespace tagwrench::test {
 
 class TemporaryTree {
  public:
-  TemporaryTree() {
-    std::string pattern = testing::TempDir() + "tagwrench-gadget-XXXXXX";
-    path_ = ::mkdtemp(pattern.data());
-  }
-  ~TemporaryTree() { std::filesystem::remove_all(path_); }
   std::string operator/(const std::string& below) const { return path_ + "/" + below; }
   const std::string& path() const { return path_; }
 
  private:
-  std::string path_;
+  test::TemporaryFolder temporary_;
+  std::string path_ = temporary_.path();
 };
 
 inline void put_text(const std::string& path, const std::string& text) {
@@ -29,4 +27,4 @@ inline void put_text(const std::string& path, const std::string& text) {
   std::ofstream(path) << text;
 }
 
-}  // namespace test
+}  // namespace tagwrench::test

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace test {
+namespace tagwrench::test {
 
 /// Powers of metre, kilogram and second (and radian, for a rotation system).
 struct Dimension {
@@ -259,4 +259,4 @@ inline HidDescriptor parse_hid(std::span<const std::uint8_t> bytes) {
   return HidDescriptorParser(bytes).take();
 }
 
-}  // namespace test
+}  // namespace tagwrench::test

@@ -5,7 +5,7 @@
 
 #include "host/core/types.h"
 
-namespace test {
+namespace tagwrench::test {
 
 inline tagwrench::Sample ok_sample() {
   tagwrench::Sample s;
@@ -28,4 +28,4 @@ inline tagwrench::Sample moving(double x) {
   return s;
 }
 
-}  // namespace test
+}  // namespace tagwrench::test

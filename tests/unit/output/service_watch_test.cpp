@@ -11,14 +11,14 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/support/temporary_folder.h"
+
 namespace tagwrench {
 namespace {
 
 class ServiceWatchTest : public testing::Test {
  protected:
   ServiceWatchTest() {
-    std::string name = (std::filesystem::temp_directory_path() / "watch-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::strcpy(address.sun_path, (folder_ + "/notify").c_str());
@@ -28,7 +28,6 @@ class ServiceWatchTest : public testing::Test {
   }
   ~ServiceWatchTest() override {
     for (const char* name : {"NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"}) ::unsetenv(name);
-    std::filesystem::remove_all(folder_);
   }
 
   /// What systemd has been told since the last call, empty if nothing.
@@ -38,7 +37,8 @@ class ServiceWatchTest : public testing::Test {
     return size > 0 ? std::string(text, static_cast<std::size_t>(size)) : std::string();
   }
 
-  std::string folder_;
+  test::TemporaryFolder temporary_;
+  std::string folder_ = temporary_.path();
   UniqueFd socket_{::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)};
 };
 

@@ -22,6 +22,7 @@
 #include "host/core/os/unique_fd.h"
 #include "host/output/spnav_daemon.h"
 #include "host/output/spnav_link.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::test {
 
@@ -30,20 +31,16 @@ using Words = std::array<std::int32_t, 8>;
 
 class SpnavFolder {
  public:
-  SpnavFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "tw-spnav-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    path_ = name;
-  }
+  SpnavFolder() = default;
   SpnavFolder(const SpnavFolder&) = delete;
   SpnavFolder& operator=(const SpnavFolder&) = delete;
-  ~SpnavFolder() { std::filesystem::remove_all(path_); }
 
   std::string socket() const { return path_ + "/spnav.sock"; }
   const std::string& path() const { return path_; }
 
  private:
-  std::string path_;
+  test::TemporaryFolder temporary_;
+  std::string path_ = temporary_.path();
 };
 
 inline sockaddr_un unix_address(const std::string& path) {

@@ -16,8 +16,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/termination.h"
-#include "host/output/csv.h"
-#include "host/output/jsonl.h"
+#include "host/output/line_outputs.h"
 #include "samples.h"
 
 namespace tagwrench {

@@ -5,7 +5,6 @@
 #include <cerrno>
 
 #include "host/recording/database.h"
-#include "host/recording/trouble.h"
 #include "tests/unit/recording/recorded.h"
 
 namespace tagwrench::record::test {

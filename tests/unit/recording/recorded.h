@@ -12,6 +12,7 @@
 #include "host/core/config_error.h"
 #include "host/recording/reader.h"
 #include "host/recording/writer.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::record::test {
 
@@ -20,15 +21,10 @@ inline constexpr int kHeight = 24;
 
 class Folder : public testing::Test {
  protected:
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "tagwrench-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    folder_ = name;
-  }
-  ~Folder() override { std::filesystem::remove_all(folder_); }
   std::filesystem::path path(const std::string& name = "r.twr") const { return folder_ / name; }
 
-  std::filesystem::path folder_;
+  tagwrench::test::TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path();
 };
 
 inline TimePoint at_ms(std::int64_t ms) { return TimePoint(std::chrono::milliseconds(ms)); }

@@ -1,9 +1,8 @@
-#include "host/source/frame_times.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "host/source/images.h"
 #include "tests/unit/source/message.h"
 
 namespace tagwrench {

@@ -1,11 +1,10 @@
-#include "host/source/image_header.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 #include <string_view>
 #include <vector>
 
+#include "host/source/raw_decoder.h"
 #include "tests/unit/source/jpeg_fixture.h"
 
 namespace tagwrench {

@@ -5,8 +5,7 @@
 #include <string>
 
 #include "host/core/png/png.h"
-#include "host/core/png/png_write.h"
-#include "host/source/pgm.h"
+#include "host/source/raw_decoder.h"
 
 namespace tagwrench {
 namespace {

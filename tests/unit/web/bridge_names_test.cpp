@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "host/web/bridge/camera_settings.h"
-#include "host/web/bridge/device_readers.h"
 #include "host/web/bridge/job_command.h"
 #include "host/web/bridge/recording_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
@@ -18,16 +18,12 @@ namespace fs = std::filesystem;
 
 class BridgeFolder : public testing::Test {
  protected:
-  BridgeFolder() {
-    std::string name = (fs::temp_directory_path() / "bridge-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~BridgeFolder() override { fs::remove_all(folder_); }
   void write(const fs::path& file, const std::string& text) const {
     fs::create_directories((folder_ / file).parent_path());
     std::ofstream(folder_ / file) << text;
   }
-  fs::path folder_;
+  test::TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 TEST(RecordingNames, AreLettersDigitsAndThreeSigns) {

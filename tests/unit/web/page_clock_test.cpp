@@ -1,8 +1,8 @@
-#include "host/tools/camera_timing/page_clock.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
+
+#include "host/tools/camera_timing/page_patch.h"
 
 namespace tagwrench {
 namespace {

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include "host/web/server/message_rate.h"
 #include "host/web/server/outbox.h"
 #include "host/web/server/refusal_log.h"
 

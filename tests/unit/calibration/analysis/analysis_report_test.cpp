@@ -1,10 +1,9 @@
 // The table as people read it.
-#include "host/calibration/analysis/analysis_report.h"
-
 #include <array>
 #include <sstream>
 #include <string>
 
+#include "host/calibration/analysis/analysis.h"
 #include "host/core/axis_names.h"
 #include "tests/unit/calibration/analysis/analyzed.h"
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <random>
 
-#include "host/calibration/analysis/analysis_report.h"
 #include "host/core/axis_names.h"
 #include "tests/unit/calibration/analysis/analyzed.h"
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "host/calibration/analysis/analysis.h"
-#include "host/calibration/analysis/analysis_report.h"
 #include "tests/unit/calibration/analysis/analyzed.h"
 
 namespace tagwrench::test {

@@ -8,7 +8,6 @@
 #include <random>
 #include <vector>
 
-#include "host/calibration/analysis/trial.h"
 #include "host/calibration/analysis/trial_csv.h"
 
 namespace tagwrench::test {

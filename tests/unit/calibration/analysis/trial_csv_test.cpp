@@ -10,6 +10,7 @@
 
 #include "host/calibration/analysis/csv_mapping.h"
 #include "host/core/config_error.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/calibration/analysis/loaded_platform.h"
 
 namespace tagwrench::test {
@@ -19,12 +20,6 @@ namespace fs = std::filesystem;
 
 class TrialFiles : public ::testing::Test {
  protected:
-  TrialFiles() {
-    std::string name = fs::temp_directory_path() / "tagwrench-trial-XXXXXX";
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~TrialFiles() override { fs::remove_all(folder_); }
-
   fs::path write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name, std::ios::binary) << text;
     return folder_ / name;
@@ -51,7 +46,8 @@ class TrialFiles : public ::testing::Test {
     return complaint([&] { study::read_mapped(mapping); });
   }
 
-  fs::path folder_;
+  test::TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 #define EXPECT_SAYS(text, part) \

@@ -1,5 +1,7 @@
 // The certificate's three files: what they say, that nothing of it is taken for markup or commands,
 // that one page stays one page, and that they come all or none.
+#include "host/calibration/certificate/certificate.h"
+
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -11,13 +13,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "host/calibration/certificate/files.h"
 #include "host/calibration/certificate/html.h"
 #include "host/calibration/certificate/plots.h"
-#include "host/calibration/certificate/program.h"
-#include "host/calibration/certificate/quantity.h"
 #include "host/calibration/certificate/render.h"
 #include "host/core/config_error.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/calibration/certificate/example.h"
 
 namespace tagwrench {
@@ -47,17 +47,12 @@ std::string html_of(const Certificate& c) { return certificate_html(c, "<svg/>",
 
 class Folder {
  public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-certificate-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    path_ = name;
-  }
-  ~Folder() { fs::remove_all(path_); }
   fs::path operator/(const std::string& name) const { return path_ / name; }
   std::ptrdiff_t files() const { return std::distance(fs::directory_iterator(path_), {}); }
 
  private:
-  fs::path path_;
+  test::TemporaryFolder temporary_;
+  fs::path path_ = temporary_.path();
 };
 
 std::string contents(const fs::path& path) {

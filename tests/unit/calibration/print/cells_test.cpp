@@ -1,8 +1,8 @@
-#include "host/calibration/print/cells.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
+
+#include "host/calibration/print/sheets.h"
 
 namespace tagwrench {
 namespace {

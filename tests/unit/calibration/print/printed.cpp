@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "host/calibration/print/vector_file.h"
+#include "host/calibration/print/drawing.h"
 
 extern char** environ;
 

@@ -1,10 +1,9 @@
-#include "host/calibration/print/vector_file.h"
-
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <iterator>
 
+#include "host/calibration/print/drawing.h"
 #include "host/calibration/print/sheets.h"
 #include "host/core/config_error.h"
 #include "tests/unit/calibration/print/printed.h"

@@ -1,5 +1,3 @@
-#include "host/core/os/write_soon.h"
-
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -9,6 +7,7 @@
 
 #include <string>
 
+#include "host/core/log.h"
 #include "host/core/os/unique_fd.h"
 
 namespace tagwrench {

@@ -14,6 +14,7 @@
 #include "host/core/config_error.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/source/simulator/simulator_source.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::sim {
 namespace {
@@ -22,13 +23,6 @@ namespace fs = std::filesystem;
 
 class FolderExport : public testing::Test {
  protected:
-  FolderExport() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) std::abort();
-    root_ = name;
-  }
-  ~FolderExport() override { fs::remove_all(root_); }
-
   static Scenario small() {
     Scenario s;
     s.camera.width_px = 160;
@@ -50,7 +44,8 @@ class FolderExport : public testing::Test {
     return found;
   }
 
-  fs::path root_;
+  test::TemporaryFolder temporary_;
+  fs::path root_ = temporary_.path();
 };
 
 TEST_F(FolderExport, WritesPicturesTimesTruthAndSensor) {

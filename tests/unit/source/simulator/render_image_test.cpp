@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "host/source/simulator/prints.h"
 #include "host/source/simulator/renderer.h"
 #include "host/source/simulator/simulator_source.h"
-#include "host/source/simulator/tag_print.h"
 
 namespace tagwrench::sim {
 namespace {

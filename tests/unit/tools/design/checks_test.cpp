@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <functional>
 
-#include "host/tools/design/part_checks.h"
 #include "tests/unit/tools/design/published.h"
 
 namespace tagwrench::hardware {

@@ -5,7 +5,6 @@
 #include <Eigen/LU>
 
 #include "host/tools/design/drawing.h"
-#include "host/tools/design/stops.h"
 #include "tests/unit/tools/design/published.h"
 
 namespace tagwrench::hardware {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "host/tools/design/hardware_config.h"
+#include "host/tools/design/parameters.h"
 
 namespace tagwrench::hardware {
 

@@ -1,9 +1,7 @@
-#include "host/tools/doctor/access.h"
-
 #include <gtest/gtest.h>
 
 #include "host/motion/control_socket.h"
-#include "host/tools/doctor/bridges.h"
+#include "host/tools/doctor/doctor.h"
 #include "tests/support/temporary_folder.h"
 
 namespace tagwrench {

@@ -1,5 +1,3 @@
-#include "host/tools/doctor/cad_programs.h"
-
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -9,6 +7,7 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/output/spnav_link.h"
+#include "host/tools/doctor/doctor.h"
 #include "tests/support/temporary_folder.h"
 
 namespace tagwrench {

@@ -1,9 +1,8 @@
-#include "host/tools/reading/hid_sysfs.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "host/tools/reading/hid_list.h"
 #include "tests/cli/bridge.h"
 
 namespace tagwrench {

@@ -1,0 +1,343 @@
+#include "host/source/simulator/prints.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/aruco/dictionary.hpp>
+#include <string_view>
+#include <utility>
+
+#include "host/core/grid_tags.h"
+
+namespace tagwrench::sim {
+namespace {
+
+using Family = std::pair<std::string_view, cv::aruco::PREDEFINED_DICTIONARY_NAME>;
+
+constexpr std::array<Family, 21> kFamilies{{
+    {"aruco_original", cv::aruco::DICT_ARUCO_ORIGINAL},
+    {"aruco_4x4_50", cv::aruco::DICT_4X4_50},
+    {"aruco_4x4_100", cv::aruco::DICT_4X4_100},
+    {"aruco_4x4_250", cv::aruco::DICT_4X4_250},
+    {"aruco_4x4_1000", cv::aruco::DICT_4X4_1000},
+    {"aruco_5x5_50", cv::aruco::DICT_5X5_50},
+    {"aruco_5x5_100", cv::aruco::DICT_5X5_100},
+    {"aruco_5x5_250", cv::aruco::DICT_5X5_250},
+    {"aruco_5x5_1000", cv::aruco::DICT_5X5_1000},
+    {"aruco_6x6_50", cv::aruco::DICT_6X6_50},
+    {"aruco_6x6_100", cv::aruco::DICT_6X6_100},
+    {"aruco_6x6_250", cv::aruco::DICT_6X6_250},
+    {"aruco_6x6_1000", cv::aruco::DICT_6X6_1000},
+    {"aruco_7x7_50", cv::aruco::DICT_7X7_50},
+    {"aruco_7x7_100", cv::aruco::DICT_7X7_100},
+    {"aruco_7x7_250", cv::aruco::DICT_7X7_250},
+    {"aruco_7x7_1000", cv::aruco::DICT_7X7_1000},
+    {"apriltag_16h5", cv::aruco::DICT_APRILTAG_16h5},
+    {"apriltag_25h9", cv::aruco::DICT_APRILTAG_25h9},
+    {"apriltag_36h10", cv::aruco::DICT_APRILTAG_36h10},
+    {"apriltag_36h11", cv::aruco::DICT_APRILTAG_36h11},
+}};
+
+constexpr double kInkGrainSize = 22e-6;  // m, toner clusters and paper fibres
+constexpr double kInkEdgeSize = 45e-6;   // m, correlation length of the ink's edge
+constexpr double kCutSize = 140e-6;      // m, correlation length of the scissors' edge
+constexpr double kMaxRaggedness = 3.0;   // standard deviations; the texture ends there
+
+constexpr std::string_view kGrid = "grid_10x10";  // host/core/grid_tags.h
+
+const Family* find_family(const std::string& name) {
+  const auto* found = std::find_if(kFamilies.begin(), kFamilies.end(),
+                                   [&](const Family& f) { return f.first == name; });
+  return found == kFamilies.end() ? nullptr : found;
+}
+
+// The black frame around across x across cells.
+template <typename IsWhite>
+TagCells framed(int across, const IsWhite& is_white) {
+  TagCells cells;
+  cells.across = across + 2;
+  cells.black.assign(static_cast<std::size_t>(cells.across * cells.across), true);
+  for (int row = 0; row < across; ++row) {
+    for (int column = 0; column < across; ++column) {
+      cells.black[static_cast<std::size_t>((row + 1) * cells.across + column + 1)] =
+          !is_white(row, column);
+    }
+  }
+  return cells;
+}
+
+double overlap(double a0, double a1, double b0, double b1) {
+  return std::max(0.0, std::min(a1, b1) - std::max(a0, b0));
+}
+
+// The ink with every black cell grown by `spread` on all sides, as area coverage. Growth cuts each
+// axis into strips: one around every line between cells (it belongs to both neighbours) and one
+// inside of every cell.
+class InkCoverage {
+ public:
+  InkCoverage(const TagCells& cells, double size, double spread)
+      : cells_(cells), cell_(size / cells.across), start_(-0.5 * size), spread_(spread) {}
+
+  /// Share of the rectangle that is black.
+  double operator()(double x0, double x1, double y0, double y1) const {
+    const Range columns = strips(x0, x1);
+    const Range rows = strips(y0, y1);
+    double area = 0;
+    for (int row = rows.first; row <= rows.last; ++row) {
+      const double height = strip_overlap(row, y0, y1);
+      if (height <= 0) continue;
+      for (int column = columns.first; column <= columns.last; ++column) {
+        if (black(column, row)) area += height * strip_overlap(column, x0, x1);
+      }
+    }
+    return area / ((x1 - x0) * (y1 - y0));
+  }
+
+ private:
+  struct Range {
+    int first, last;
+  };
+
+  // Strip 2i lies around line i, strip 2i + 1 inside of cell i.
+  Range strips(double a0, double a1) const {
+    const int first = 2 * static_cast<int>(std::floor((a0 - spread_ - start_) / cell_));
+    const int last = 2 * static_cast<int>(std::ceil((a1 + spread_ - start_) / cell_));
+    return {std::max(first, 0), std::min(last, 2 * cells_.across)};
+  }
+
+  double strip_overlap(int strip, double a0, double a1) const {
+    const double line = start_ + (strip / 2) * cell_;
+    return strip % 2 == 0 ? overlap(line - spread_, line + spread_, a0, a1)
+                          : overlap(line + spread_, line + cell_ - spread_, a0, a1);
+  }
+
+  bool black(int column_strip, int row_strip) const {
+    const auto cells = [](int strip) {
+      return strip % 2 == 0 ? Range{strip / 2 - 1, strip / 2} : Range{strip / 2, strip / 2};
+    };
+    const Range columns = cells(column_strip);
+    const Range rows = cells(row_strip);
+    for (int row = std::max(rows.first, 0); row <= std::min(rows.last, cells_.across - 1); ++row) {
+      for (int c = std::max(columns.first, 0); c <= std::min(columns.last, cells_.across - 1);
+           ++c) {
+        if (cells_.is_black(c, row)) return true;
+      }
+    }
+    return false;
+  }
+
+  const TagCells& cells_;
+  double cell_, start_, spread_;
+};
+
+}  // namespace
+
+bool family_exists(const std::string& family) {
+  return family == kGrid || find_family(family) != nullptr;
+}
+
+int family_size(const std::string& family) {
+  if (family == kGrid) return kGridIds;
+  const Family* found = find_family(family);
+  return found == nullptr ? 0 : cv::aruco::getPredefinedDictionary(found->second)->bytesList.rows;
+}
+
+TagCells tag_cells(const std::string& family, int id) {
+  if (family == kGrid) {
+    return framed(kGridCells, [id](int row, int column) { return grid_is_white(id, row, column); });
+  }
+  const auto dictionary = cv::aruco::getPredefinedDictionary(find_family(family)->second);
+  const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
+      dictionary->bytesList.rowRange(id, id + 1), dictionary->markerSize);
+  return framed(bits.cols,
+                [&bits](int row, int column) { return bits.at<std::uint8_t>(row, column) != 0; });
+}
+
+Texture print_tag(const Target& target, const TagCells& cells, double texels_per_m,
+                  std::uint64_t seed) {
+  const double half_paper = 0.5 * target.tag_size + target.border;
+  const double half = half_paper + kMaxRaggedness * target.paper_raggedness;
+  Texture t = Texture::of_size(half, half, texels_per_m);
+  Random random(seed, kPrint);
+  const SmoothNoise ink_x(random, kInkEdgeSize), ink_y(random, kInkEdgeSize);
+  const SmoothNoise cut_x(random, kCutSize), cut_y(random, kCutSize);
+  const SmoothNoise grain(random, kInkGrainSize);
+  const InkCoverage ink(cells, target.tag_size, target.ink_spread);
+  const double h = 0.5 / texels_per_m;
+  const double limit = kMaxRaggedness * target.paper_raggedness;
+  for (int v = 0; v < t.height; ++v) {
+    for (int u = 0; u < t.width; ++u) {
+      const double x = t.x(u);
+      const double y = t.y(v);
+      const double cx = x + std::clamp(target.paper_raggedness * cut_x(x, y), -limit, limit);
+      const double cy = y + std::clamp(target.paper_raggedness * cut_y(x, y), -limit, limit);
+      const double paper = overlap(cx - h, cx + h, -half_paper, half_paper) *
+                           overlap(cy - h, cy + h, -half_paper, half_paper) / (4 * h * h);
+      const double ix = x + target.ink_edge_roughness * ink_x(x, y);
+      const double iy = y + target.ink_edge_roughness * ink_y(x, y);
+      const double black = ink(ix - h, ix + h, iy - h, iy + h);
+      const double clean =
+          target.paper_reflectance + black * (target.ink_reflectance - target.paper_reflectance);
+      const double reflectance = std::clamp(clean + target.ink_grain * grain(x, y), 0.0, 1.0);
+      t.texels[t.index(u, v)] = {.reflectance = static_cast<float>(paper * reflectance),
+                                 .coverage = static_cast<float>(paper)};
+    }
+  }
+  return t;
+}
+
+namespace {
+
+constexpr double kDirtEdge = 0.03e-3;      // m, softness of the outline
+constexpr double kScratchWidth = 1 / 6.0;  // of Dirt::size
+
+// A capsule from one point to another; a speck has both in one place.
+struct Mark {
+  double x0, y0, x1, y1, radius;
+
+  double distance(double x, double y) const {
+    const double dx = x1 - x0;
+    const double dy = y1 - y0;
+    const double squared = dx * dx + dy * dy;
+    const double along =
+        squared > 0 ? std::clamp(((x - x0) * dx + (y - y0) * dy) / squared, 0.0, 1.0) : 0.0;
+    return std::hypot(x - x0 - along * dx, y - y0 - along * dy) - radius;
+  }
+};
+
+void draw(Texture& t, const Mark& mark, double reflectance) {
+  for (int v = 0; v < t.height; ++v) {
+    for (int u = 0; u < t.width; ++u) {
+      const double share = std::clamp(0.5 - mark.distance(t.x(u), t.y(v)) / kDirtEdge, 0.0, 1.0);
+      if (share <= 0) continue;
+      // Texels hold reflectance times coverage; dirt lies on paper alone.
+      Texel& texel = t.texels[t.index(u, v)];
+      const double paper = texel.coverage;
+      texel.reflectance =
+          static_cast<float>(texel.reflectance + share * (reflectance * paper - texel.reflectance));
+    }
+  }
+}
+
+}  // namespace
+
+Texture with_dirt(const Texture& clean, const Dirt& dirt, double tag_size, std::uint64_t seed,
+                  std::uint64_t number) {
+  Texture t = clean;
+  Random random = Random::numbered(seed, kDirt, number);
+  const double half = 0.5 * tag_size;
+  const auto anywhere = [&] { return random.uniform(-half, half); };
+  for (int i = 0; i < dirt.specks; ++i) {
+    const double x = anywhere();
+    const double y = anywhere();
+    draw(t, {x, y, x, y, 0.5 * dirt.size * random.uniform(0.4, 1.0)}, dirt.reflectance);
+  }
+  for (int i = 0; i < dirt.scratches; ++i) {
+    const double x = anywhere();
+    const double y = anywhere();
+    const double angle = random.uniform(0, 2 * std::numbers::pi);
+    const double length = random.uniform(0.2, 1.0) * half;
+    draw(t,
+         {x, y, x + length * std::cos(angle), y + length * std::sin(angle),
+          0.5 * kScratchWidth * dirt.size},
+         dirt.reflectance);
+  }
+  return t;
+}
+
+namespace {
+
+constexpr double kTau = 2 * std::numbers::pi;
+constexpr double kPlateReflectance = 0.43;
+constexpr double kPadReflectance = 0.62;
+constexpr double kFilamentWidth = 0.45e-3;  // m, one extruded line
+constexpr double kSpringRadius = 2.375e-3;  // m
+constexpr double kCoilPitch = 0.85e-3;      // m, as it looks from the lens
+constexpr double kScrewRadius = 1.15e-3;    // m
+constexpr double kScrewX = 5.2e-3;          // m, one on each side of the roof
+constexpr double kEdge = 0.04e-3;           // m, softness of drawn outlines
+
+// 1 inside (negative distance), 0 outside.
+double inside(double distance) { return std::clamp(0.5 - distance / kEdge, 0.0, 1.0); }
+
+double blend(double below, double above, double share) { return below + share * (above - below); }
+
+// A spring runs from its seat towards the lens, so perspective draws it outwards: a capsule with
+// coils across.
+double draw_spring(double below, double x, double y, double seat_x, double seat_y) {
+  const double length = std::hypot(seat_x, seat_y);
+  const double ax = seat_x / length;
+  const double ay = seat_y / length;
+  const double along = (x - seat_x) * ax + (y - seat_y) * ay;
+  const double across = (y - seat_y) * ax - (x - seat_x) * ay;
+  const double radius = kSpringRadius * (1 + 0.06 * std::max(along, 0.0) / kSpringRadius);
+  const double distance = std::hypot(std::min(along, 0.0), across) - radius;
+  // The lit side of each turn of the wire bends around the axis.
+  const double bend = 0.35 * across * across / kSpringRadius;
+  const double coil = std::sin(kTau * (along + bend) / kCoilPitch);
+  const double lit = std::max(coil, 0.0) * (1 - 0.6 * std::abs(across) / radius);
+  const double shade = 0.07 + 0.16 * lit * lit;
+  const double rim = inside(std::abs(distance - 0.25e-3) - 0.25e-3);
+  return blend(blend(below, 0.55 * below, rim), shade, inside(distance));
+}
+
+double draw_screw(double below, double x, double y, double screw_x) {
+  const double radius = std::hypot(x - screw_x, y);
+  const double turned = 0.06 * std::sin(kTau * radius / 0.16e-3);
+  const double washer = blend(below, 0.60, inside(radius - 1.55 * kScrewRadius));
+  const double groove = blend(washer, 0.16, inside(radius - 1.12 * kScrewRadius));
+  return blend(groove, 0.34 + turned, inside(radius - kScrewRadius));
+}
+
+}  // namespace
+
+Texture print_plate(const Mechanics& mechanics, double half_x, double half_y, double texels_per_m,
+                    std::uint64_t seed) {
+  Texture t = Texture::of_size(half_x, half_y, texels_per_m);
+  Random random(seed, kPlate);
+  const SmoothNoise stains(random, 1.3e-3), scratches(random, 0.12e-3), grain(random, 0.04e-3);
+  const double sx = mechanics.spring_half_spacing_x;
+  const double sy = mechanics.spring_half_spacing_y;
+  for (int v = 0; v < t.height; ++v) {
+    for (int u = 0; u < t.width; ++u) {
+      const double x = t.x(u);
+      const double y = t.y(v);
+      const double diagonal = (x - y) / std::numbers::sqrt2 + 0.05e-3 * stains(x, y);
+      const double lines = 0.035 * std::sin(kTau * diagonal / kFilamentWidth);
+      const double gouge = 0.05 * std::max(scratches(0.4 * (x - y), 1.6 * (x + y)) - 1.2, 0.0);
+      double shade = kPlateReflectance + lines + gouge + 0.025 * stains(y, x) + 0.012 * grain(x, y);
+      shade = draw_screw(shade, x, y, -kScrewX);
+      shade = draw_screw(shade, x, y, kScrewX);
+      for (const double side_x : {-sx, sx}) {
+        for (const double side_y : {-sy, sy}) shade = draw_spring(shade, x, y, side_x, side_y);
+      }
+      t.texels[t.index(u, v)] = {.reflectance = static_cast<float>(std::clamp(shade, 0.02, 1.0)),
+                                 .coverage = 1};
+    }
+  }
+  return t;
+}
+
+Texture print_pad(double half_paper, double margin, double texels_per_m, std::uint64_t seed) {
+  const double half_x = half_paper + margin;
+  const double half_y = half_paper + 0.35 * margin;
+  Texture t = Texture::of_size(half_x, half_y, texels_per_m);
+  Random random(seed, kPlate + 1);
+  const SmoothNoise glue(random, 0.5e-3), grain(random, 0.06e-3);
+  for (int v = 0; v < t.height; ++v) {
+    for (int u = 0; u < t.width; ++u) {
+      const double x = t.x(u);
+      const double y = t.y(v);
+      const double cover = inside(std::abs(x) - half_x) * inside(std::abs(y) - half_y);
+      const double lines = 0.03 * std::sin(kTau * x / 0.21e-3);
+      const double shade = kPadReflectance + lines + 0.04 * glue(x, y) + 0.01 * grain(x, y);
+      t.texels[t.index(u, v)] = {
+          .reflectance = static_cast<float>(cover * std::clamp(shade, 0.0, 1.0)),
+          .coverage = static_cast<float>(cover)};
+    }
+  }
+  return t;
+}
+
+}  // namespace tagwrench::sim
