@@ -149,7 +149,7 @@ enum class Diagnostic : std::uint8_t {
   appearance_does_not_fit,  ///< the target no longer looks like the picture that was loaded
   far_from_rest,  ///< held, and standing still since the start, but not where rest was given
   shutter_rolls,  ///< pictures of a moving target are sheared; the sensor says readout 0
-  // Why the target is not held (tracker/diagnosis.h):
+  // Why the target is not held (tracker/diagnostics.h):
   image_black,           ///< lens cap on, no light
   image_saturated,       ///< much of it is white
   image_empty,           ///< even grey

@@ -12,7 +12,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <exception>
 #include <string_view>
 #include <utility>
 
@@ -163,13 +162,9 @@ void GadgetDaemon::lose_node() noexcept {
 
 void GadgetDaemon::find_node() noexcept {
   if (ended_) return;
-  try {
-    OpenedNode found = open_();
-    if (!found.fd) return;
-    node_ = std::move(found);
-  } catch (const std::exception&) {
-    return;  // out of memory: the next event tries again
-  }
+  OpenedNode found = open_();
+  if (!found.fd) return;
+  node_ = std::move(found);
   readable_ = true;
   reports_.renew();
 }

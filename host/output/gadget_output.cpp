@@ -13,7 +13,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <exception>
 #include <utility>
 
 #include "host/core/config_error.h"
@@ -21,7 +20,7 @@
 #include "host/core/os/termination.h"
 #include "host/core/os/uninterrupted.h"
 #include "host/output/hid_report.h"
-#include "host/output/shown.h"
+#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {
@@ -194,12 +193,8 @@ GadgetOutput::~GadgetOutput() {
   const auto wait = [&] { return ::poll(&gone, 1, kPatience_ms); };
   if (uninterrupted(wait) > 0) uninterrupted([this] { return ::waitpid(daemon_, nullptr, 0); });
   if (there) return;
-  try {
-    const OpenedNode node = open_gadget_node(GadgetFiles(), places_, function_);
-    if (node.fd) rest_gadget(node.fd.get(), face_);
-  } catch (const std::exception&) {
-    return;  // out of memory: what can be said is failure()
-  }
+  const OpenedNode node = open_gadget_node(GadgetFiles(), places_, function_);
+  if (node.fd) rest_gadget(node.fd.get(), face_);
 }
 
 SendStatus GadgetOutput::put(std::span<const std::uint8_t> reports) noexcept {

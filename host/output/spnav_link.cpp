@@ -164,20 +164,12 @@ SpnavSockets inherited_spnav(const std::string& path, int programs, int bridge) 
 
 void SpnavSockets::remove() const noexcept {
   if (file_number(path) == programs_file) ::unlink(path.c_str());
-  try {
-    const std::string beside = bridge_path(path);
-    if (file_number(beside) == bridge_file) ::unlink(beside.c_str());
-  } catch (const std::exception&) {
-    return;  // out of memory: a left-over, which the next daemon takes away
-  }
+  const std::string beside = bridge_path(path);
+  if (file_number(beside) == bridge_file) ::unlink(beside.c_str());
 }
 
 UniqueFd connect_spnav_bridge(const std::string& path) noexcept {
-  try {
-    return connected(bridge_path(path), SOCK_SEQPACKET);
-  } catch (const std::exception&) {
-    return UniqueFd();
-  }
+  return connected(bridge_path(path), SOCK_SEQPACKET);
 }
 
 }  // namespace tagwrench

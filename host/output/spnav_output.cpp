@@ -14,7 +14,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/spawn_daemon.h"
-#include "host/output/shown.h"
+#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {
@@ -44,13 +44,9 @@ SpnavHello hello_of(const SpnavOptions& options) noexcept {
 template <typename... Args>
 std::string_view write_line(std::span<char> into, fmt::format_string<Args...> format,
                             Args&&... args) noexcept {
-  try {
-    const auto written =
-        fmt::format_to_n(into.data(), into.size(), format, std::forward<Args>(args)...);
-    return {into.data(), std::min(written.size, into.size())};
-  } catch (const std::exception&) {
-    return {};
-  }
+  const auto written =
+      fmt::format_to_n(into.data(), into.size(), format, std::forward<Args>(args)...);
+  return {into.data(), std::min(written.size, into.size())};
 }
 
 }  // namespace

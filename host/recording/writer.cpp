@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/recording/database.h"
 #include "host/recording/sink.h"
-#include "host/recording/trouble.h"
 
 namespace tagwrench::record {
 namespace {
@@ -345,14 +345,12 @@ std::string RecordingWriter::kept() const {
 }
 
 void RecordingWriter::fail(const std::exception& error) noexcept {
-  try {
-    const auto* database = dynamic_cast<const DatabaseError*>(&error);
-    std::string line = write_trouble(
-        options_.path, database != nullptr ? *database : DatabaseError(error.what(), 0), kept());
+  const auto* database = dynamic_cast<const DatabaseError*>(&error);
+  std::string line = write_trouble(
+      options_.path, database != nullptr ? *database : DatabaseError(error.what(), 0), kept());
+  {
     const std::scoped_lock lock(mutex_);
     if (failure_.empty()) failure_ = std::move(line);
-  } catch (const std::exception&) {
-    // Out of memory: the failure has no words, but stands.
   }
   failed_.store(true, std::memory_order_release);
 }
@@ -383,11 +381,32 @@ std::string RecordingWriter::finish() noexcept {
     sink_.reset();
     bytes_ = size_of(options_.path);
   }
-  try {
-    return failure();
-  } catch (const std::exception&) {
-    return {};
-  }
+  return failure();
+}
+
+void FrameRecorder::frame(const LoggedFrame& all) noexcept {
+  clock_ = all.frame.capture_time - all.frame.latency_origin;
+  writer_.frame(all.frame, all.decoded, all.raw);
+  writer_.track(all.track);
+  writer_.sample(all.sample);
+}
+
+void FrameRecorder::missing(const Sample& sample) noexcept { writer_.missing(sample); }
+
+void FrameRecorder::disconnected(std::string_view detail) noexcept {
+  writer_.event(EventKind::disconnected, now_of_frames(), detail);
+}
+
+void FrameRecorder::reconnected(std::string_view detail) noexcept {
+  writer_.event(EventKind::reconnected, now_of_frames(), detail);
+}
+
+void FrameRecorder::note(std::string_view line) noexcept {
+  if (!line.empty()) writer_.event(EventKind::note, now_of_frames(), line);
+}
+
+TimePoint FrameRecorder::now_of_frames() const noexcept {
+  return std::chrono::steady_clock::now() + clock_;
 }
 
 }  // namespace tagwrench::record

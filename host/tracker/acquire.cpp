@@ -1,12 +1,10 @@
 #include "host/tracker/acquire.h"
 
 #include <algorithm>
-#include <exception>
 #include <optional>
 #include <string>
 
 #include "host/core/config_error.h"
-#include "host/tracker/flipped.h"
 #include "host/tracker/square_pose.h"
 #include "host/tracker/tag_patterns.h"
 
@@ -139,7 +137,7 @@ Finding Acquirer::detect(const ImageView& image) {
   return sorted(camera_, target_, std::move(*list));
 }
 
-Finding Acquirer::search(const ImageView& image) {
+Finding Acquirer::find(const ImageView& image) {
   std::optional<FlippedImage> flipped;
   if (camera_.mirrored) flipped.emplace(image);
   Finding finding = detect(flipped ? flipped->view() : image);
@@ -151,15 +149,6 @@ Finding Acquirer::search(const ImageView& image) {
   if (!flipped) flipped.emplace(image);
   finding.other_way_round = !detect(camera_.mirrored ? image : flipped->view()).tags.empty();
   return finding;
-}
-
-Finding Acquirer::find(const ImageView& image) noexcept {
-  try {
-    return search(image);
-  } catch (const std::exception&) {
-    // The library throws for images that it finds too small or degenerate: nothing to be found.
-    return {};
-  }
 }
 
 }  // namespace tagwrench

@@ -2,6 +2,7 @@
 // target is not held.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "host/core/types.h"
@@ -29,6 +30,27 @@ struct Finding {
   std::vector<Square> squares;  ///< four corners, but no tag of the target
 };
 
+/// An image, left and right exchanged.
+class FlippedImage {
+ public:
+  explicit FlippedImage(const ImageView& image)
+      : width_(image.width),
+        height_(image.height),
+        pixels_(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
+    for (int row = 0; row < height_; ++row) {
+      const std::uint8_t* from = image.pixels + static_cast<std::ptrdiff_t>(row) * image.stride;
+      std::reverse_copy(from, from + width_,
+                        pixels_.begin() + static_cast<std::ptrdiff_t>(row) * width_);
+    }
+  }
+  ImageView view() const noexcept { return {pixels_.data(), width_, height_, width_}; }
+
+ private:
+  int width_;
+  int height_;
+  std::vector<std::uint8_t> pixels_;
+};
+
 class Acquirer {
  public:
   /// Throws ConfigError for a target without tags, with too many, with an id twice or outside the
@@ -38,11 +60,9 @@ class Acquirer {
   /// The tags as printed, in the target's order.
   const std::vector<TagPattern>& patterns() const noexcept { return patterns_; }
 
-  /// Never throws.
-  Finding find(const ImageView& image) noexcept;
+  Finding find(const ImageView& image);
 
  private:
-  Finding search(const ImageView& image);
   Finding detect(const ImageView& image);
   void add_sharpened(const ImageView& image, SquareList& list);
 

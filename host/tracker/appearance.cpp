@@ -67,7 +67,7 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
     const Measurements all = measure_all(meter, image, target, camera_T_platform);
     const double cut = robust_cut(all);
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(6 + tags, 6 + tags);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(6 + tags);
+    Eigen::VectorXd rhs = Eigen::VectorXd::Zero(6 + tags);
     Eigen::VectorXd row(6 + tags);
     // What neighbouring points have in common (ragged ink, a neighbour's blur) moves the fit more
     // than noise of the same size: the sandwich estimator for clustered errors, three cells'
@@ -88,7 +88,7 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
         row[6 + t] = m.px_per_m;
         row.array() *= units.array();
         normal += weight * row * row.transpose();
-        right += weight * (m.offset_px / gain) * row;
+        rhs += weight * (m.offset_px / gain) * row;
         pull += weight * (m.offset_px / gain) * row;
         if (++in_cluster == kClusterPoints) {
           meat += pull * pull.transpose();
@@ -105,7 +105,7 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
     }
     const Ldlt<Eigen::Dynamic> ldlt(normal);
     if (!ldlt.positive(1e-12)) return false;
-    const Eigen::VectorXd step = ldlt.solve(right).cwiseProduct(units);
+    const Eigen::VectorXd step = ldlt.solve(rhs).cwiseProduct(units);
     if (!step.allFinite()) return false;
     camera_T_platform = moved(camera_T_platform, step.head<6>());
     const auto parameters = static_cast<double>(6 + tags);

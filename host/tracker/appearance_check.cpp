@@ -59,14 +59,14 @@ double likeness(const CameraModel& camera, const ReferenceImage& image, const Ta
 
 std::optional<AppearanceMismatch> check_appearance(const CameraModel& camera,
                                                    const TargetDescription& target,
-                                                   const ReferenceOptions& rest) {
-  if (!rest.appearance || !rest.camera_T_platform) return std::nullopt;
+                                                   const ReferenceOptions& reference) {
+  if (!reference.appearance || !reference.camera_T_platform) return std::nullopt;
   for (const Tag& tag : target.tags) {
     if (!tag.platform_T_tag) continue;
     const double found =
-        likeness(camera, *rest.appearance,
+        likeness(camera, *reference.appearance,
                  tag_pattern(target.family, tag.id, target.tag_size, target.border),
-                 *rest.camera_T_platform * *tag.platform_T_tag);
+                 *reference.camera_T_platform * *tag.platform_T_tag);
     if (!(found >= kMinLikeness)) return AppearanceMismatch{tag.id, found};
   }
   return std::nullopt;

@@ -1,4 +1,4 @@
-// Whether a loaded picture of the sensor at rest shows this target at its rest pose.
+// Whether a loaded picture of the sensor at rest shows this target at its reference pose.
 #pragma once
 
 #include <optional>
@@ -16,9 +16,9 @@ struct AppearanceMismatch {
 };
 
 /// The first tag whose cells the picture does not show. Empty where all are shown, and where
-/// nothing can be said: without a picture, a rest pose or the tags' places.
+/// nothing can be said: without a picture, a reference pose or the tags' places.
 std::optional<AppearanceMismatch> check_appearance(const CameraModel& camera,
                                                    const TargetDescription& target,
-                                                   const ReferenceOptions& rest);
+                                                   const ReferenceOptions& reference);
 
 }  // namespace tagwrench

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <optional>
 #include <span>
 
 #include "host/tracker/corner_pose.h"
-#include "host/tracker/flipped.h"
 #include "host/tracker/picture_quality.h"
+#include "host/tracker/predictor.h"
 #include "host/tracker/rotation.h"
 #include "host/tracker/square_reader.h"
 
@@ -34,6 +33,16 @@ constexpr double kSameScale =
 /// Between tags, as four corners each tell it: rad.
 constexpr double kOtherTurn = 0.25;
 constexpr double kOtherDirection = 0.2;
+
+/// Frames in a row that a given picture of the target may fail to fit before it is called wrong.
+constexpr int kMisfits = 15;
+
+/// Farther from a given reference pose than anybody seats a platform twice: m and rad; how long it
+/// stands there; and how long it must stand near it for the pose to be right.
+constexpr double kFar = 0.3e-3;
+constexpr double kFarAngle = 0.026;
+constexpr Duration kStillTime = milliseconds(1500);
+constexpr Duration kSettling = milliseconds(200);
 
 bool holds(const DiagnosticDetails::Ids& ids, int id) {
   return std::find(ids.id.begin(), ids.id.begin() + ids.count, id) != ids.id.begin() + ids.count;
@@ -73,8 +82,9 @@ std::optional<PairMisfit> compare(const FoundTag& a, const FoundTag& b,
   return best;
 }
 
-/// Tags that are where the description has them, to each other and to rest? A cause if not.
-Diagnostic judge_geometry(const TargetDescription& target, const KnownReference& rest,
+/// Tags that are where the description has them, to each other and to the reference? A cause if
+/// not.
+Diagnostic judge_geometry(const TargetDescription& target, const KnownReference& reference,
                           const Finding& finding, DiagnosticDetails& details) {
   const std::vector<FoundTag>& tags = finding.tags;
   for (std::size_t i = 0; i < tags.size(); ++i) {
@@ -94,20 +104,21 @@ Diagnostic judge_geometry(const TargetDescription& target, const KnownReference&
   }
   details.concerned = {};
   details.amount = 0;
-  if (!rest.known) return Diagnostic::none;
+  if (!reference.known) return Diagnostic::none;
   // The nearest of all poses that any tag allows: what is out of reach then is so beyond doubt.
   double nearest = 1e9;
   for (const FoundTag& tag : tags) {
     for (const Eigen::Isometry3d& camera_T_tag : tag.camera_T_tag) {
-      const Eigen::Isometry3d pose = camera_T_tag * rest.platform_T_tag[tag.index].inverse();
-      if (within_reach(rest.camera_T_platform, pose)) return Diagnostic::none;
-      const Vector6 offset = motion_between(rest.camera_T_platform, pose);
-      const double far = offset.head<3>().norm() / rest.camera_T_platform.translation().norm() +
-                         offset.tail<3>().norm();
+      const Eigen::Isometry3d pose = camera_T_tag * reference.platform_T_tag[tag.index].inverse();
+      if (within_reach(reference.camera_T_platform, pose)) return Diagnostic::none;
+      const Vector6 offset = motion_between(reference.camera_T_platform, pose);
+      const double far =
+          offset.head<3>().norm() / reference.camera_T_platform.translation().norm() +
+          offset.tail<3>().norm();
       if (far >= nearest) continue;
       nearest = far;
       details.offset = offset;
-      details.rest_given = rest.given;
+      details.rest_given = reference.given;
     }
   }
   return nearest < 1e9 ? Diagnostic::rest_elsewhere : Diagnostic::none;
@@ -184,9 +195,10 @@ bool same(const Diagnosis& a, const Diagnosis& b) {
 }  // namespace
 
 Diagnosis diagnose(const CameraModel& camera, const TargetDescription& target,
-                   const KnownReference& rest, const ImageView& image, const Finding& finding) {
+                   const KnownReference& reference, const ImageView& image,
+                   const Finding& finding) {
   Diagnosis out;
-  if (finding.other_way_round) return out;  // said by whoever asked for the finding
+  if (finding.other_way_round) return out;  // said at once
   DiagnosticDetails& details = out.details;
   details.expected_family = details.family = name(target.family);
   const auto found = [&finding](std::size_t t) {
@@ -206,35 +218,115 @@ Diagnosis diagnose(const CameraModel& camera, const TargetDescription& target,
     return out;
   }
   const DiagnosticDetails::Ids missing = details.concerned;
-  out.cause = judge_geometry(target, rest, finding, details);
+  out.cause = judge_geometry(target, reference, finding, details);
   if (out.cause != Diagnostic::none || missing.count == 0) return out;
   details.concerned = missing;
   out.cause = judge_missing(camera, target, image, finding, details);
   return out;
 }
 
-Diagnosis TrackingDiagnostics::not_held(TimePoint time, const KnownReference& rest,
-                                        const ImageView& image, const Finding& finding) noexcept {
-  try {
-    if (!not_held_since_ || time < *not_held_since_) {
-      not_held_since_ = time;
-      next_look_ = time + kFirstLook;
-      last_look_ = {};
+/// Once, as soon as the target is held: tags of the wrong size, or in other places than described,
+/// may be held, but what is measured is wrong.
+void TrackingDiagnostics::check_geometry(const FrameFacts& facts, Track& track) {
+  if (geometry_checked_) return;
+  geometry_checked_ = true;
+  if (facts.finding.tags.size() != target_.tags.size()) return;
+  const Diagnosis look =
+      diagnose(camera_, target_, facts.reference, facts.frame.image, facts.finding);
+  if (look.cause != Diagnostic::other_scale && look.cause != Diagnostic::other_places) return;
+  distance_checked_ = true;  // a wrong scale looks like a wrong distance
+  track.diagnostic = look.cause;
+  track.details = look.details;
+}
+
+/// Once, when pictures of a moving target that are not accepted turn out to be sheared.
+void TrackingDiagnostics::check_shutter(const FrameFacts& facts, Track& track) {
+  if (camera_.readout > 0 || !facts.aligner.ready()) return;
+  const ImageView& image = facts.frame.image;
+  const PixelWindow window{image.pixels, image.stride, 0, 0, image.width, image.height};
+  if (shutter_.rolls(facts.aligner, window, facts.frame.capture_time, *facts.pose,
+                     facts.photometric) &&
+      track.diagnostic == Diagnostic::none) {
+    track.diagnostic = Diagnostic::shutter_rolls;
+  }
+}
+
+/// When a picture of the target that was given does not show what the camera sees.
+void TrackingDiagnostics::check_picture(const FrameFacts& facts, Track& track) {
+  if (!facts.reference.picture_given) return;
+  misfits_ = facts.accepted ? 0 : misfits_ + 1;
+  if (misfits_ >= kMisfits && track.diagnostic == Diagnostic::none)
+    track.diagnostic = Diagnostic::appearance_does_not_fit;
+}
+
+/// Once, when the target has stood still, but not where its reference was given; never after it was
+/// seen there.
+void TrackingDiagnostics::check_distance(const FrameFacts& facts, Track& track) {
+  if (distance_checked_ || !facts.reference.given) return;
+  const TimePoint time = facts.frame.capture_time;
+  const Vector6& offset = track.displacement;
+  if (!still_since_ || still_by_picture_ != facts.by_picture || !stands_still(offset - still_at_)) {
+    still_since_ = time;
+    still_at_ = offset;
+    still_by_picture_ = facts.by_picture;
+  }
+  if (time - *still_since_ < kSettling) return;
+  const bool far = offset.head<3>().norm() > kFar || offset.tail<3>().norm() > kFarAngle;
+  if (far && time - *still_since_ < kStillTime) return;
+  distance_checked_ = true;
+  if (!far) return;
+  track.diagnostic = Diagnostic::far_from_rest;
+  track.details.offset = offset;
+  track.details.rest_given = true;
+}
+
+/// Why there are no numbers, now and then.
+void TrackingDiagnostics::explain(const FrameFacts& facts, Track& track) {
+  const TimePoint time = facts.frame.capture_time;
+  if (!not_held_since_ || time < *not_held_since_) {
+    not_held_since_ = time;
+    next_look_ = time + kFirstLook;
+    last_look_ = {};
+  }
+  if (time < next_look_) return;
+  next_look_ = time + kBetweenLooks;
+  const Diagnosis look =
+      diagnose(camera_, target_, facts.reference, facts.frame.image, facts.finding);
+  const bool agreed = same(look, last_look_) &&
+                      (look.cause != Diagnostic::other_scale ||
+                       std::abs(look.details.amount - last_look_.details.amount) < kSameScale);
+  last_look_ = look;
+  if (!agreed || look.cause == Diagnostic::none || same(look, said_) || time < quiet_until_) return;
+  quiet_until_ = time + kQuiet;
+  said_ = look;
+  track.diagnostic = look.cause;
+  track.details = look.details;
+}
+
+void TrackingDiagnostics::add(const FrameFacts& facts, Track& track) {
+  using Progress = ReferenceEstimator::Progress;
+  if (facts.searched && facts.finding.other_way_round) {
+    track.diagnostic =
+        camera_.mirrored ? Diagnostic::image_looks_unmirrored : Diagnostic::image_looks_mirrored;
+  }
+  if (facts.learning == Progress::moved) track.diagnostic = Diagnostic::moved_while_learning;
+  if (facts.learning == Progress::done) track.diagnostic = Diagnostic::rest_learned;
+  if (facts.pose) {
+    if (!facts.accepted) check_shutter(facts, track);
+    shutter_.seen(facts.frame.capture_time, *facts.pose);
+    check_picture(facts, track);
+    if (facts.accepted) check_distance(facts, track);
+  } else {
+    shutter_.lost();
+  }
+  if (facts.accepted || facts.learning == Progress::learning) {
+    if (not_held_since_) {
+      not_held_since_.reset();
+      said_ = {};
     }
-    if (time < next_look_) return {};
-    next_look_ = time + kBetweenLooks;
-    const Diagnosis look = diagnose(camera_, target_, rest, image, finding);
-    const bool agreed = same(look, last_look_) &&
-                        (look.cause != Diagnostic::other_scale ||
-                         std::abs(look.details.amount - last_look_.details.amount) < kSameScale);
-    last_look_ = look;
-    if (!agreed || look.cause == Diagnostic::none || same(look, said_) || time < quiet_until_)
-      return {};
-    quiet_until_ = time + kQuiet;
-    said_ = look;
-    return look;
-  } catch (const std::exception&) {
-    return {};  // an image that the library refuses, or out of memory: nothing can be told
+    if (facts.accepted && track.diagnostic == Diagnostic::none) check_geometry(facts, track);
+  } else if (facts.searched && track.diagnostic == Diagnostic::none) {
+    explain(facts, track);
   }
 }
 

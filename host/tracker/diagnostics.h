@@ -1,20 +1,14 @@
-// Why the target is not held, from what the camera shows: asked only then, now and then.
+// What a person should know of how the target is tracked: why it is not held, and what spoils
+// measurements while it is.
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "host/tracker/acquire.h"
+#include "host/tracker/reference.h"
+#include "host/tracker/shutter_check.h"
 
 namespace tagwrench {
-
-/// What is known of the target at rest so far.
-struct KnownReference {
-  bool known = false;
-  bool given = false;  ///< by the sensor's description, not learned
-  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
-  std::vector<Eigen::Isometry3d> platform_T_tag;  ///< in the target's order
-};
 
 struct Diagnosis {
   Diagnostic cause = Diagnostic::none;
@@ -22,37 +16,59 @@ struct Diagnosis {
 };
 
 /// Looks at one picture: the cause that explains most, or none when nothing is certain. Allocates;
-/// costs about as much as finding tags. Throws what the library throws that finds them.
+/// costs about as much as finding tags.
 Diagnosis diagnose(const CameraModel& camera, const TargetDescription& target,
-                   const KnownReference& rest, const ImageView& image, const Finding& finding);
+                   const KnownReference& reference, const ImageView& image, const Finding& finding);
 
-/// Asks diagnose() at times, and says each cause once: when two looks in a row agree, and then not
-/// again until another one has been said or the target was held.
+/// What the tracker made of one frame.
+struct FrameFacts {
+  const Frame& frame;
+  const KnownReference& reference;
+  const Finding& finding;  ///< of the last search
+  PhotometricAligner& aligner;
+  const PhotometricState& photometric;
+  bool searched = false;  ///< the last search was in this frame
+  /// While the reference is learned: what became of this frame.
+  std::optional<ReferenceEstimator::Progress> learning{};
+  std::optional<Eigen::Isometry3d> pose{};  ///< while the target is held
+  bool accepted = false;                    ///< and numbers were made of it
+  bool by_picture = false;                  ///< and not by edges, which lie a little elsewhere
+};
+
+/// Says each cause why the target is not held once: when two looks in a row agree, and then not
+/// again until another one has been said or the target was held. No heap while the target is held
+/// and its fits are accepted.
 class TrackingDiagnostics {
  public:
   TrackingDiagnostics(const CameraModel& camera, const TargetDescription& target)
       : camera_(camera), target_(target) {}
 
-  /// All is well in the frame of this time.
-  void held() noexcept {
-    if (!not_held_since_) return;
-    not_held_since_.reset();
-    said_ = {};
-  }
-
-  /// The target is not held in the frame of this time, whose whole image was searched with this
-  /// result. A cause when there is something to be said. Never throws.
-  Diagnosis not_held(TimePoint time, const KnownReference& rest, const ImageView& image,
-                     const Finding& finding) noexcept;
+  /// Every frame that could be judged. Fills `diagnostic` and `details` of the track.
+  void add(const FrameFacts& facts, Track& track);
 
  private:
+  void explain(const FrameFacts& facts, Track& track);
+  void check_geometry(const FrameFacts& facts, Track& track);
+  void check_shutter(const FrameFacts& facts, Track& track);
+  void check_picture(const FrameFacts& facts, Track& track);
+  void check_distance(const FrameFacts& facts, Track& track);
+
   CameraModel camera_;
   TargetDescription target_;
+  // Of a target that is not held.
   std::optional<TimePoint> not_held_since_;
   TimePoint next_look_{};
   TimePoint quiet_until_{};
   Diagnosis last_look_;
   Diagnosis said_;
+  // Of one that is.
+  bool geometry_checked_ = false;
+  int misfits_ = 0;                ///< to a given picture, frames in a row
+  bool distance_checked_ = false;  ///< said to be far from its reference, or seen to be there
+  std::optional<TimePoint> still_since_;  ///< only while that is open
+  Vector6 still_at_ = Vector6::Zero();    ///< m, rad, from the reference
+  bool still_by_picture_ = false;
+  ShutterCheck shutter_;
 };
 
 }  // namespace tagwrench

@@ -21,6 +21,10 @@ struct PixelView {
   int stride = 0;
 };
 
+inline PixelView<std::uint8_t> pixel_view(const ImageView& image) {
+  return {image.pixels, image.width, image.height, image.stride};
+}
+
 /// One edge point's place in the image.
 struct EdgeMeasurement {
   Vector6 row = Vector6::Zero();  ///< d offset_px / d motion of the platform (m, rad, camera axes;

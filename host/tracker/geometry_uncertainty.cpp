@@ -64,10 +64,10 @@ void GeometryUncertainty::set(PhotometricAligner& aligner,
           const Eigen::Isometry3d displaced = moved(camera_T_platform, displacement);
           const Eigen::Vector3d origin = camera_T_platform.translation();
           for (std::size_t n = 0; n < patches.size(); ++n) {
-            const Eigen::Vector3d believed = camera_T_platform * patches[n].middle;
+            const Eigen::Vector3d described = camera_T_platform * patches[n].middle;
             const Eigen::Vector3d real =
-                patches[n].tag == t ? on_plane(believed, centre + error.head<3>(), turn * normal)
-                                    : believed;
+                patches[n].tag == t ? on_plane(described, centre + error.head<3>(), turn * normal)
+                                    : described;
             const Eigen::Matrix3d rotation = rotation_from_vector(displacement.tail<3>());
             const Eigen::Vector3d real_origin = origin + origin_error;
             const Eigen::Vector3d now =

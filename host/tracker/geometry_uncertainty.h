@@ -10,8 +10,8 @@
 namespace tagwrench {
 
 /// First-order propagation: error = (sum over axes j of d_j * slope_j) * (error of the tags' poses
-/// at rest). The tags' planes turn or shift while what they show in the rest image stays where it
-/// is.
+/// at rest). The tags' planes turn or shift while what they show in the picture at rest stays where
+/// it is.
 class GeometryUncertainty {
  public:
   /// `tag_covariance`: of each tag's motion in the platform frame at rest (camera axes; m, rad; see

@@ -1,6 +1,6 @@
 // Photometric alignment: from a predicted pose and pixels to the pose at which the image looks most
-// like the template, over the six motions of the rigid target, with the light of each tag and the
-// blur as nuisances.
+// like the template, over the six motions of the rigid target, with the illumination of each tag
+// and the blur as nuisances.
 //
 // Gauss-Newton with the gradients of the template, which never change (compare Baker and Matthews,
 // "Lucas-Kanade 20 years on", IJCV 56(3), 2004), carried through the full camera model of points on
@@ -17,13 +17,13 @@
 
 namespace tagwrench {
 
-/// Light and blur are carried from frame to frame: they change slowly.
+/// Illumination and blur are carried from frame to frame: they change slowly.
 struct PhotometricState {
-  struct Light {
+  struct Illumination {
     std::array<double, 4> gain{1, 0, 0, 0};
     double offset = 0;
   };
-  std::array<Light, kMaxTags> light{};
+  std::array<Illumination, kMaxTags> illumination{};
   std::array<double, kBlurParameters> blur{};
 };
 
@@ -34,9 +34,18 @@ struct PhotometricFit {
   Matrix6 covariance = Matrix6::Zero();
   double residual = 0;           ///< RMS of whitened residuals: 1 when nothing but noise is left
   double residual_fraction = 0;  ///< RMS of residuals relative to the template's contrast
-  double good = 0;               ///< part of the template's pixels that the fit believes, 0..1
+  double inlier_fraction = 0;    ///< of the template's pixels, those in accepted patches, 0..1
   std::uint8_t tags_held = 0;
   bool converged = false;
+};
+
+/// Whether numbers may be made of the fit: converged, to enough of the template, sharp and precise.
+bool accepted(const PhotometricFit& fit, const PhotometricState& state) noexcept;
+
+/// Rows of a rolling shutter are exposed one after the other while the platform moves.
+struct RowMotion {
+  double readout = 0;                  ///< from the first row to the last, s; 0: all at once
+  Vector6 velocity = Vector6::Zero();  ///< of the platform, camera axes, m/s and rad/s
 };
 
 class PhotometricAligner {
@@ -46,11 +55,9 @@ class PhotometricAligner {
   const PixelTemplate& pixels() const noexcept { return template_; }
   bool ready() const noexcept { return !template_.patches.empty(); }
 
-  /// Changes `state` only when the fit has converged. `velocity` is the platform's motion per
-  /// second (camera axes, m/s and rad/s): with a rolling shutter, rows are exposed at different
-  /// times. Never throws, never allocates.
+  /// Changes `state` only when the fit has converged. Never throws, never allocates.
   PhotometricFit align(const PixelWindow& image, const Eigen::Isometry3d& predicted,
-                       const Vector6& velocity, PhotometricState& state) noexcept;
+                       const RowMotion& rows, PhotometricState& state) noexcept;
 
   /// The part of the image that align() looks at from this pose, with a margin; empty when it is
   /// out of view.
@@ -63,21 +70,22 @@ class PhotometricAligner {
  private:
   using SharedVector = Eigen::Matrix<double, kSharedParameters, 1>;
   using SharedMatrix = Eigen::Matrix<double, kSharedParameters, kSharedParameters>;
-  using LightVector = Eigen::Matrix<double, kLightParameters, 1>;
-  using LightMatrix = Eigen::Matrix<double, kLightParameters, kLightParameters>;
-  using Coupling = Eigen::Matrix<double, kSharedParameters, kLightParameters>;
+  using IlluminationVector = Eigen::Matrix<double, kIlluminationParameters, 1>;
+  using IlluminationMatrix =
+      Eigen::Matrix<double, kIlluminationParameters, kIlluminationParameters>;
+  using Coupling = Eigen::Matrix<double, kSharedParameters, kIlluminationParameters>;
 
   struct TagSystem {
-    LightMatrix light_inverse;
-    Coupling coupling;   ///< shared against light
-    Coupling eliminate;  ///< coupling times light_inverse
+    IlluminationMatrix illumination_inverse;
+    Coupling coupling;   ///< shared against illumination
+    Coupling eliminate;  ///< coupling times illumination_inverse
   };
   struct Step {
     bool solved = false;
     double squared_size = 0;  ///< in standard deviations, all shared parameters together
   };
 
-  void view_patches(const Eigen::Isometry3d& pose, const Vector6& velocity,
+  void view_patches(const Eigen::Isometry3d& pose, const RowMotion& rows,
                     const PhotometricState& state) noexcept;
   double typical_residual() noexcept;
   void judge_patches(double typical, bool near) noexcept;
@@ -89,7 +97,7 @@ class PhotometricAligner {
   std::vector<PatchView> views_;
   std::vector<NormalEquations> sums_;
   PixelPairs pairs_;
-  std::vector<std::uint8_t> good_;
+  std::vector<std::uint8_t> inlier_;
   std::vector<float> scratch_;
   /// d template pixel / d motion in the middle of each patch, px/m and px/rad.
   std::vector<Eigen::Matrix<double, 2, kMotionParameters>> pixel_motion_;

@@ -120,8 +120,8 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
   const V one = set(1.0F);
   const V cut = set(inverse_cut);
   const V saturated = set(253.5F);
-  V right[kPatchParameters];
-  for (V& sum : right) sum = zero;
+  V rhs[kPatchParameters];
+  for (V& sum : rhs) sum = zero;
   V squares = zero;
   V weights = zero;
   V inside = zero;
@@ -141,9 +141,10 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
     // Horner in dx, with coefficients that are polynomials in dy.
     const V linear = hn::MulAdd(dy, hn::MulAdd(dy, polynomial(8), polynomial(4)), polynomial(1));
     const V square = hn::MulAdd(dy, polynomial(7), polynomial(3));
-    const V rest = hn::MulAdd(dy, hn::MulAdd(dy, polynomial(9), polynomial(5)), polynomial(2));
+    const V without_dx =
+        hn::MulAdd(dy, hn::MulAdd(dy, polynomial(9), polynomial(5)), polynomial(2));
     V expected = hn::MulAdd(dx, hn::MulAdd(dx, hn::MulAdd(dx, polynomial(6), square), linear),
-                            hn::MulAdd(dy, rest, middle));
+                            hn::MulAdd(dy, without_dx, middle));
     const V laplacian = hn::Mul(
         set(2.0F),
         hn::Add(hn::Add(polynomial(3), polynomial(5)),
@@ -186,27 +187,27 @@ HWY_NOINLINE void compare(const PixelTemplate& t, const Lens& lens, const PatchV
     const auto& p = view.camera_t_platform;
     const V pull_z = hn::Neg(hn::Mul(inverse, hn::MulAdd(hn::Add(x, set(p[0])), pull_x,
                                                          hn::Mul(hn::Add(y, set(p[1])), pull_y))));
-    right[0] = hn::Add(right[0], pull_x);
-    right[1] = hn::Add(right[1], pull_y);
-    right[2] = hn::Add(right[2], pull_z);
-    right[3] = hn::Add(right[3], hn::MulSub(y, pull_z, hn::Mul(z, pull_y)));
-    right[4] = hn::Add(right[4], hn::MulSub(z, pull_x, hn::Mul(x, pull_z)));
-    right[5] = hn::Add(right[5], hn::MulSub(x, pull_y, hn::Mul(y, pull_x)));
-    right[6] = hn::MulAdd(wrw, laplacian, right[6]);
-    right[7] = hn::MulAdd(hn::Mul(wrw, depth), laplacian, right[7]);
+    rhs[0] = hn::Add(rhs[0], pull_x);
+    rhs[1] = hn::Add(rhs[1], pull_y);
+    rhs[2] = hn::Add(rhs[2], pull_z);
+    rhs[3] = hn::Add(rhs[3], hn::MulSub(y, pull_z, hn::Mul(z, pull_y)));
+    rhs[4] = hn::Add(rhs[4], hn::MulSub(z, pull_x, hn::Mul(x, pull_z)));
+    rhs[5] = hn::Add(rhs[5], hn::MulSub(x, pull_y, hn::Mul(y, pull_x)));
+    rhs[6] = hn::MulAdd(wrw, laplacian, rhs[6]);
+    rhs[7] = hn::MulAdd(hn::Mul(wrw, depth), laplacian, rhs[7]);
     const V wrl = hn::Mul(wrw, middle);
-    right[8] = hn::Add(right[8], wrl);
-    right[9] = hn::MulAdd(wrl, across, right[9]);
+    rhs[8] = hn::Add(rhs[8], wrl);
+    rhs[9] = hn::MulAdd(wrl, across, rhs[9]);
     const V wrld = hn::Mul(wrl, down);
-    right[10] = hn::Add(right[10], wrld);
-    right[11] = hn::MulAdd(wrld, down, right[11]);
-    right[12] = hn::Add(right[12], wrw);
+    rhs[10] = hn::Add(rhs[10], wrld);
+    rhs[11] = hn::MulAdd(wrld, down, rhs[11]);
+    rhs[12] = hn::Add(rhs[12], wrw);
     squares = hn::MulAdd(wr, residual, squares);
     weights = hn::Add(weights, w);
     inside = hn::Add(inside, valid);
   }
   const auto total = [&](V v) { return hn::GetLane(hn::SumOfLanes(d, v)); };
-  for (std::size_t k = 0; k < kPatchParameters; ++k) sums.right[k] += total(right[k]);
+  for (std::size_t k = 0; k < kPatchParameters; ++k) sums.rhs[k] += total(rhs[k]);
   sums.squares += total(squares);
   sums.weights += total(weights);
   sums.inside += total(inside);

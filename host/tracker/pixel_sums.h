@@ -11,7 +11,7 @@
 
 namespace tagwrench {
 
-/// How one patch is believed to be seen now.
+/// How one patch is seen from the pose of this step.
 struct PatchView {
   std::array<float, 9> camera_R_platform{};  ///< row by row
   std::array<float, 3> camera_t_platform{};  ///< m
@@ -26,7 +26,7 @@ struct PatchView {
 struct NormalEquations {
   /// Weighted sums of the whitened columns times the whitened residual, in the order of
   /// PatchVector.
-  std::array<float, kPatchParameters> right{};
+  std::array<float, kPatchParameters> rhs{};
   float squares = 0;  ///< weighted, of whitened residuals
   float weights = 0;
   float inside = 0;  ///< pixels that lie in the image and are not saturated

@@ -86,7 +86,6 @@ class Builder {
           const PixelTemplateOptions& options)
       : noise_(noise), options_(options), mean_depth_(camera_T_platform.translation().z()) {
     out_.camera = raw_camera(camera);
-    out_.readout = camera.readout;
     out_.camera_T_platform = camera_T_platform;
     out_.frames = frames;
     image_.reserve(static_cast<std::size_t>(mean.width) * static_cast<std::size_t>(mean.height));

@@ -1,4 +1,4 @@
-// What the target looked like at rest, pixel by pixel: those pixels of the averaged rest image that
+// What the target looked like at rest, pixel by pixel: those pixels of the averaged picture that
 // tell something about the pose, as points on the tags' planes with all that one step of alignment
 // needs, laid out for vector units.
 #pragma once
@@ -16,22 +16,23 @@
 namespace tagwrench {
 
 /// Parameters of the linear model of one patch, in this order: motion of the platform (camera axes,
-/// m and rad; see rotation.h), blur (2), light of the patch's tag (5). The residual image
+/// m and rad; see rotation.h), blur (2), illumination of the patch's tag (5). The residual image
 /// is explained by
 ///   motion   gradient times image motion,
 ///   blur     the Laplacian, times 1 and times depth: a Gaussian point spread whose variance grows
 ///            by 2 b adds b times the Laplacian (heat equation) and, to second order, b^2 / 2 times
 ///            the Laplacian of that; defocus changes the variance in proportion to depth,
-///   light    gain times (1, x, y, y^2) over the tag's picture, and an offset: y^2 for the bands
+///   illumination  gain times (1, x, y, y^2) over the tag's picture, and an offset: y^2 for the
+///   bands
 ///            that a flickering lamp leaves with a rolling shutter. An offset with slopes would
 ///            cost a fifth of the precision.
 constexpr int kMotionParameters = 6;
 constexpr int kBlurParameters = 2;
-constexpr int kLightParameters = 5;
+constexpr int kIlluminationParameters = 5;
 constexpr int kSharedParameters = kMotionParameters + kBlurParameters;
-constexpr int kPatchParameters = kSharedParameters + kLightParameters;
+constexpr int kPatchParameters = kSharedParameters + kIlluminationParameters;
 
-constexpr int kNuisanceParameters = kBlurParameters + kLightParameters;
+constexpr int kNuisanceParameters = kBlurParameters + kIlluminationParameters;
 
 using PatchVector = Eigen::Matrix<double, kPatchParameters, 1>;
 using PatchMatrix = Eigen::Matrix<double, kPatchParameters, kPatchParameters>;
@@ -67,7 +68,7 @@ struct PixelPatch {
   /// its right and one below.
   Eigen::Vector3d middle, right, below;
   /// Sums of products of whitened columns: of the gradient (2), from which the motion's follow for
-  /// any pose, and of blur and light.
+  /// any pose, and of blur and illumination.
   Eigen::Matrix2d gradient = Eigen::Matrix2d::Zero();
   Eigen::Matrix<double, 2, kNuisanceParameters> gradient_nuisance =
       Eigen::Matrix<double, 2, kNuisanceParameters>::Zero();
@@ -79,7 +80,6 @@ struct PixelTemplate {
   CameraModel camera;  ///< of the raw image: fx is negative in a mirrored one
   Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();  ///< when it was learned
   int frames = 1;                                                       ///< averaged
-  double readout = 0;   ///< of a rolling shutter, from the first to the last row, s
   double contrast = 0;  ///< between the darkest and the brightest pixels, grey levels
   std::size_t tags = 0;
   std::vector<PixelPatch> patches;
@@ -102,7 +102,7 @@ struct PixelTemplateOptions {
   double least_information = 0.99;  ///< stop choosing pixels when they carry this part
 };
 
-/// Chooses the pixels. `mean` is the averaged rest image as delivered (not flipped).
+/// Chooses the pixels. `mean` is the averaged picture as delivered (not flipped).
 /// The planes come from `target`, whose pose at rest is camera_T_platform. Empty patches when
 /// nothing is visible.
 PixelTemplate make_pixel_template(const CameraModel& camera, const PixelView<float>& mean,

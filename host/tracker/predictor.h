@@ -5,6 +5,13 @@
 
 namespace tagwrench {
 
+/// Less motion than this between frames (m, rad) is the noise of edges: the platform stands still.
+/// At 3 um and 0.3 mrad their noise kept the picture from being learned. Where more matters, as
+/// while the picture is averaged, one looks closer.
+inline bool stands_still(const Vector6& motion) {
+  return motion.head<3>().norm() < 15e-6 && motion.tail<3>().norm() < 1e-3;
+}
+
 class ConstantVelocityPredictor {
  public:
   /// Forgets the velocity.

@@ -19,10 +19,6 @@ constexpr double kMoved_px = 0.5;
 /// not show it.
 constexpr double kEdgeBias_px = 0.015;
 
-PixelView<std::uint8_t> view(const ImageView& image) {
-  return {image.pixels, image.width, image.height, image.stride};
-}
-
 }  // namespace
 
 ReferenceEstimator::ReferenceEstimator(const CameraModel& camera, const TargetDescription& target,
@@ -41,7 +37,7 @@ ReferenceEstimator::Progress ReferenceEstimator::add(const ImageView& image,
   if (frames_ == 0) {
     if (!start(image, finding)) return Progress::waiting;
   } else {
-    const Refinement fit = joint_.refine(view(image), last_pose_);
+    const Refinement fit = joint_.refine(pixel_view(image), last_pose_);
     tags_seen_ = fit.tags_held;
     const bool all = fit.verdict == Verdict::held && fit.tags_held == description_.tags.size();
     const bool has_moved = all && motion_px(fit.camera_T_platform) > kMoved_px;
@@ -69,7 +65,7 @@ bool ReferenceEstimator::start(const ImageView& image, const Finding& finding) {
   }
   if (!place(camera_T_tag)) return false;
   joint_.set_target(learned_.target);
-  const Refinement fit = joint_.refine(view(image), seen_from(camera_T_tag));
+  const Refinement fit = joint_.refine(pixel_view(image), seen_from(camera_T_tag));
   if (fit.verdict != Verdict::held || fit.tags_held != description_.tags.size()) return false;
   first_pose_ = last_pose_ = fit.camera_T_platform;
   return true;
@@ -82,7 +78,7 @@ std::optional<Eigen::Isometry3d> ReferenceEstimator::tag_pose(const ImageView& i
   std::optional<Eigen::Isometry3d> best;
   double least_px = 1e9;
   for (const Eigen::Isometry3d& candidate : found.camera_T_tag) {
-    const Refinement fit = single_.refine(view(image), candidate);
+    const Refinement fit = single_.refine(pixel_view(image), candidate);
     if (fit.verdict != Verdict::held || fit.residual_px >= least_px) continue;
     if (fit.camera_T_platform.linear().col(2).dot(fit.camera_T_platform.translation()) <= 0)
       continue;
@@ -124,7 +120,7 @@ bool ReferenceEstimator::place(const std::vector<Eigen::Isometry3d>& camera_T_ta
   return camera_T_platform.matrix().allFinite();
 }
 
-/// Where the platform is, which need not be where rest was given.
+/// Where the platform is, which need not be where the reference was given.
 Eigen::Isometry3d ReferenceEstimator::seen_from(
     const std::vector<Eigen::Isometry3d>& camera_T_tag) const {
   for (std::size_t t = 0; t < camera_T_tag.size(); ++t) {
@@ -188,7 +184,7 @@ PixelNoise ReferenceEstimator::measure_noise() const {
     bins[std::min(bin, kBins - 1)].push_back(squares_[i] / (2.0 * (frames_ - 1)));
   }
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
   for (std::size_t b = 0; b + 1 < kBins; ++b) {  // the last one saturates
     if (bins[b].size() < kMin) continue;
     const auto middle = bins[b].begin() + static_cast<std::ptrdiff_t>(bins[b].size() / 2);
@@ -197,12 +193,12 @@ PixelNoise ReferenceEstimator::measure_noise() const {
     const Eigen::Vector2d row(1, (static_cast<double>(b) + 0.5) * (256.0 / kBins));
     const auto weight = static_cast<double>(bins[b].size());
     normal += weight * row * row.transpose();
-    right += weight * variance * row;
+    rhs += weight * variance * row;
   }
   if (!(normal(0, 0) > 0)) return {};
-  PixelNoise noise{right[0] / normal(0, 0), 0};
+  PixelNoise noise{rhs[0] / normal(0, 0), 0};
   if (normal.determinant() > 1e-6 * normal(0, 0) * normal(1, 1)) {
-    const Eigen::Vector2d line = normal.inverse() * right;
+    const Eigen::Vector2d line = normal.inverse() * rhs;
     if (line[0] > 0 && line[1] > 0) noise = {line[0], line[1]};
   }
   return noise;
@@ -249,8 +245,8 @@ bool ReferenceEstimator::finish() {
   }
   Eigen::Isometry3d fitted = learned_.camera_T_platform;
   if (any_given) {
-    // Given tags make one rigid body: they and the rest pose are fitted together, and the open ones
-    // placed by it.
+    // Given tags make one rigid body: they and the reference pose are fitted together, and the open
+    // ones placed by it.
     EdgeTarget given;
     for (std::size_t t = 0; t < patterns_.size(); ++t) {
       if (description_.tags[t].platform_T_tag) given.tags.push_back(learned_.target.tags[t]);

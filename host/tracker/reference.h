@@ -1,4 +1,4 @@
-// The rest pose, the tags' placement and their looks, learned from the first frames.
+// The reference pose, the tags' placement and their looks, learned from the first frames.
 #pragma once
 
 #include <optional>
@@ -15,9 +15,10 @@ struct LearnedReference {
   Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
   EdgeTarget target;
   Eigen::Isometry3d seen_from = Eigen::Isometry3d::Identity();  ///< camera_T_platform in `image`
-  Matrix6 pose_covariance = Matrix6::Zero();  ///< of seen_from; matters when rest was given
-  ReferenceImage image;                       ///< the average of the rest frames, as delivered
-  PixelNoise noise;                           ///< of one frame
+  Matrix6 pose_covariance =
+      Matrix6::Zero();   ///< of seen_from; matters when the reference was given
+  ReferenceImage image;  ///< the average of the first frames, as delivered
+  PixelNoise noise;      ///< of one frame
   /// How well each tag's pose is known: of its motion, camera axes, m and rad.
   std::vector<Matrix6> tag_covariance;
 };

@@ -36,10 +36,6 @@ constexpr double kMinCorrelation = 0.75;    ///< of cell grey levels with those 
 constexpr double kDoubtLearned_px = 0.4;
 constexpr double kDoubtBare_px = 2.0;
 
-/// Standard deviations beyond these are of no use for a force: m, rad.
-constexpr double kDoubtTranslation = 0.3e-3;
-constexpr double kDoubtRotation = 0.03;
-
 /// A pose that is useful at all: in front of the lens and not absurdly far, m.
 constexpr double kFarthest = 10.0;
 
@@ -99,11 +95,8 @@ Refinement Refiner::run(const PixelView<Pixel>& image,
   fit.tags_held = static_cast<std::uint8_t>(held);
   renormalise(fit.camera_T_platform);
   const double doubt_px = target_.residual_px > 0 ? kDoubtLearned_px : kDoubtBare_px;
-  const Vector6 sigma = fit.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const bool trusted = fit.residual_px < doubt_px &&
-                       sigma.head<3>().maxCoeff() < kDoubtTranslation &&
-                       sigma.tail<3>().maxCoeff() < kDoubtRotation;
-  fit.verdict = trusted ? Verdict::held : Verdict::doubtful;
+  const bool accepted = fit.residual_px < doubt_px && is_precise(fit.covariance);
+  fit.verdict = accepted ? Verdict::held : Verdict::doubtful;
   return fit;
 }
 
@@ -153,7 +146,7 @@ Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
   units << Eigen::Vector3d::Constant(kLengthScale), Eigen::Vector3d::Ones();
   const double cut = kTukey * std::max(robust_scale_px(), least_scale_px);
   Matrix6 normal = Matrix6::Zero();
-  Vector6 right = Vector6::Zero();
+  Vector6 rhs = Vector6::Zero();
   double weights = 0;
   double gains = 0;
   int inliers = 0;
@@ -167,7 +160,7 @@ Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
     gains += m.weight * m.gain;
     const Vector6 row = m.row.cwiseProduct(units);
     normal.selfadjointView<Eigen::Lower>().rankUpdate(row, m.weight);
-    right += m.weight * m.offset_px * row;
+    rhs += m.weight * m.offset_px * row;
   }
   fit.inliers = inliers;
   if (inliers < kMinPoints) return {};
@@ -176,7 +169,7 @@ Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
   const Matrix6 full = normal.selfadjointView<Eigen::Lower>();
   const Ldlt<6> ldlt(full);
   if (!ldlt.positive(1e-12)) return {};
-  const Vector6 delta = (ldlt.solve(right) / gain).cwiseProduct(units);
+  const Vector6 delta = (ldlt.solve(rhs) / gain).cwiseProduct(units);
   if (!delta.allFinite()) return {};
 
   double moved_px2 = 0;

@@ -14,7 +14,7 @@
 namespace tagwrench {
 
 enum class Verdict : std::uint8_t {
-  held,      ///< the fit deserves trust
+  held,      ///< the fit is accepted
   doubtful,  ///< something like the target is there, but the fit is poor
   lost,      ///< no fit
 };

@@ -37,7 +37,7 @@ SquareFinder::SquareFinder(TagFamily family) : library_(std::make_unique<Library
 
 SquareFinder::~SquareFinder() = default;
 
-std::optional<SquareList> SquareFinder::find(const ImageView& image, bool sharpen) {
+std::optional<SquareList> SquareFinder::find(const ImageView& image, bool sharpen) try {
   // OpenCV wants a mutable pointer but does not write to its input.
   const cv::Mat as_it_is(image.height, image.width, CV_8UC1,
                          const_cast<std::uint8_t*>(image.pixels),
@@ -55,6 +55,8 @@ std::optional<SquareList> SquareFinder::find(const ImageView& image, bool sharpe
   for (const auto& tag : corners) list.tags.push_back(square_of(tag));
   for (const auto& other : rejected) list.others.push_back(square_of(other));
   return list;
+} catch (const cv::Exception&) {
+  return SquareList{};
 }
 
 }  // namespace tagwrench

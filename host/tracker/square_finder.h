@@ -28,8 +28,8 @@ class SquareFinder {
   SquareFinder& operator=(const SquareFinder&) = delete;
 
   /// Tags may be listed more than once. `sharpen`: an unsharp mask goes over the image first. Empty
-  /// while the library is not there yet. Throws what the library throws, for one for images that it
-  /// finds too small.
+  /// while the library is not there yet; an empty list where it refuses the image, for one as too
+  /// small.
   std::optional<SquareList> find(const ImageView& image, bool sharpen);
 
  private:

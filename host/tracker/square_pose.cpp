@@ -29,7 +29,7 @@ std::optional<Rays> rays_of(const CameraModel& camera, const Square& corners) {
 Eigen::Vector3d translation(const Rays& rays, const Eigen::Matrix3d& rotation, double half) {
   // Each corner gives two rows, (1 0 -x) and (0 1 -y); these are their normal equations.
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
   for (int c = 0; c < 4; ++c) {
     const Eigen::Vector3d arm =
         half * (kSigns[c][0] * rotation.col(0) + kSigns[c][1] * rotation.col(1));
@@ -37,9 +37,9 @@ Eigen::Vector3d translation(const Rays& rays, const Eigen::Matrix3d& rotation, d
     Eigen::Matrix<double, 2, 3> rows;
     rows << 1, 0, -ray.x(), 0, 1, -ray.y();
     normal += rows.transpose() * rows;
-    right += rows.transpose() * (ray * arm.z() - arm.head<2>());
+    rhs += rows.transpose() * (ray * arm.z() - arm.head<2>());
   }
-  return normal.inverse() * right;
+  return normal.inverse() * rhs;
 }
 
 double squares_px(const CameraModel& camera, const Eigen::Isometry3d& pose, double half,

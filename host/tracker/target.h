@@ -68,8 +68,17 @@ struct ReferenceImage {
 struct ReferenceOptions {
   int frames = 25;  ///< the first frames, taken at rest
   std::optional<Eigen::Isometry3d>
-      camera_T_platform;  ///< known rest pose; learned from the rest frames when absent
+      camera_T_platform;  ///< known reference pose; learned from the first frames when absent
   std::optional<ReferenceImage> appearance;  ///< as calibrated, seen from camera_T_platform
+};
+
+/// What is known of the target at rest so far.
+struct KnownReference {
+  bool known = false;
+  bool given = false;          ///< by the sensor's description, not learned
+  bool picture_given = false;  ///< and so was its picture
+  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
+  std::vector<Eigen::Isometry3d> platform_T_tag;  ///< in the target's order
 };
 
 }  // namespace tagwrench

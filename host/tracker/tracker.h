@@ -1,15 +1,21 @@
-// Room tracker: pixels -> where the platform is.
-// In:  Frame (grey pixels); camera, tags and rest as sensor/ has read them.
-// Out: Track: displacement from rest (m, rad, along the camera's axes), its covariance, status, and
-//      why the target is not held. Formulas: docs/theory.md.
-// Then: photometric.h (the pose), acquire.h (without one), reference.h (rest), diagnostics.h.
+// Frame -> displacement of the platform from its reference pose.
 //
-// Frame -> displacement of the platform from rest.
+// In    8-bit luminance with its capture time, the camera's model (px), the target's tags (m), and
+//       what is already known of the reference: pose, placement, picture.
+// Out   a Track: displacement (m, rad, camera axes) with its covariance, the tags' corners (px),
+//       the region that the next frame must show, and a diagnostic if there is something to say.
 //
-// acquire   image -> tag corners, by OpenCV; runs only while the target is not held.
-// refine    predicted pose + pixels -> pose with covariance, all tags as one rigid target.
-// rest      learns the rest pose and the tags' placement from the first frames.
-// diagnosis says why, while the target is not held.
+// learn     the first frames at rest -> reference pose, tags' placement, averaged picture
+//           (reference.h), and of the picture a template (pixel_template.h)
+// predict   constant velocity (predictor.h)
+// align     prediction + pixels -> pose: photometric alignment with the template, six motions with
+//           illumination and blur (photometric.h)
+// refine    where that fails, or while there is no template: model-based edges from the prediction
+//           (refine.h), then tags in the whole image, by OpenCV (acquire.h, corner_pose.h), edges,
+//           and alignment once more
+// conclude  covariance: noise and residuals, the tags' placement (geometry_uncertainty.h), and
+//           where the reference pose was given, that of the picture
+// diagnose  what a person should know (diagnostics.h)
 #pragma once
 
 #include <memory>
@@ -20,24 +26,32 @@
 
 namespace tagwrench {
 
-struct KnownReference;  // tracker/diagnosis.h
+enum class TrackingState : std::uint8_t {
+  learning_reference,
+  searching,        ///< the reference is known, but the target has not been seen yet
+  held_by_edges,    ///< no picture at rest yet
+  held_by_picture,  ///< aligned with the template
+  lost,             ///< was held
+};
 
 class Tracker {
  public:
-  Tracker(const CameraModel& camera, const TargetDescription& target, const ReferenceOptions& rest);
+  Tracker(const CameraModel& camera, const TargetDescription& target,
+          const ReferenceOptions& reference);
   ~Tracker();
   Tracker(const Tracker&) = delete;
   Tracker& operator=(const Tracker&) = delete;
 
-  /// Never throws. Allocates only while the target is not held.
+  /// Never throws. Allocates only while the target is not held by its picture.
   Track track(const Frame& frame) noexcept;
 
-  /// The rest as it was given, or as it has been learned since.
-  const KnownReference& rest() const noexcept;
+  /// The reference as it was given, or as it has been learned since.
+  const KnownReference& reference() const noexcept;
+  TrackingState state() const noexcept;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace tagwrench

@@ -14,7 +14,6 @@
 #include "host/sensor/sensor_identity.h"
 #include "host/sensor/zero_options.h"
 #include "host/tracker/diagnostic_text.h"
-#include "host/tracker/diagnostics.h"
 #include "host/wrench/zero_text.h"
 
 namespace tagwrench {
@@ -96,7 +95,7 @@ Session::Session(const SensorConfig& sensor, std::string name)
     : sensor_(sensor),
       name_(std::move(name)),
       tracker_(sensor.camera, sensor.target, sensor.rest),
-      rest_given_(tracker_.rest().known),
+      rest_given_(tracker_.reference().known),
       wrench_(sensor.wrench),
       zero_(zero_options(sensor, wrench_.tool(), true)) {}
 
@@ -185,7 +184,7 @@ std::string Session::description() const {
 }
 
 std::string Session::learned(const std::string& date) const {
-  const KnownReference& rest = tracker_.rest();
+  const KnownReference& rest = tracker_.reference();
   if (!rest.known) return "null";
   json files = json::object();
   if (rest_given_) return dump_json(files);

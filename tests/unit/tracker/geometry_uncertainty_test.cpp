@@ -63,7 +63,7 @@ TEST_P(GeometryError, IsWhatTheCovarianceSays) {
     const auto read = [&](PhotometricAligner& with, const Eigen::Isometry3d& rest) -> Vector6 {
       PhotometricState state;
       const PhotometricFit fit =
-          with.align(render::window(picture), moved(rest, displacement), Vector6::Zero(), state);
+          with.align(render::window(picture), moved(rest, displacement), {}, state);
       EXPECT_TRUE(fit.converged);
       return motion_between(rest, fit.camera_T_platform);
     };

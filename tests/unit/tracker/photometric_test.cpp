@@ -39,7 +39,7 @@ struct Aligned {
     aligner.set_template(render::template_of(scene));
   }
   PhotometricFit align(const Picture& picture) {
-    return aligner.align(render::window(picture), rest, Vector6::Zero(), state);
+    return aligner.align(render::window(picture), rest, {}, state);
   }
   /// The rest picture with `change` applied to every pixel's light.
   template <class Change>
@@ -85,7 +85,7 @@ TEST_P(Displaced, IsFoundOnEveryAxis) {
     const PhotometricFit fit = bench.align(render::take(bench.scene, truth, bench.random));
     ASSERT_TRUE(fit.converged) << truth.transpose();
     EXPECT_EQ(fit.tags_held, 2);
-    EXPECT_GT(fit.good, 0.95);
+    EXPECT_GT(fit.inlier_fraction, 0.95);
     const Vector6 error = motion_between(bench.rest, fit.camera_T_platform) - truth;
     // The tags' edges lie along the rows: what the template's polynomials leave does not average
     // out.
@@ -107,7 +107,7 @@ TEST(Photometric, ResidualOfNothingButNoiseIsOne) {
   const PhotometricFit fit = bench.align(render::take(bench.scene, Vector6::Zero(), bench.random));
   bench.expect_at_rest(fit);
   EXPECT_NEAR(fit.residual, 1.0, 0.05);
-  EXPECT_NEAR(fit.good, 1.0, 0.02);
+  EXPECT_NEAR(fit.inlier_fraction, 1.0, 0.02);
 }
 
 TEST(Photometric, LightStepLeavesThePoseWhereItIs) {
@@ -115,9 +115,9 @@ TEST(Photometric, LightStepLeavesThePoseWhereItIs) {
   for (int i = 0; i < 3; ++i) {
     bench.expect_at_rest(
         bench.align(bench.changed([](float level, int, int) { return 0.6F * level + 20; })));
-    EXPECT_NEAR(bench.state.light[0].gain[0] * 0.6, 1.0, 0.02);
+    EXPECT_NEAR(bench.state.illumination[0].gain[0] * 0.6, 1.0, 0.02);
     bench.expect_at_rest(bench.align(bench.changed([](float level, int, int) { return level; })));
-    EXPECT_NEAR(bench.state.light[1].gain[0], 1.0, 0.02);
+    EXPECT_NEAR(bench.state.illumination[1].gain[0], 1.0, 0.02);
   }
 }
 
@@ -171,8 +171,8 @@ TEST(Photometric, CoveredThirdOfATagIsLeftOut) {
   const PhotometricFit fit = bench.align(picture);
   bench.expect_at_rest(fit);
   EXPECT_EQ(fit.tags_held, 2);
-  EXPECT_LT(fit.good, 0.90);
-  EXPECT_GT(fit.good, 0.70);
+  EXPECT_LT(fit.inlier_fraction, 0.90);
+  EXPECT_GT(fit.inlier_fraction, 0.70);
   EXPECT_LT(fit.residual, 1.2) << "what is covered must not count";
 }
 
@@ -182,7 +182,7 @@ TEST(Photometric, GlareOnPartOfATagIsLeftOut) {
     return level + (column > 340 && row > 300 ? 200.0F : 0.0F);
   }));
   bench.expect_at_rest(fit);
-  EXPECT_LT(fit.good, 0.95);
+  EXPECT_LT(fit.inlier_fraction, 0.95);
 }
 
 TEST(Photometric, WholeTagCoveredLeavesTheOther) {
@@ -191,7 +191,7 @@ TEST(Photometric, WholeTagCoveredLeavesTheOther) {
       bench.changed([](float level, int, int row) { return row > 245 ? 90.0F : level; }));
   ASSERT_TRUE(fit.converged);
   EXPECT_EQ(fit.tags_held, 1);
-  EXPECT_NEAR(fit.good, 0.5, 0.1);
+  EXPECT_NEAR(fit.inlier_fraction, 0.5, 0.1);
   const Vector6 error = motion_between(bench.rest, fit.camera_T_platform);
   for (int axis = 0; axis < 6; ++axis)
     EXPECT_LT(std::abs(error[axis]), kSigmas * std::sqrt(fit.covariance(axis, axis))) << axis;
@@ -201,21 +201,21 @@ TEST(Photometric, StateIsLeftAloneUnlessConverged) {
   Aligned bench;
   bench.align(bench.changed([](float level, int, int) { return 0.8F * level; }));
   const PhotometricState before = bench.state;
-  ASSERT_NE(before.light[0].gain[0], 1.0);
+  ASSERT_NE(before.illumination[0].gain[0], 1.0);
   const auto expect_untouched = [&](const PhotometricFit& fit) {
     ASSERT_FALSE(fit.converged);
     for (std::size_t t = 0; t < 2; ++t) {
-      EXPECT_EQ(bench.state.light[t].gain, before.light[t].gain);
-      EXPECT_EQ(bench.state.light[t].offset, before.light[t].offset);
+      EXPECT_EQ(bench.state.illumination[t].gain, before.illumination[t].gain);
+      EXPECT_EQ(bench.state.illumination[t].offset, before.illumination[t].offset);
     }
     EXPECT_EQ(bench.state.blur, before.blur);
   };
-  expect_untouched(bench.aligner.align({}, bench.rest, Vector6::Zero(), bench.state));
+  expect_untouched(bench.aligner.align({}, bench.rest, {}, bench.state));
   // 10 px away there is nothing that alignment could climb.
   const Picture picture = render::take(bench.scene, Vector6::Zero(), bench.random);
   expect_untouched(bench.aligner.align(render::window(picture),
-                                       moved(bench.rest, motion_um_rad(500, 400, 0, 0, 0, 0.3)),
-                                       Vector6::Zero(), bench.state));
+                                       moved(bench.rest, motion_um_rad(500, 400, 0, 0, 0, 0.3)), {},
+                                       bench.state));
 }
 
 TEST(Photometric, RegionCoversTheTagsAndTheMarginAndNotMuchMore) {

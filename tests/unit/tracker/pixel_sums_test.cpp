@@ -14,7 +14,7 @@
 namespace tagwrench {
 namespace {
 
-using Right = std::array<double, kPatchParameters>;
+using Columns = std::array<double, kPatchParameters>;
 
 /// PatchView in double precision.
 struct View {
@@ -37,7 +37,7 @@ struct View {
 };
 
 struct Sums {
-  Right right{}, size{};  ///< sums, and the same of absolute values
+  Columns rhs{}, size{};  ///< sums, and the same of absolute values
   double squares = 0, weights = 0, inside = 0;
 };
 
@@ -86,12 +86,12 @@ Sums sums_of(const PixelTemplate& t, const PixelPatch& patch, const View& view, 
                                       c[2] + c[4] * x + 2 * c[5] * y);
     const Eigen::RowVector3d shift = gradient * view.template_per_image * projection;
     const Eigen::RowVector3d turn = -shift * cross_matrix(lever);
-    Right column{shift[0], shift[1], shift[2],  turn[0],
-                 turn[1],  turn[2],  laplacian, t.depth[i] * laplacian};
+    Columns column{shift[0], shift[1], shift[2],  turn[0],
+                   turn[1],  turn[2],  laplacian, t.depth[i] * laplacian};
     for (std::size_t k = 0; k < view.gain.size(); ++k) column[8 + k] = c[0] * over_the_tag[k];
     column.back() = 1;
     for (std::size_t k = 0; k < column.size(); ++k) {
-      sums.right[k] += q * q * w * column[k] * r;
+      sums.rhs[k] += q * q * w * column[k] * r;
       sums.size[k] += std::abs(q * q * w * column[k] * r);
     }
     sums.squares += q * q * r * r;
@@ -172,14 +172,14 @@ class PixelSums : public testing::TestWithParam<Case> {
 constexpr double kRelative = 1e-4;
 
 void expect_equal(const std::vector<NormalEquations>& is, const std::vector<Sums>& should) {
-  Right total{}, size{};
+  Columns total{}, size{};
   double rounding = 0;
   for (const Sums& s : should) {
     for (std::size_t k = 0; k < kPatchParameters; ++k) size[k] += s.size[k];
   }
   for (std::size_t n = 0; n < is.size(); ++n) {
     for (std::size_t k = 0; k < kPatchParameters; ++k) {
-      const double off = is[n].right[k] - should[n].right[k];
+      const double off = is[n].rhs[k] - should[n].rhs[k];
       total[k] += off;
       rounding += std::abs(off);
       const double mean_size = size[k] / static_cast<double>(is.size());
@@ -285,10 +285,10 @@ TEST(PixelSumsOfNothing, BehindTheLensOrWithoutAnImageAreZero) {
   PixelPairs pairs(t.size());
   std::vector<NormalEquations> sums(t.patches.size());
   const auto expect_nothing = [&](const PixelWindow& image, const Eigen::Isometry3d& pose) {
-    sums.assign(t.patches.size(), {.right = {1}, .squares = 1, .weights = 1, .inside = 1});
+    sums.assign(t.patches.size(), {.rhs = {1}, .squares = 1, .weights = 1, .inside = 1});
     sum_patches(t, image, views_of(t, pose), 0, false, pairs, sums);
     for (const NormalEquations& s : sums) {
-      for (const float right : s.right) ASSERT_EQ(right, 0);
+      for (const float sum : s.rhs) ASSERT_EQ(sum, 0);
       ASSERT_EQ(s.squares, 0);
       ASSERT_EQ(s.weights, 0);
       ASSERT_EQ(s.inside, 0);
@@ -321,8 +321,8 @@ TEST(PixelSumsGradient, RightHandSideIsTheSlopeOfTheSquaredResiduals) {
     PixelPairs pairs(t.size());
     std::vector<NormalEquations> sums(t.patches.size());
     sum_patches(t, render::window(picture), views, 0, false, pairs, sums);
-    double right = 0;
-    for (const NormalEquations& s : sums) right += s.right[static_cast<std::size_t>(axis)];
+    double rhs = 0;
+    for (const NormalEquations& s : sums) rhs += s.rhs[static_cast<std::size_t>(axis)];
 
     const auto squares = [&](double step) {
       Vector6 more = Vector6::Zero();
@@ -337,7 +337,7 @@ TEST(PixelSumsGradient, RightHandSideIsTheSlopeOfTheSquaredResiduals) {
     };
     const double step = 1e-2 * motion[axis];
     const double slope = (squares(step) - squares(-step)) / (4 * step);
-    EXPECT_NEAR(right, slope, kOfTheSlope * std::abs(slope)) << "axis " << axis;
+    EXPECT_NEAR(rhs, slope, kOfTheSlope * std::abs(slope)) << "axis " << axis;
     EXPECT_GT(slope * motion[axis], 500) << "axis " << axis;
   }
 }

@@ -46,10 +46,8 @@ void expect_near(const Vector6& truth, const Vector6& is) {
 
 TEST(RollingShutter, PoseIsThatOfTheMiddleRow) {
   const render::Scene scene = render::roof();
-  PixelTemplate pixels = render::template_of(scene);
-  pixels.readout = kReadout;
   PhotometricAligner aligner;
-  aligner.set_template(pixels);
+  aligner.set_template(render::template_of(scene));
   Vector6 velocity;
   velocity << 3e-3, -4e-3, 10e-3, 0.3, 0.3, 0.5;  // m/s, rad/s
   std::mt19937 random(2);
@@ -57,7 +55,8 @@ TEST(RollingShutter, PoseIsThatOfTheMiddleRow) {
       scene, expose_rows(scene, [&](double t) { return Vector6(t * velocity); }), random);
   const Eigen::Isometry3d rest = render::rest_pose(scene);
   PhotometricState state;
-  const PhotometricFit fit = aligner.align(render::window(picture), rest, velocity, state);
+  const PhotometricFit fit =
+      aligner.align(render::window(picture), rest, {kReadout, velocity}, state);
   ASSERT_TRUE(fit.converged);
   expect_near(Vector6::Zero(), motion_between(rest, fit.camera_T_platform));
   EXPECT_LT(fit.residual, 1.4);

@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "tests/unit/tracker/render.h"
+#include "tests/unit/tracker/template_scene.h"
 
 namespace tagwrench {
 namespace {
@@ -17,14 +18,6 @@ using render::Scene;
 
 constexpr int kRestFrames = 25;
 constexpr Duration kPeriod = std::chrono::milliseconds(40);
-
-CameraModel camera_of(const Scene& scene) {
-  CameraModel camera;
-  camera.fx_px = camera.fy_px = scene.f_px;
-  camera.distortion[0] = scene.k1;
-  camera.mirrored = scene.mirrored;
-  return camera;
-}
 
 TargetDescription ids(TagFamily family, std::vector<int> list) {
   TargetDescription target;
@@ -72,6 +65,20 @@ struct Bench {
     return track;
   }
 };
+
+/// The roof, with placement and reference pose given and no picture.
+Bench given_roof() {
+  const Scene scene = render::roof();
+  TargetDescription target = roof_target();
+  for (std::size_t t = 0; t < 2; ++t)
+    target.tags[t].platform_T_tag = render::rest_pose(scene).inverse() * scene.tags[t].camera_T_tag;
+  return Bench(scene, target, {kRestFrames, render::rest_pose(scene), {}});
+}
+
+const Picture& blank() {
+  static const Picture grey{640, 480, std::vector<std::uint8_t>(640 * 480, 90)};
+  return grey;
+}
 
 /// Smooth motion over all six axes: up to 0.6 mm and 40 mrad, below 5 px a frame.
 Vector6 sway(int i) {
@@ -376,6 +383,66 @@ TEST(Tracker, GarbageGivesNoNumbersAndNoNan) {
     EXPECT_TRUE(std::isfinite(track.residual_px));
   }
   EXPECT_EQ(bench.show(Vector6::Zero()).status, Status::ok);
+}
+
+TEST(TrackingState, LearnsIsHeldByPictureLostAndFoundAnew) {
+  Bench bench(render::roof(), roof_target());
+  EXPECT_EQ(bench.tracker.state(), TrackingState::learning_reference);
+  bench.show(blank());
+  EXPECT_EQ(bench.tracker.state(), TrackingState::learning_reference);
+  bench.rest();
+  EXPECT_EQ(bench.tracker.state(), TrackingState::held_by_picture);
+  EXPECT_EQ(bench.show(blank()).status, Status::lost);
+  EXPECT_EQ(bench.tracker.state(), TrackingState::lost);
+  bench.show(blank());
+  EXPECT_EQ(bench.tracker.state(), TrackingState::lost);
+  EXPECT_EQ(bench.show(Vector6::Zero()).status, Status::ok);
+  EXPECT_EQ(bench.tracker.state(), TrackingState::held_by_picture);
+}
+
+TEST(TrackingState, AGivenReferenceIsSearchedHeldByEdgesAndThenByItsPicture) {
+  Bench bench = given_roof();
+  EXPECT_EQ(bench.tracker.state(), TrackingState::searching);
+  EXPECT_EQ(bench.show(blank()).status, Status::acquiring);
+  EXPECT_EQ(bench.tracker.state(), TrackingState::searching);
+  bench.show(Vector6::Zero());
+  EXPECT_EQ(bench.tracker.state(), TrackingState::held_by_edges);
+  for (int i = 0; i < kRestFrames; ++i) bench.show(Vector6::Zero());
+  EXPECT_EQ(bench.tracker.state(), TrackingState::held_by_picture);
+}
+
+TEST(TrackingState, HeldByEdgesItIsLostAndHeldByEdgesAgain) {
+  Bench bench = given_roof();
+  bench.show(Vector6::Zero());
+  EXPECT_EQ(bench.show(blank()).status, Status::lost);
+  EXPECT_EQ(bench.tracker.state(), TrackingState::lost);
+  bench.show(Vector6::Zero());
+  EXPECT_EQ(bench.tracker.state(), TrackingState::held_by_edges);
+}
+
+TEST(TrackingState, AFrameThatCannotBeReadLosesAHeldTargetAndNothingElse) {
+  Bench bench = given_roof();
+  EXPECT_EQ(bench.show(Picture{}).status, Status::acquiring);
+  EXPECT_EQ(bench.tracker.state(), TrackingState::searching);
+  bench.show(Vector6::Zero());
+  EXPECT_EQ(bench.show(Picture{}).status, Status::lost);
+  EXPECT_EQ(bench.tracker.state(), TrackingState::lost);
+}
+
+TEST(TrackingState, APartThatIsTooSmallToTellLeavesItAsItIs) {
+  Bench bench(render::roof(), roof_target());
+  bench.rest();
+  const Picture jumped = render::take(bench.scene, pose6(0.8, 0.8, 0, 0, 0, 0), bench.random);
+  Frame frame;
+  frame.image = jumped.view();
+  frame.decoded = {0, 0, 64, 64};
+  frame.capture_time = TimePoint{} + kPeriod * static_cast<int>(bench.sequence);
+  const Track part = bench.tracker.track(frame);
+  EXPECT_TRUE(part.needs_whole_frame);
+  EXPECT_EQ(part.status, Status::lost);
+  EXPECT_EQ(bench.tracker.state(), TrackingState::held_by_picture);
+  frame.decoded = {};
+  EXPECT_EQ(bench.tracker.track(frame).status, Status::ok);
 }
 
 TEST(Tracker, TinyCameraNeverFindsAnything) {
