@@ -21,6 +21,7 @@
 #include "tests/bench/hid_clip.h"
 #include "tests/bench/hid_figures.h"
 #include "tests/bench/hid_spnav.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::bench {
 namespace {
@@ -119,8 +120,8 @@ struct Bystanders {
   bool then_zero = false;
 };
 
-std::vector<std::string> profile(const HidFolder& folder, double rate_hz) {
-  const std::string path = folder.file("rate.yaml");
+std::vector<std::string> profile(const test::TemporaryFolder& folder, double rate_hz) {
+  const std::string path = (folder / "rate.yaml").string();
   std::ofstream(path) << fmt::format("name: rate\nrate_hz: {}\n", rate_hz);
   return {path};
 }
@@ -141,8 +142,8 @@ void drain(const UniqueFd& program, Bystanders& bystanders) {
 
 LiveFigures run_live(const HidClip& clip, const Script& script, double rate_hz,
                      Bystanders* bystanders = nullptr) {
-  const HidFolder folder;
-  const std::string path = folder.file("spnav.sock");
+  const test::TemporaryFolder folder;
+  const std::string path = (folder / "spnav.sock").string();
   HidHolder daemon(path);
   SpnavListener listener(path);
   UniqueFd slow;

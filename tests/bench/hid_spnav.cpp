@@ -9,21 +9,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <filesystem>
 #include <stdexcept>
 
 namespace tagwrench::bench {
-
-HidFolder::HidFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "hid-bench-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-  path_ = name;
-}
-
-HidFolder::~HidFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
 
 HidHolder::HidHolder(const std::string& path) {
   int ends[2];

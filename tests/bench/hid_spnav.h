@@ -15,19 +15,6 @@
 
 namespace tagwrench::bench {
 
-/// A folder that goes with its contents.
-class HidFolder {
- public:
-  HidFolder();
-  ~HidFolder();
-  HidFolder(const HidFolder&) = delete;
-  HidFolder& operator=(const HidFolder&) = delete;
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
 /// The daemon, in a thread instead of a process.
 class HidHolder {
  public:

@@ -8,6 +8,7 @@
 #include "board_model.h"
 #include "host/core/config_error.h"
 #include "pty.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench::link {
 namespace {
@@ -18,13 +19,9 @@ namespace fs = std::filesystem;
 class BoardLinkTest : public ::testing::Test {
  protected:
   BoardLinkTest() : clock(1, {}, 0), board(clock) {
-    std::string name = (fs::temp_directory_path() / "tagwrench-link-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    folder = name;
     port = (folder / "usb-board").string();
     plug();
   }
-  ~BoardLinkTest() override { fs::remove_all(folder); }
 
   void plug() {
     device.open();
@@ -63,7 +60,7 @@ class BoardLinkTest : public ::testing::Test {
   SyntheticLink clock;
   BoardModel board;
   Pty device;
-  fs::path folder;
+  tagwrench::test::TemporaryFolder folder;
   std::string port;
   std::vector<BoardEvent::Kind> news;
 };

@@ -18,6 +18,7 @@
 #include "host/core/os/termination.h"
 #include "host/output/line_outputs.h"
 #include "samples.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
@@ -33,18 +34,10 @@ class Text : public ::testing::Test {
  protected:
   void SetUp() override {
     signal(SIGPIPE, SIG_IGN);  // as main() does
-    char folder[] = "/tmp/tagwrench_text_XXXXXX";
-    ASSERT_NE(mkdtemp(folder), nullptr);
-    folder_ = folder;
-    path_ = folder_ + "/out";
     int ends[2];
     ASSERT_EQ(pipe2(ends, O_CLOEXEC), 0);
     reader_.reset(ends[0]);
     writer_.reset(ends[1]);
-  }
-  void TearDown() override {
-    unlink(path_.c_str());
-    rmdir(folder_.c_str());
   }
   std::string fd_path(const UniqueFd& fd) { return "/proc/self/fd/" + std::to_string(fd.get()); }
   std::string drain() {
@@ -57,7 +50,8 @@ class Text : public ::testing::Test {
     return text;
   }
 
-  std::string folder_, path_;
+  test::TemporaryFolder temporary_;
+  std::string folder_ = temporary_.path(), path_ = folder_ + "/out";
   UniqueFd reader_, writer_;
   LineBuffer buffer_{};
 };

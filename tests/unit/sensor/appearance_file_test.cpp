@@ -10,6 +10,7 @@
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
 #include "host/sensor/sensor_config.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
@@ -19,9 +20,6 @@ namespace fs = std::filesystem;
 class RestPicture : public testing::Test {
  protected:
   RestPicture() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-test-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    folder_ = name;
     camera_.width_px = 64;
     camera_.height_px = 48;
     image_.width = 64;
@@ -29,7 +27,6 @@ class RestPicture : public testing::Test {
     for (int i = 0; i < 64 * 48; ++i)
       image_.level.push_back(255.0F * static_cast<float>(i) / (64 * 48 - 1));
   }
-  ~RestPicture() override { fs::remove_all(folder_); }
 
   std::string complaint() const {
     testing::internal::CaptureStderr();
@@ -60,7 +57,8 @@ class RestPicture : public testing::Test {
     return {std::istreambuf_iterator<char>(in), {}};
   }
 
-  fs::path folder_;
+  test::TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
   CameraModel camera_;
   ReferenceImage image_;
 };

@@ -13,6 +13,7 @@
 #include "host/sensor/appearance_file.h"
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/sensor_config.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
@@ -59,12 +60,7 @@ std::string changed(std::string text, const std::string& from, const std::string
 
 class MeasuredFiles : public testing::Test {
  protected:
-  MeasuredFiles() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-measured-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-    write_atomically(sensor(), kSensor);
-  }
-  ~MeasuredFiles() override { fs::remove_all(folder_); }
+  MeasuredFiles() { write_atomically(sensor(), kSensor); }
 
   fs::path sensor() const { return folder_ / "sensor.yaml"; }
   fs::path measured(const char* file) const { return folder_ / kMeasuredFolder / file; }
@@ -121,7 +117,8 @@ class MeasuredFiles : public testing::Test {
                               sha256_of(now.wrench)}));
   }
 
-  fs::path folder_;
+  test::TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
   mutable float level_ = 50;
 };
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "host/calibration/print/drawing.h"
+#include "tests/support/temporary_folder.h"
 
 extern char** environ;
 
@@ -29,14 +30,6 @@ bool run(std::vector<std::string> words) {
 
 }  // namespace
 
-Folder::Folder() {
-  std::string name = (std::filesystem::temp_directory_path() / "tagwrench-print-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
-  path_ = name;
-}
-
-Folder::~Folder() { std::filesystem::remove_all(path_); }
-
 bool have(const std::string& program) {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path == nullptr ? "" : path);
@@ -47,7 +40,7 @@ bool have(const std::string& program) {
 }
 
 cv::Mat rasterise(const std::filesystem::path& file, int dpi) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string dots = std::to_string(dpi);
   const std::string page = folder / "page";
   const bool done =
@@ -59,7 +52,7 @@ cv::Mat rasterise(const std::filesystem::path& file, int dpi) {
 }
 
 cv::Mat print(const Drawing& drawing, const std::string& ending, int dpi) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::filesystem::path file = folder / ("sheet" + ending);
   write_vector_file(drawing, file);
   return rasterise(file, dpi);

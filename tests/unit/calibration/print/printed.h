@@ -9,19 +9,6 @@
 
 namespace tagwrench::test {
 
-/// A folder of its own, gone at the end.
-class Folder {
- public:
-  Folder();
-  ~Folder();
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
-
 /// Whether a program of this name is on the PATH.
 bool have(const std::string& program);
 

@@ -6,6 +6,7 @@
 #include "host/calibration/print/drawing.h"
 #include "host/calibration/print/sheets.h"
 #include "host/core/config_error.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/calibration/print/printed.h"
 
 namespace tagwrench::test {
@@ -21,7 +22,7 @@ std::size_t files_in(const std::filesystem::path& folder) {
 }
 
 TEST(VectorFile, EndingSaysWhichKindItIs) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Drawing drawing = tag_sheet(kA4, {});
   write_vector_file(drawing, folder / "sheet.PDF");
   EXPECT_EQ(text_of(folder / "sheet.PDF").rfind("%PDF-", 0), 0u);
@@ -37,7 +38,7 @@ TEST(VectorFile, EndingSaysWhichKindItIs) {
 }
 
 TEST(VectorFile, WhatCannotBeWrittenLeavesNothingBehind) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Drawing drawing = tag_sheet(kA4, {});
   EXPECT_THROW(write_vector_file(drawing, folder / "no/such/folder/sheet.pdf"), ConfigError);
   std::filesystem::create_directory(folder / "taken.pdf");
@@ -46,7 +47,7 @@ TEST(VectorFile, WhatCannotBeWrittenLeavesNothingBehind) {
 }
 
 TEST(VectorFile, ReplacesAnOlderSheetAsAWhole) {
-  const Folder folder;
+  const TemporaryFolder folder;
   std::ofstream(folder / "sheet.svg") << "old";
   write_vector_file(tag_sheet(kA4, {}), folder / "sheet.svg");
   EXPECT_EQ(text_of(folder / "sheet.svg").rfind("<?xml", 0), 0u);

@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "host/core/config_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
 namespace {
@@ -17,16 +18,12 @@ namespace fs = std::filesystem;
 
 class AtomicFile : public testing::Test {
  protected:
-  AtomicFile() {
-    std::string name = (fs::temp_directory_path() / "tagwrench-atomic-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~AtomicFile() override { fs::remove_all(folder_); }
   std::size_t files() const {
     return static_cast<std::size_t>(
         std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
   }
-  fs::path folder_;
+  test::TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 TEST_F(AtomicFile, IsReplacedAsAWholeKeepingItsMode) {
