@@ -8,7 +8,7 @@ import { before, test } from 'node:test';
 import { reason, root } from './support/environment.mjs';
 import { loadModule } from './support/typescript.mjs';
 
-const skip = reason('packages');
+const skip = reason('packages', 'sensor');
 let frames;
 let messages;
 let hid;
@@ -85,6 +85,20 @@ test('damaged, cut and endless frames are dropped, and the next is read', { skip
     assert.equal(reader.take(new Uint8Array(5000).fill(7)).length, 0);
     assert.equal(reader.take(Uint8Array.from([0, ...bytes])).length, 1);
   }
+});
+
+test('a message that is none is null, one with more fields is not', { skip }, () => {
+  const read = (...bytes) => messages.readNews(messages.Kind.cellSample, Uint8Array.from(bytes));
+  const cell = { kind: 'cell', channel: 2, counts: -1, time_us: 0, saturated: false };
+  const endless = new Array(10).fill(0xff);
+  const noMessages = [
+    [0x1d, 1, 2, 3], [0x08], [0x08, ...endless], [...endless], [0x7a, 2, 0], [0x7a, 0xff, 0xff, 0xff, 0xff, 0x0f], // cut, endless
+    [0x00], [0x00, 1], [0x7c], [0x0c], [0x7e, 1], [0x7f], // field 0, a group's end, types that are none
+  ];
+  assert.deepEqual(read(0x08, 2, 0x10, 1), cell);
+  for (const bytes of noMessages) assert.equal(read(0x08, 2, 0x10, 1, ...bytes), null, `${bytes}`);
+  assert.deepEqual(read(0x08, 9, 0x7a, 1, 0, 0x78, 3, 0x10, 1, 0x08, 2), cell);
+  assert.equal(messages.readNews(messages.Kind.hello, Uint8Array.from([0x1a, 4, 0x41, 0x0a, 0xff, 0x42])).board, 'A??B');
 });
 
 test('no message makes the reader read beyond it or fail', { skip }, () => {

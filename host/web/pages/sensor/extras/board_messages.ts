@@ -1,5 +1,9 @@
-// The messages of protocol/link.proto that this page needs, as protobuf has them. Whatever comes: nothing is read beyond a
-// message's end, unknown fields are skipped, and a message that is none is null.
+// What this page says to the board and hears from it, in the code that the build makes of protocol/link.proto. Whatever comes:
+// nothing is read beyond a message's end, unknown fields are skipped, and a message that is none is null.
+import { BinaryReader } from '@bufbuild/protobuf/wire';
+import {
+  Answer, Capabilities, CellInput, CellSample, Configure, Fault, Hello, HelloRequest, Led, LedMode, Status, Tare, TareResult,
+} from '../../generated/protocol/link';
 
 export const Kind = {
   helloRequest: 0x01, configure: 0x02, led: 0x03, timeRequest: 0x04, tare: 0x05,
@@ -8,116 +12,22 @@ export const Kind = {
 
 export const PROTOCOL_MAJOR = 1;
 
-type Value = number | Uint8Array;
-type Fields = Map<number, Value>;
-
-class Writer {
-  private readonly bytes: number[] = [];
-
-  varint(field: number, value: number): this {
-    if (value === 0) return this; // proto3: not sent
-    this.raw(field << 3);
-    return this.raw(value);
-  }
-  fixed32(field: number, value: number): this {
-    if (value === 0) return this;
-    this.raw((field << 3) | 5);
-    for (let shift = 0; shift < 32; shift += 8) this.bytes.push((value >>> shift) & 0xff);
-    return this;
-  }
-  packed(field: number, values: readonly number[]): this {
-    const inner = new Writer();
-    values.forEach((value) => inner.raw(value));
-    this.raw((field << 3) | 2).raw(inner.bytes.length);
-    this.bytes.push(...inner.bytes);
-    return this;
-  }
-  done(): Uint8Array {
-    return Uint8Array.from(this.bytes);
-  }
-  private raw(value: number): this {
-    let rest = value >>> 0;
-    for (; rest > 0x7f; rest >>>= 7) this.bytes.push((rest & 0x7f) | 0x80);
-    this.bytes.push(rest);
-    return this;
-  }
-}
-
-export const helloRequest = (session: number): Uint8Array => new Writer().varint(1, PROTOCOL_MAJOR).fixed32(3, session).done();
+export const helloRequest = (session: number): Uint8Array =>
+  HelloRequest.encode({ protocol_major: PROTOCOL_MAJOR, protocol_minor: 0, session }).finish();
 
 /** Cells with channel A and gain 128 in all places that the board has. */
-export function configure(cells: number, hostTimeout_ms: number, status_ms: number): Uint8Array {
-  const writer = new Writer().varint(1, hostTimeout_ms);
-  if (cells > 0) writer.packed(2, new Array<number>(cells).fill(1));
-  return writer.varint(3, 10).varint(6, status_ms).done();
-}
+export const configure = (cells: number, host_timeout_ms: number, status_period_ms: number): Uint8Array =>
+  Configure.encode({
+    host_timeout_ms, cells: new Array<CellInput>(cells).fill(CellInput.CELL_A128), cell_rate_sps: 10, adc_mask: 0, adc_rate_hz: 0,
+    status_period_ms,
+  }).finish();
 
 export const steadyLight = (permille: number): Uint8Array =>
-  permille > 0 ? new Writer().varint(1, 1).varint(2, permille).done() : new Uint8Array(0);
+  permille > 0
+    ? Led.encode({ mode: LedMode.LED_STEADY, level_permille: permille, period_us: 0, width_us: 0, start_us: 0, pattern_seed: 0 }).finish()
+    : new Uint8Array(0);
 
-export const tare = (mask: number, conversions: number): Uint8Array => new Writer().varint(1, mask).varint(2, conversions).done();
-
-class Reader {
-  private at = 0;
-  constructor(private readonly bytes: Uint8Array) {}
-
-  get ended(): boolean {
-    return this.at >= this.bytes.length;
-  }
-  /** Up to 64 bits, of which 32 matter here; null beyond the end or if it never ends. */
-  varint(): number | null {
-    let value = 0;
-    for (let count = 0; count < 10; count++) {
-      const byte = this.bytes[this.at++];
-      if (byte === undefined) return null;
-      if (count < 5) value += (byte & 0x7f) * 2 ** (7 * count);
-      if (byte < 0x80) return value;
-    }
-    return null;
-  }
-  take(count: number): Uint8Array | null {
-    if (count > this.bytes.length - this.at) return null;
-    this.at += count;
-    return this.bytes.subarray(this.at - count, this.at);
-  }
-}
-
-/** Of a field that comes twice, the last one counts. */
-function fields(message: Uint8Array): Fields | null {
-  const reader = new Reader(message);
-  const found: Fields = new Map();
-  while (!reader.ended) {
-    const tag = reader.varint();
-    if (tag === null || tag >>> 3 === 0) return null;
-    const type = tag & 7;
-    let value: Value | null = null;
-    if (type === 0) value = reader.varint();
-    else if (type === 2) {
-      const length = reader.varint();
-      value = length === null ? null : reader.take(length);
-    } else if (type === 5) {
-      const four = reader.take(4);
-      value = four && new DataView(four.buffer, four.byteOffset, 4).getUint32(0, true);
-    } else if (type === 1) value = reader.take(8);
-    if (value === null) return null;
-    found.set(tag >>> 3, value);
-  }
-  return found;
-}
-
-const number = (from: Fields, field: number): number => {
-  const value = from.get(field);
-  return typeof value === 'number' ? value : 0;
-};
-const signed = (from: Fields, field: number): number => {
-  const zigzag = number(from, field) >>> 0;
-  return (zigzag >>> 1) ^ -(zigzag & 1);
-};
-const text = (from: Fields, field: number): string => {
-  const value = from.get(field);
-  // A stranger's bytes: what does not print is not shown.
-  return value instanceof Uint8Array ? [...value].map((b) => (b >= 0x20 && b < 0x7f ? String.fromCharCode(b) : '?')).join('') : '';
-};
+export const tare = (cell_mask: number, conversions: number): Uint8Array => Tare.encode({ cell_mask, conversions }).finish();
 
 export type BoardNews =
   | { kind: 'hello'; major: number; minor: number; board: string; firmware: string; bootId: number; session: number }
@@ -128,28 +38,60 @@ export type BoardNews =
   | { kind: 'tare'; channel: number; mean_counts: number; spread_counts: number }
   | { kind: 'fault'; code: number; channel: number };
 
-export function readNews(kind: number, message: Uint8Array): BoardNews | null {
-  const f = fields(message);
-  if (!f) return null;
+// A stranger's bytes: what does not print is not shown.
+const text = (value: string): string => value.replace(/[^ -~]/g, '?');
+
+/** Throws where the fields do not follow each other up to the very end; decode() alone would take what stands before that. */
+function checkFields(message: Uint8Array): void {
+  const reader = new BinaryReader(message);
+  while (reader.pos < reader.len) {
+    const [field, type] = reader.tag();
+    reader.skip(type, field);
+  }
+}
+
+function understand(kind: number, message: Uint8Array): BoardNews | null {
+  checkFields(message);
   switch (kind) {
-    case Kind.hello:
+    case Kind.hello: {
+      const { protocol_major, protocol_minor, board, firmware, boot_id, session } = Hello.decode(message);
       return {
-        kind: 'hello', major: number(f, 1), minor: number(f, 2), board: text(f, 3), firmware: text(f, 4),
-        bootId: number(f, 6), session: number(f, 8),
+        kind: 'hello', major: protocol_major, minor: protocol_minor, board: text(board), firmware: text(firmware), bootId: boot_id, session,
       };
-    case Kind.capabilities:
-      return { kind: 'capabilities', cells: Math.min(number(f, 1), 8), ledLevels: number(f, 5), ledSustained_permille: number(f, 6) };
-    case Kind.cellSample:
-      return { kind: 'cell', channel: number(f, 1), counts: signed(f, 2), time_us: number(f, 3), saturated: number(f, 6) !== 0 };
-    case Kind.status:
-      return { kind: 'status', session: number(f, 2), led_permille: number(f, 3), limited: number(f, 4) !== 0, supply_mv: number(f, 6) };
-    case Kind.answer:
-      return { kind: 'answer', request: number(f, 1), result: number(f, 3) };
-    case Kind.tareResult:
-      return { kind: 'tare', channel: number(f, 1), mean_counts: signed(f, 2), spread_counts: number(f, 3) };
-    case Kind.fault:
-      return { kind: 'fault', code: number(f, 1), channel: number(f, 2) };
+    }
+    case Kind.capabilities: {
+      const { cells, led_levels, led_sustained_permille } = Capabilities.decode(message);
+      return { kind: 'capabilities', cells: Math.min(cells, 8), ledLevels: led_levels, ledSustained_permille: led_sustained_permille };
+    }
+    case Kind.cellSample: {
+      const { channel, counts, time_us, saturated } = CellSample.decode(message);
+      return { kind: 'cell', channel, counts, time_us, saturated };
+    }
+    case Kind.status: {
+      const { session, led_level_permille, led_limited, supply_mv } = Status.decode(message);
+      return { kind: 'status', session, led_permille: led_level_permille, limited: led_limited, supply_mv };
+    }
+    case Kind.answer: {
+      const { request_kind, result } = Answer.decode(message);
+      return { kind: 'answer', request: request_kind, result };
+    }
+    case Kind.tareResult: {
+      const { channel, mean_counts, spread_counts } = TareResult.decode(message);
+      return { kind: 'tare', channel, mean_counts, spread_counts };
+    }
+    case Kind.fault: {
+      const { code, channel } = Fault.decode(message);
+      return { kind: 'fault', code, channel };
+    }
     default:
       return null; // of a later version
+  }
+}
+
+export function readNews(kind: number, message: Uint8Array): BoardNews | null {
+  try {
+    return understand(kind, message);
+  } catch {
+    return null;
   }
 }
