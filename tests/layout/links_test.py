@@ -1,9 +1,17 @@
 #!/usr/bin/env python3
-"""Every link and picture of the documents leads to a file of the tree, and to a heading where it names one: links_test.py SOURCE_TREE"""
+"""What documents point at is there: links_test.py SOURCE_TREE
+
+Every link and picture leads to a file of the tree, and to a heading where it names one. Sources that the documents of the house name in
+backticks, and that the first header of a room sends on to ("Then: ..."), are found somewhere in the tree by the end of their path.
+"""
+import fnmatch
+import os
 import pathlib
 import re
 import sys
 
+NAMED = re.compile(r"`([\w./*-]+\.(?:h|cpp|ts|mjs|py|sh|proto))`")
+THEN = re.compile(r"(?m)^// Then: .*(?:\n// .*)*?\.$")
 LINK = re.compile(r'\]\(([^)\s]+)\)|\bsrc="([^"]+)"')
 
 
@@ -19,6 +27,29 @@ def documents_of(root):
         top = file.relative_to(root).parts[0]
         if not top.startswith(("build", ".")) and "node_modules" not in file.parts:
             yield file
+
+
+def sources_of(root):
+    paths = []
+    for folder, folders, files in os.walk(root):
+        folders[:] = [name for name in folders if not name.startswith((".", "build")) and name != "node_modules"]
+        paths += ["/" + os.path.relpath(os.path.join(folder, name), root) for name in files]
+    return paths
+
+
+def names_of(root):
+    """(where, source named there)"""
+    documents = [root / "README.md", root / "CONTRIBUTING.md", *root.glob("docs/*.md"), *root.glob("host/*/README.md"),
+                 *root.glob("tests/README.md"), *root.glob("protocol/README.md"), *root.glob("firmware/README.md")]
+    for document in documents:
+        if document.exists():
+            for match in NAMED.finditer(document.read_text(encoding="utf-8")):
+                yield document.relative_to(root), match[1]
+    for header in root.glob("host/**/*.h"):
+        if "node_modules" not in header.parts:
+            for line in THEN.findall(header.read_text(encoding="utf-8")):
+                for name in re.findall(r"[\w/]+\.(?:h|cpp)\b", line):
+                    yield header.relative_to(root), name
 
 
 def main():
@@ -38,9 +69,15 @@ def main():
                 faults.append(f"{where}: {link}: no such file")
             elif anchor and target.suffix == ".md" and anchor not in anchors_of(target.read_text(encoding="utf-8")):
                 faults.append(f"{where}: {link}: no such heading")
+    sources, names = sources_of(root), list(names_of(root))
+    for where, name in names:
+        if not any(path.endswith("/" + name) or fnmatch.fnmatch(path, "*/" + name) for path in sources):
+            faults.append(f"{where}: {name}: no such file in the tree")
+    if len(names) < 100:
+        faults.append(f"only {len(names)} names of sources were found: the reader of names is broken")
     if count < 30:
         faults.append(f"only {count} links were found: the reader of links is broken")
-    print("\n".join(faults) if faults else f"{count} links")
+    print("\n".join(faults) if faults else f"{count} links, {len(names)} names of sources")
     return 1 if faults else 0
 
 
