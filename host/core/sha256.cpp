@@ -1,6 +1,7 @@
 #include "host/core/sha256.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <openssl/evp.h>
 
 #include <array>
@@ -21,13 +22,7 @@ using Digest = std::array<unsigned char, EVP_MAX_MD_SIZE>;
 }
 
 std::string hex(const Digest& digest, unsigned int length) {
-  std::string out;
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  for (unsigned int i = 0; i < length; ++i) {
-    out += kDigits[digest[i] >> 4];
-    out += kDigits[digest[i] & 15];
-  }
-  return out;
+  return fmt::format("{:02x}", fmt::join(std::span(digest).first(length), ""));
 }
 
 }  // namespace

@@ -119,87 +119,45 @@ bool Option::is_required() const { return option_->get_required(); }
 bool Option::is_positional() const { return option_->get_positional(); }
 
 Command Command::add_subcommand(const std::string& name, const std::string& description) {
-  return Command(app_->add_subcommand(name, description));
+  return {app_->add_subcommand(name, description), action_};
 }
 
-Option Command::add_option(const std::string& name, std::string& value,
-                           const std::string& description) {
+template <typename Value>
+Option Command::add_option(const std::string& name, Value& value, const std::string& description) {
   return Option(app_->add_option(name, value, description));
 }
 
-Option Command::add_option(const std::string& name, std::filesystem::path& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, int& value, const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::size_t& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, double& value, const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::optional<int>& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::optional<long>& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::optional<double>& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::optional<std::uint8_t>& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::vector<std::string>& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::vector<std::filesystem::path>& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::vector<int>& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
-
-Option Command::add_option(const std::string& name, std::vector<double>& value,
-                           const std::string& description) {
-  return Option(app_->add_option(name, value, description));
-}
+using Text = const std::string&;
+template Option Command::add_option(Text, std::string&, Text);
+template Option Command::add_option(Text, std::filesystem::path&, Text);
+template Option Command::add_option(Text, int&, Text);
+template Option Command::add_option(Text, std::size_t&, Text);
+template Option Command::add_option(Text, double&, Text);
+template Option Command::add_option(Text, std::optional<int>&, Text);
+template Option Command::add_option(Text, std::optional<long>&, Text);
+template Option Command::add_option(Text, std::optional<double>&, Text);
+template Option Command::add_option(Text, std::optional<std::uint8_t>&, Text);
+template Option Command::add_option(Text, std::vector<std::string>&, Text);
+template Option Command::add_option(Text, std::vector<std::filesystem::path>&, Text);
+template Option Command::add_option(Text, std::vector<int>&, Text);
+template Option Command::add_option(Text, std::vector<double>&, Text);
 
 Option Command::add_flag(const std::string& name, bool& value, const std::string& description) {
   return Option(app_->add_flag(name, value, description));
 }
 
-Command Command::footer(const std::string& text) { return Command(app_->footer(text)); }
+Command Command::footer(const std::string& text) { return {app_->footer(text), action_}; }
 
-Command Command::require_subcommand() { return Command(app_->require_subcommand(1)); }
+Command Command::require_subcommand() { return {app_->require_subcommand(1), action_}; }
 
-Command Command::hidden() { return Command(app_->group("")); }
+Command Command::hidden() { return {app_->group(""), action_}; }
 
-Command Command::callback(const std::function<void()>& function) {
-  return Command(app_->callback(function));
+void Command::runs(std::function<int()> action, std::function<void()> check) {
+  app_->callback([action = std::move(action), check = std::move(check), chosen = action_] {
+    if (check) check();
+    *chosen = action;
+  });
 }
-
-bool Command::parsed() const { return app_->parsed(); }
 
 std::size_t Command::count(const std::string& name) const { return app_->count(name); }
 
@@ -212,7 +170,7 @@ std::string Command::footer_text() const { return app_->get_footer(); }
 std::vector<Command> Command::subcommands() const {
   std::vector<Command> commands;
   const auto shown = [](CLI::App* command) { return !command->get_group().empty(); };
-  for (CLI::App* command : app_->get_subcommands(shown)) commands.emplace_back(command);
+  for (CLI::App* command : app_->get_subcommands(shown)) commands.emplace_back(command, action_);
   return commands;
 }
 
@@ -225,14 +183,12 @@ std::vector<Option> Command::options() const {
 
 void missing(const std::string& name) { throw CLI::RequiredError(name); }
 
-Program::Program(std::unique_ptr<CLI::App> app) : Command(app.get()), app_(std::move(app)) {}
-
-Program::Program(const std::string& description)
-    : Program(std::make_unique<CLI::App>(description)) {}
+Program::Program(std::unique_ptr<CLI::App> app)
+    : Command(app.get(), &chosen_), app_(std::move(app)) {}
 
 Program::Program(const std::string& description, const std::string& version)
-    : Program(description) {
-  app_->set_version_flag("--version", version);
+    : Program(std::make_unique<CLI::App>(description)) {
+  if (!version.empty()) app_->set_version_flag("--version", version);
 }
 
 Program::~Program() = default;

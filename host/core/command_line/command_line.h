@@ -84,34 +84,14 @@ class Option {
 class Command {
  public:
   Command() = default;
-  explicit Command(CLI::App* app) : app_(app) {}
+  Command(CLI::App* app, std::function<int()>* action) : app_(app), action_(action) {}
 
   Command add_subcommand(const std::string& name, const std::string& description);
   /// `value` is written by parsing: it must stay where it is until then.
-  Option add_option(const std::string& name, std::string& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, std::filesystem::path& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, int& value, const std::string& description = "");
-  Option add_option(const std::string& name, std::size_t& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, double& value, const std::string& description = "");
-  Option add_option(const std::string& name, std::optional<int>& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, std::optional<long>& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, std::optional<double>& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, std::optional<std::uint8_t>& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, std::vector<std::string>& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, std::vector<std::filesystem::path>& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, std::vector<int>& value,
-                    const std::string& description = "");
-  Option add_option(const std::string& name, std::vector<double>& value,
-                    const std::string& description = "");
+  /// Values: text, paths, whole numbers and numbers, some of them optional or in lists: what
+  /// command_line.cpp instantiates.
+  template <typename Value>
+  Option add_option(const std::string& name, Value& value, const std::string& description = "");
   Option add_flag(const std::string& name, bool& value, const std::string& description);
 
   /// Below the options in the help text.
@@ -120,11 +100,10 @@ class Command {
   Command require_subcommand();
   /// Only for programs: not in help, manual and completion.
   Command hidden();
-  /// Called when all of it has been read. It may call missing().
-  Command callback(const std::function<void()>& function);
+  /// What it does if it was given, and what is to be checked before, while all of it has just been
+  /// read: that may call missing().
+  void runs(std::function<int()> action, std::function<void()> check = {});
 
-  /// Whether it was given.
-  bool parsed() const;
   /// Of the option of this name.
   std::size_t count(const std::string& name) const;
 
@@ -137,30 +116,31 @@ class Command {
 
  private:
   CLI::App* app_ = nullptr;
+  std::function<int()>* action_ = nullptr;  ///< the program's
 };
 
-/// Ends the parsing as it ends where a required option is not given. To be called in a callback.
+/// Ends the parsing as it ends where a required option is not given. For a check of runs().
 [[noreturn]] void missing(const std::string& name);
 
 /// The program as its own topmost command; owns all that is declared on it.
 class Program : public Command {
  public:
-  explicit Program(const std::string& description);
-  /// With --version.
-  Program(const std::string& description, const std::string& version);
+  /// With --version unless that is empty.
+  explicit Program(const std::string& description, const std::string& version = "");
   ~Program();
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
 
   /// False: help or version was asked for and has been printed. Throws ConfigError for wrong usage.
   bool parse(int argc, const char* const* argv);
   /// The same for a program without commands: of what is wrong the bare words, then `advice`.
   bool parse(int argc, const char* const* argv, const std::string& advice);
+  /// What the command that was given does; its exit status.
+  int run() const { return chosen_ ? chosen_() : 0; }
 
  private:
   explicit Program(std::unique_ptr<CLI::App> app);
 
   std::unique_ptr<CLI::App> app_;
+  std::function<int()> chosen_;
 };
 
 }  // namespace tagwrench::command_line

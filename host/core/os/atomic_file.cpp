@@ -26,11 +26,12 @@ fs::path resolved(const fs::path& path) {
   return error ? path : real;
 }
 
-[[noreturn]] void cannot_write(const fs::path& path, const std::string& why) {
-  throw std::runtime_error(fmt::format(
+template <class Error>
+[[noreturn]] void cannot_write(const fs::path& path) {
+  throw Error(fmt::format(
       "{}: cannot be written ({}); the old file is as it was: free some space, mend the "
       "permissions, or name another file with --out",
-      path.string(), why));
+      path.string(), std::strerror(errno)));
 }
 
 /// A temporary file that goes away unless it has been renamed.
@@ -40,7 +41,7 @@ class Temporary {
       : target_(target),
         name_(target.string() + ".XXXXXX"),
         file_(::mkostemp(name_.data(), O_CLOEXEC)) {
-    if (!file_) cannot_write(target_, std::strerror(errno));
+    if (!file_) cannot_write<ConfigError>(target_);
   }
   Temporary(const Temporary&) = delete;
   Temporary& operator=(const Temporary&) = delete;
@@ -54,7 +55,7 @@ class Temporary {
       // Another's file stays another's where we may; the mode comes last, chown clears bits of it.
       [[maybe_unused]] const int ignored = ::fchown(file_.get(), old.st_uid, old.st_gid);
       if (::fchmod(file_.get(), old.st_mode & 07777) != 0)
-        cannot_write(target_, std::strerror(errno));
+        cannot_write<std::runtime_error>(target_);
       return;
     }
     const mode_t mask = ::umask(0);
@@ -65,13 +66,13 @@ class Temporary {
     while (!text.empty()) {
       const ssize_t written = ::write(file_.get(), text.data(), text.size());
       if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) cannot_write(target_, std::strerror(errno));
+      if (written <= 0) cannot_write<std::runtime_error>(target_);
       text.remove_prefix(static_cast<std::size_t>(written));
     }
   }
   void take_the_name() {
     if (::fsync(file_.get()) != 0 || ::rename(name_.c_str(), target_.c_str()) != 0)
-      cannot_write(target_, std::strerror(errno));
+      cannot_write<std::runtime_error>(target_);
     renamed_ = true;
   }
 
@@ -89,8 +90,8 @@ void check_replaceable(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(real, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
-    throw ConfigError(fmt::format(
-        "{}: is not a regular file; name the sensor.yaml to write with --out", path.string()));
+    throw ConfigError(
+        fmt::format("{}: is not a regular file; name another file with --out", path.string()));
   }
   if (fs::exists(status) && ::access(real.c_str(), W_OK) != 0) {
     throw ConfigError(

@@ -12,7 +12,8 @@ namespace tagwrench {
 void check_replaceable(const std::filesystem::path& path);
 
 /// Replaces the file as a whole: a reader sees the old text or the new one, never a part. Follows a
-/// symbolic link and keeps the permissions. Throws std::runtime_error, and leaves the old file.
+/// symbolic link and keeps the permissions. Throws ConfigError if the folder takes no file,
+/// std::runtime_error if writing fails later, and leaves the old file.
 void write_atomically(const std::filesystem::path& path, std::string_view text);
 
 /// The text of a file, whatever it holds. Throws ConfigError if it cannot be read.

@@ -12,9 +12,21 @@
 namespace tagwrench {
 namespace {
 
-struct YamlEntry {
-  std::string key;
-  std::string value;  ///< in flow notation
+// Where the keys and values stand, to the byte.
+
+/// Bytes [begin, end) of the text.
+struct Span {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+struct YamlNode {
+  enum class Kind : unsigned char { scalar, sequence, mapping };
+  Kind kind = Kind::scalar;
+  bool flow = true;  ///< of collections: [..] or {..}
+  Span span;         ///< ends with the last character that is not a blank, a comment or a line end
+  std::string text;  ///< of scalars
+  std::vector<YamlNode> children;  ///< of mappings: key, value, key, value ...
 };
 
 constexpr int kDeepest = 64;  // levels of nesting; recursion must end
@@ -56,23 +68,18 @@ class Reader {
   Reader& operator=(const Reader&) = delete;
   ~Reader() { yaml_parser_delete(&parser_); }
 
-  YamlDocument document() {
-    YamlDocument out;
-    for (;;) {
+  /// Of the only document.
+  YamlNode root() {
+    YamlNode out;
+    for (bool ended = false;;) {
       Event event;
       next(event);
       if (event->type == YAML_STREAM_END_EVENT) return out;
-      if (event->type == YAML_DOCUMENT_END_EVENT) {
-        const bool marked = event->data.document_end.implicit == 0;
-        out.end = marked ? at(event->start_mark) : text_.size();
-        Event after;
-        next(after);
-        if (after->type != YAML_STREAM_END_EVENT)
-          fail(after->start_mark.line, "a second document begins here; keep one");
-        return out;
-      }
-      if (event->type != YAML_STREAM_START_EVENT && event->type != YAML_DOCUMENT_START_EVENT)
-        out.root = node(event, 0);
+      if (ended) fail(event->start_mark.line, "a second document begins here; keep one");
+      ended = event->type == YAML_DOCUMENT_END_EVENT;
+      if (!ended && event->type != YAML_STREAM_START_EVENT &&
+          event->type != YAML_DOCUMENT_START_EVENT)
+        out = node(event, 0);
     }
   }
 
@@ -136,25 +143,11 @@ class Reader {
   yaml_parser_t parser_{};
 };
 
-}  // namespace
-
-YamlDocument yaml_spans(std::string_view text, const std::string& name) {
-  if (text.substr(0, 3) == "\xEF\xBB\xBF")
-    throw ConfigError(fmt::format("{}:1: begins with a byte order mark; save it without", name));
-  return Reader(text, name).document();
-}
-
-namespace {
-
 /// `text` takes the place of the bytes of `span`.
 struct Replacement {
   Span span;
   std::string text;
 };
-
-std::string with_replacement(std::string_view yaml, const Replacement& r) {
-  return std::string(yaml).replace(r.span.begin, r.span.end - r.span.begin, r.text);
-}
 
 std::size_t line_start(std::string_view text, std::size_t at) {
   const std::size_t newline = at == 0 ? std::string_view::npos : text.rfind('\n', at - 1);
@@ -175,11 +168,6 @@ std::string indented(const std::string& value, std::size_t indent) {
     if (c == '\n') out.append(indent, ' ');
   }
   return out;
-}
-
-std::string line_of(const YamlEntry& entry, std::size_t indent) {
-  return std::string(indent, ' ') + entry.key + ": " +
-         indented(entry.value, indent + entry.key.size() + 2) + "\n";
 }
 
 /// Position of the value in `mapping.children`; 0 where there is no such key.
@@ -207,15 +195,17 @@ Replacement replacement(std::string_view yaml, const YamlNode& mapping, std::siz
 }
 
 /// Puts an entry that the mapping lacks after its last one.
-Replacement addition(std::string_view yaml, const YamlNode& mapping, const YamlEntry& entry) {
+Replacement addition(std::string_view yaml, const YamlNode& mapping, const std::string& key,
+                     const std::string& value) {
   if (mapping.flow) {
     const bool empty = mapping.children.empty();
     const std::size_t at = empty ? mapping.span.begin + 1 : mapping.children.back().span.end;
-    return {{at, at}, fmt::format("{}{}: {}", empty ? "" : ", ", entry.key, entry.value)};
+    return {{at, at}, fmt::format("{}{}: {}", empty ? "" : ", ", key, value)};
   }
   const std::size_t at = line_end(yaml, mapping.span.end);
   const std::size_t indent = column(yaml, mapping.children.front().span.begin);
-  const std::string line = line_of(entry, indent);
+  const std::string line =
+      std::string(indent, ' ') + key + ": " + indented(value, indent + key.size() + 2) + "\n";
   if (at == yaml.size()) return {{at, at}, std::string(1, '\n') + line};
   return {{at + 1, at + 1}, line};
 }
@@ -224,15 +214,17 @@ Replacement addition(std::string_view yaml, const YamlNode& mapping, const YamlE
 
 std::string with_value(std::string_view yaml, const std::vector<std::string>& path,
                        const std::string& value, const std::string& name) {
-  const YamlDocument document = yaml_spans(yaml, name);
-  if (document.root.kind != YamlNode::Kind::mapping)
+  if (yaml.starts_with("\xEF\xBB\xBF"))
+    throw ConfigError(fmt::format("{}:1: begins with a byte order mark; save it without", name));
+  const YamlNode root = Reader(yaml, name).root();
+  if (root.kind != YamlNode::Kind::mapping)
     throw ConfigError(
         fmt::format("{}: expected 'key: value' lines at the top level, found none", name));
-  const YamlNode* mapping = &document.root;
+  const YamlNode* mapping = &root;
   for (std::size_t depth = 0; depth < path.size(); ++depth) {
     const std::size_t at = find_value(*mapping, path[depth]);
-    const bool last = depth + 1 == path.size();
-    const bool deeper = at > 0 && !last && mapping->children[at].kind == YamlNode::Kind::mapping &&
+    const bool deeper = at > 0 && depth + 1 < path.size() &&
+                        mapping->children[at].kind == YamlNode::Kind::mapping &&
                         !mapping->children[at].children.empty();
     if (deeper) {
       mapping = &mapping->children[at];
@@ -241,8 +233,9 @@ std::string with_value(std::string_view yaml, const std::vector<std::string>& pa
     std::string rest = value;
     for (std::size_t i = path.size() - 1; i > depth; --i)
       rest = fmt::format("{{{}: {}}}", path[i], rest);
-    return with_replacement(yaml, at > 0 ? replacement(yaml, *mapping, at, rest)
-                                         : addition(yaml, *mapping, {path[depth], rest}));
+    const Replacement r = at > 0 ? replacement(yaml, *mapping, at, rest)
+                                 : addition(yaml, *mapping, path[depth], rest);
+    return std::string(yaml).replace(r.span.begin, r.span.end - r.span.begin, r.text);
   }
   return std::string(yaml);
 }

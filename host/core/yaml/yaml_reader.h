@@ -13,9 +13,13 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tagwrench {
+
+/// In double quotes, as a YAML value: names may hold anything but control characters.
+std::string yaml_quoted(std::string_view text);
 
 class YamlReader {
  public:
@@ -73,6 +77,31 @@ class YamlReader {
   std::string file_;
   std::string path_;  ///< of keys from the root, "camera."
   std::set<std::string> asked_;
+};
+
+/// A mapping whose keys go over the defaults that a struct already holds, converted to SI.
+class YamlSection {
+ public:
+  explicit YamlSection(YamlReader reader) : reader_(std::move(reader)) {}
+
+  void number(const char* key, double& value, double unit = 1.0) {
+    if (reader_.has(key)) value = unit * reader_.number(key);
+  }
+  template <typename Vector>  // anything with size() and []
+  void numbers(const char* key, Vector& value, double unit = 1.0) {
+    if (!reader_.has(key)) return;
+    const std::vector<double> read = reader_.numbers(key, static_cast<std::size_t>(value.size()));
+    for (std::size_t i = 0; i < read.size(); ++i) value[static_cast<int>(i)] = unit * read[i];
+  }
+  template <typename Enum>
+  void choice(const char* key, Enum& value, const std::vector<std::string_view>& names) {
+    if (reader_.has(key)) value = static_cast<Enum>(reader_.one_of(key, names));
+  }
+  YamlReader& reader() { return reader_; }
+  void finish() { reader_.finish(); }
+
+ private:
+  YamlReader reader_;
 };
 
 }  // namespace tagwrench

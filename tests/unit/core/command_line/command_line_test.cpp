@@ -98,10 +98,20 @@ TEST(CommandLine, WrongUsageNamesTheCommandWhoseHelpTellsMore) {
             "Could not convert: --count = x; `tagwrench board led --help` lists what there is");
 }
 
-TEST(CommandLine, CallbackMayMissAnOption) {
+TEST(CommandLine, CheckBeforeACommandMayMissAnOption) {
   Program program("a program");
-  program.callback([] { command_line::missing("--sensor"); });
+  program.runs([] { return 0; }, [] { command_line::missing("--sensor"); });
   EXPECT_EQ(refusal(program, {}), "--sensor is required; `tagwrench --help` lists what there is");
+}
+
+TEST(CommandLine, RunsWhatWasGiven) {
+  Program program("a program");
+  program.add_subcommand("run", "go").runs([] { return 1; });
+  Command board = program.add_subcommand("board", "the board");
+  board.add_subcommand("led", "its light").runs([] { return 2; });
+  board.add_subcommand("info", "who it is").runs([] { return 3; });
+  EXPECT_EQ(refusal(program, {"board", "led"}), "");
+  EXPECT_EQ(program.run(), 2);
 }
 
 TEST(CommandLine, HelpAndVersionEndTheParsing) {

@@ -1,3 +1,5 @@
+#include "host/core/log.h"
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -7,7 +9,6 @@
 
 #include <string>
 
-#include "host/core/log.h"
 #include "host/core/os/unique_fd.h"
 
 namespace tagwrench {

@@ -1,4 +1,4 @@
-#include "host/core/os/runtime_folder.h"
+#include "host/core/os/user_folders.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,6 +20,14 @@ std::string place() {
 }
 
 }  // namespace
+
+std::string config_folder() {
+  const char* config = std::getenv("XDG_CONFIG_HOME");
+  if (config != nullptr && *config == '/') return std::string(config) + "/tagwrench";
+  const char* home = std::getenv("HOME");
+  if (home != nullptr && *home == '/') return std::string(home) + "/.config/tagwrench";
+  return {};
+}
 
 std::string runtime_folder() {
   const std::string folder = place();

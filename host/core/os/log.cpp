@@ -1,3 +1,5 @@
+#include "host/core/log.h"
+
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -7,8 +9,8 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <string>
 
-#include "host/core/log.h"
 #include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
@@ -48,6 +50,13 @@ bool write_soon(int fd, std::string_view text, std::chrono::milliseconds patienc
     text.remove_prefix(static_cast<std::size_t>(written));
   }
   return true;
+}
+
+void log_info(std::string_view line) noexcept {
+  std::string text = "tagwrench: ";
+  for (const char c : line) text += c == '\n' || c == '\r' ? ' ' : c;
+  text += '\n';
+  write_soon(STDERR_FILENO, text, std::chrono::milliseconds(20));
 }
 
 }  // namespace tagwrench

@@ -1,11 +1,14 @@
-#include "host/core/os/spawn_daemon.h"
+#include "host/core/os/child_process.h"
 
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <climits>
 
 #include "host/core/os/unique_fd.h"
 
@@ -50,6 +53,16 @@ class SpawnPlan {
   posix_spawnattr_t attributes_;
 };
 
+void close_gap(unsigned first, unsigned last) noexcept {
+  if (first > last || close_range(first, last, 0) == 0) return;
+  rlimit files{};  // kernels before 5.9
+  getrlimit(RLIMIT_NOFILE, &files);
+  const rlim_t limit = std::min<rlim_t>(files.rlim_cur, 65536);
+  for (unsigned fd = first; fd <= last && fd < limit; ++fd) {
+    ::close(static_cast<int>(fd));
+  }
+}
+
 }  // namespace
 
 int spawn_daemon(pid_t& pid, const std::string& program, std::vector<std::string> words,
@@ -65,6 +78,16 @@ int spawn_daemon(pid_t& pid, const std::string& program, std::vector<std::string
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   return SpawnPlan(high, signals).spawn(pid, program, argv);
+}
+
+void close_all_but(const std::vector<int>& kept) noexcept {
+  unsigned next = 0;
+  for (const int fd : kept) {
+    const auto number = static_cast<unsigned>(fd);
+    if (number > next) close_gap(next, number - 1);
+    next = std::max(next, number + 1);
+  }
+  close_gap(next, UINT_MAX);
 }
 
 }  // namespace tagwrench

@@ -1,5 +1,5 @@
-// Starts a program that nothing of who started it reaches: the daemons of the spnav socket and of a
-// gadget.
+// Processes that keep only what they need of who started them: daemons (of the spnav socket, of a
+// gadget), and those that are forked.
 #pragma once
 
 #include <sys/types.h>
@@ -21,5 +21,9 @@ int spawn_daemon(pid_t& pid, const std::string& program, std::vector<std::string
                  std::span<const int> descriptors, DaemonSignals signals);
 
 constexpr int kFirstDaemonFd = 3;
+
+/// Closes every file descriptor but those `kept`, which are in rising order. Safe after a fork from
+/// a process with threads: no allocation, no lock.
+void close_all_but(const std::vector<int>& kept) noexcept;
 
 }  // namespace tagwrench

@@ -1,4 +1,4 @@
-#include "host/core/os/spawn_daemon.h"
+#include "host/core/os/child_process.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
