@@ -4,25 +4,21 @@
 #include <cmath>
 
 namespace tagwrench {
-namespace {
 
-/// F' = R^T F; M' = R^T (M - o x F): the same load, its moment taken about o, along the axes of R.
-Matrix6 tool_transform(const Eigen::Vector3d& o, const Eigen::Matrix3d& camera_R_frame) {
-  Eigen::Matrix3d ox;
-  ox << 0, -o.z(), o.y(), o.z(), 0, -o.x(), -o.y(), o.x(), 0;
-  const Eigen::Matrix3d R = camera_R_frame.transpose();
+Matrix6 wrench_transform(const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
+  Eigen::Matrix3d px;
+  px << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
   Matrix6 m = Matrix6::Zero();
   m.topLeftCorner<3, 3>() = R;
   m.bottomRightCorner<3, 3>() = R;
-  m.bottomLeftCorner<3, 3>() = -R * ox;
+  m.bottomLeftCorner<3, 3>() = px * R;
   return m;
 }
 
-}  // namespace
-
 WrenchEstimator::WrenchEstimator(const WrenchModel& model)
     : model_(model),
-      tool_(tool_transform(model.wrench_origin, model.camera_R_wrench_frame)),
+      tool_(wrench_transform(model.camera_R_wrench_frame.transpose(),
+                             -model.camera_R_wrench_frame.transpose() * model.wrench_origin)),
       features_(model.features) {
   if (model.parameter_covariance.size() > 0) set_parameter_variances();
 }
@@ -106,6 +102,70 @@ Vector6 WrenchEstimator::noise(const Track& track) const noexcept {
   const Matrix6 tangent = tool_ * model_.K;
   const Matrix6 covariance = tangent * track.covariance * tangent.transpose();
   return covariance.diagonal().cwiseMax(0).cwiseSqrt();
+}
+
+Features::Features(const FeatureSpec& spec)
+    : spec_(spec),
+      values_(FeatureVector::Zero(feature_count(spec.kind))),
+      jacobian_(FeatureJacobian::Zero(feature_count(spec.kind), 6)) {
+  jacobian_.topRows<6>().setIdentity();
+}
+
+void Features::reset() noexcept {
+  memory_.setZero();
+  values_.setZero();
+}
+
+void Features::update(const Vector6& displacement, double dt) noexcept {
+  values_.head<6>() = displacement;
+  switch (spec_.kind) {
+    case FeatureKind::linear:
+      return;
+    case FeatureKind::quadratic: {
+      int row = 6;
+      for (int j = 0; j < 6; ++j) {
+        for (int k = j; k < 6; ++k, ++row) {
+          values_[row] = displacement[j] * displacement[k];
+          jacobian_.row(row).setZero();
+          jacobian_(row, j) += displacement[k];
+          jacobian_(row, k) += displacement[j];
+        }
+      }
+      return;
+    }
+    case FeatureKind::creep: {
+      // Exact for a displacement that is constant over dt.
+      const double gain = dt > 0 ? -std::expm1(-dt / spec_.time_constant) : 0.0;
+      memory_ += gain * (displacement - memory_);
+      values_.tail<6>() = memory_;
+      jacobian_.bottomRows<6>().diagonal().setConstant(gain);
+      return;
+    }
+    case FeatureKind::hysteresis: {
+      for (int j = 0; j < 6; ++j) {
+        const double before = memory_[j];
+        memory_[j] =
+            std::clamp(before, displacement[j] - spec_.play[j], displacement[j] + spec_.play[j]);
+        jacobian_(6 + j, j) = memory_[j] == before ? 0.0 : 1.0;
+      }
+      values_.tail<6>() = memory_;
+      return;
+    }
+  }
+}
+
+Matrix6 stiffness(const Springs& springs) {
+  Vector6 own;
+  own << springs.lateral, springs.lateral, springs.axial, springs.bending, springs.bending,
+      springs.torsion;
+  Matrix6 sum = Matrix6::Zero();
+  for (const Eigen::Vector3d& p : springs.centres) {
+    // The spring's wrench about its centre, moved to the origin; motions go the other way, by the
+    // transpose.
+    const Matrix6 move = wrench_transform(Eigen::Matrix3d::Identity(), p);
+    sum += move * own.asDiagonal() * move.transpose();
+  }
+  return sum;
 }
 
 }  // namespace tagwrench

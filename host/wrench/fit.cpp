@@ -3,30 +3,230 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
+#include "host/core/algebra/decompositions.h"
 #include "host/core/axis_names.h"
 #include "host/core/config_error.h"
-#include "host/wrench/fit_axes.h"
-#include "host/wrench/fit_consistency.h"
-#include "host/wrench/fit_errors.h"
-#include "host/wrench/fit_select.h"
+#include "host/wrench/fit_judge.h"
 
 namespace tagwrench {
 namespace {
 
-using fit::Judged;
-using fit::Problem;
+using namespace fit;
+
+// Which of the six axes a fit knows, and why not the others.
+
+constexpr double kReachedRatio = 0.25;  // standard deviation after over before
+constexpr double kReachedError = 0.10;  // of full load, in all six numbers together
+constexpr double kMissing = 0.02;       // singular value over the largest
+constexpr double kTakesFraction = 0.3;  // in a combination
+
+struct AxisKnowledge {
+  bool reached = false;   ///< the answer to a load along this axis is known
+  double coverage = 0;    ///< 1 - standard deviation after over before
+  double gain_sigma = 0;  ///< relative
+};
+
+/// Sum over the six answers to a motion d of their variances, in natural scales, is d^T A d.
+Matrix6 answer_variance(const Problem& problem, const Eigen::MatrixXd& covariance) {
+  Matrix6 A = Matrix6::Zero();
+  for (int k = 0; k < 6; ++k) {
+    for (int l = 0; l < 6; ++l) {
+      for (int i = 0; i < 6; ++i)
+        A(k, l) += covariance(6 * k + i, 6 * l + i) / (problem.scale[i] * problem.scale[i]);
+    }
+  }
+  return A;
+}
+
+/// How well the answers to loads along each axis are known. `K`: the fitted stiffness;
+/// `covariance`: of all unknowns.
+std::array<AxisKnowledge, 6> axis_knowledge(const Problem& problem, const Matrix6& K,
+                                            const Eigen::MatrixXd& covariance) {
+  // The motion that answers a load best: what it misses of the load, and what is not known of its
+  // answer, are least together. (K^-1 would also use motions that no load has ever made.)
+  const Vector6 per_scale = problem.scale.cwiseAbs2().cwiseInverse();
+  const Matrix6 A = answer_variance(problem, covariance);
+  const Matrix6 weighed = K.transpose() * per_scale.asDiagonal();
+  const Matrix6 unit = problem.motion_scale.asDiagonal();
+  const Ldlt<6> least(unit * (weighed * K + A) * unit + 1e-12 * Matrix6::Identity());
+  std::array<AxisKnowledge, 6> out;
+  for (int axis = 0; axis < 6; ++axis) {
+    const Vector6 load = problem.scale[axis] * Vector6::Unit(axis);
+    const Vector6 motion = unit * least.solve(unit * (weighed * load));
+    const double missed = (K * motion - load).cwiseQuotient(problem.scale).squaredNorm();
+    const double after = motion.dot(A * motion);
+    const double before =
+        per_scale.dot(problem.prior_sigma.leftCols<6>().cwiseAbs2() * motion.cwiseAbs2());
+    const double error = std::sqrt(missed + after);
+    const double ratio = before > 0 ? std::min(1.0, std::sqrt(after / before)) : 1;
+    double own = 0;
+    for (int k = 0; k < 6; ++k) {
+      for (int l = 0; l < 6; ++l)
+        own += motion[k] * motion[l] * covariance(6 * k + axis, 6 * l + axis);
+    }
+    out[static_cast<std::size_t>(axis)] = {
+        .reached = error <= kReachedError && (ratio <= kReachedRatio || !problem.has_prior),
+        .coverage = missed > kReachedError ? 0 : 1 - ratio,
+        .gain_sigma = std::sqrt(missed + std::max(0.0, own) * per_scale[axis])};
+  }
+  return out;
+}
+
+/// Combinations of axes along which no load acted, each a unit vector in natural scales. `weight`:
+/// of blocks.
+std::vector<Vector6> missing_loads(const Problem& problem, const std::vector<double>& weight) {
+  Matrix6 moment = Matrix6::Zero();
+  for (const Row& row : problem.rows) {
+    if (weight[static_cast<std::size_t>(row.block)] == 0) continue;
+    const Vector6 load = row.wrench.cwiseQuotient(problem.scale);
+    moment += load * load.transpose();
+  }
+  const Eigen::JacobiSVD<Matrix6> svd(moment, Eigen::ComputeFullV);
+  std::vector<Vector6> out;
+  for (int i = 0; i < 6; ++i) {
+    if (svd.singularValues()[i] < kMissing * kMissing * svd.singularValues()[0])
+      out.push_back(svd.matrixV().col(i));
+  }
+  return out;
+}
+
+/// "Fx and My": the axes that take part in a combination.
+std::string axes_of(const Vector6& combination) {
+  std::vector<std::string> names;
+  for (int i = 0; i < 6; ++i) {
+    if (std::abs(combination[i]) > kTakesFraction) names.emplace_back(wrench_axis(i));
+  }
+  return fmt::format("{}", fmt::join(names, " and "));
+}
+
+/// "Mz"; "Fx and My apart from each other".
+std::string missing_name(const Vector6& combination) {
+  const bool one = (combination.array().abs() > kTakesFraction).count() == 1;
+  return axes_of(combination) + (one ? "" : " apart from each other");
+}
+
+/// "no torque about z was applied".
+std::string missing_reason(int axis, const std::vector<Vector6>& missing, double gain_sigma) {
+  double alone = 0;  // squared share of the axis in all that is missing
+  Vector6 most = Vector6::Zero();
+  for (const Vector6& combination : missing) {
+    alone += combination[axis] * combination[axis];
+    if (std::abs(combination[axis]) > std::abs(most[axis])) most = combination;
+  }
+  if (alone > 0.9) {
+    return fmt::format("no {} {} was applied", axis < 3 ? "force along" : "torque about",
+                       "xyz"[axis % 3]);
+  }
+  if (std::abs(most[axis]) > kTakesFraction) return axes_of(most) + " were only applied together";
+  if (!(gain_sigma > 0)) return "the platform did not yield to the loads along it";
+  return fmt::format(
+      "the loads along it were too few, too small or too uncertain to tell it better than to "
+      "{:.0f} %",
+      std::max(1.0, 100 * gain_sigma));
+}
+
+// Models richer than the linear one, and whether held-out data want them.
+
+// A model is adopted when what it wins is this many standard errors, and worth having. Two rather
+// than one, as the best of a dozen candidates is looked for.
+constexpr double kSure = 2;
+constexpr double kWorthwhile = 0.05;  // of the held-out squared residual
+constexpr double kFelt = 0.001;       // of full load, held-out RMS of the axis that wins most
+
+std::vector<FeatureSpec> candidates(const Problem& problem, const Judged& linear,
+                                    std::span<const PathPoint> path) {
+  std::vector<FeatureSpec> out;
+  // How a load bends what no load has moved cannot be told.
+  if (missing_loads(problem, linear.weighting.block).empty())
+    out.push_back({.kind = FeatureKind::quadratic});
+  if (path.size() < 2) return out;
+  const double length = path.back().time - path.front().time;
+  for (double tau = 1; tau <= 512 && tau <= length / 2; tau *= 2)
+    out.push_back({.kind = FeatureKind::creep, .time_constant = tau});
+  for (const double width : {0.02, 0.05, 0.1, 0.2})
+    out.push_back({.kind = FeatureKind::hysteresis, .play = width * problem.motion_scale / 2});
+  return out;
+}
+
+/// Mean over each block that counts, weighed as the linear model's residuals are.
+std::vector<double> block_scores(const Problem& problem, const Judged& linear,
+                                 const std::vector<Vector6>& errors) {
+  std::vector<double> out;
+  for (std::size_t b = 0; b < linear.held_out.size(); ++b) {
+    if (linear.weighting.block[b] == 0) continue;
+    double sum = 0;
+    for (const Prediction& p : linear.held_out[b])
+      sum += chi2_of(problem, p, linear.weighting.error, errors[p.row]);
+    out.push_back(sum / static_cast<double>(linear.held_out[b].size()));
+  }
+  return out;
+}
+
+/// RMS of what is held out and counts, of full load.
+Vector6 held_out_rms(const Problem& problem, const Judged& linear,
+                     const std::vector<Vector6>& errors) {
+  Vector6 squares = Vector6::Zero();
+  double n = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (linear.weighting.block[static_cast<std::size_t>(problem.rows[i].block)] == 0) continue;
+    squares += errors[i].cwiseQuotient(problem.scale).cwiseAbs2();
+    n += 1;
+  }
+  return (squares / n).cwiseSqrt();
+}
+
+/// All that were tried against `linear`; at most one is adopted.
+std::vector<ModelTrial> try_richer(const Problem& problem, const Judged& linear,
+                                   std::span<const Observation> observations,
+                                   std::span<const PathPoint> path) {
+  const std::vector<Vector6> linear_errors = hold_out_errors(problem, linear.solution);
+  const std::vector<double> reference = block_scores(problem, linear, linear_errors);
+  const auto blocks = static_cast<double>(reference.size());
+  const double total = std::accumulate(reference.begin(), reference.end(), 0.0);
+  std::vector<ModelTrial> out;
+  if (blocks < 3 || total == 0) return out;
+  std::size_t best = 0;
+  bool felt = false;
+  double best_score = std::numeric_limits<double>::infinity();
+  for (const FeatureSpec& features : candidates(problem, linear, path)) {
+    const Problem other = with_features(problem, observations, path, features);
+    const Solution solution = solve(other, linear.weighting, {});
+    const std::vector<Vector6> errors = hold_out_errors(other, solution);
+    const std::vector<double> scores = block_scores(problem, linear, errors);
+    const double sum = std::accumulate(scores.begin(), scores.end(), 0.0);
+    const double mean_won = (total - sum) / blocks;
+    double scatter = 0;
+    for (std::size_t b = 0; b < scores.size(); ++b)
+      scatter += std::pow(reference[b] - scores[b] - mean_won, 2);
+    ModelTrial trial{.features = features,
+                     .score = sum / total,
+                     .score_sigma = std::sqrt(scatter / (blocks - 1) * blocks) / total};
+    if (trial.score < best_score) {
+      best_score = trial.score;
+      best = out.size();
+      felt = (held_out_rms(problem, linear, linear_errors) - held_out_rms(problem, linear, errors))
+                 .maxCoeff() > kFelt;
+    }
+    out.push_back(trial);
+  }
+  if (out.empty()) return out;
+  ModelTrial& winner = out[best];
+  winner.adopted = felt && 1 - winner.score > std::max(kSure * winner.score_sigma, kWorthwhile);
+  return out;
+}
+
+// What people are told of a fit.
 
 constexpr double kUnloaded = 0.5;  // share of an axis in the loads that are missing
 constexpr double kInside95 = 1.96;
 constexpr double kGrossError = 0.2;    // of full load: the model's own
 constexpr double kFalseAlarms = 1e-3;  // healthy calibrations in which some common error is told of
-
-Matrix6 stiffness_of(const Eigen::VectorXd& unknowns) {
-  return Eigen::Map<const Matrix6>(unknowns.data());
-}
 
 /// Assumes reciprocity, in the units of the springs' stiffness or, without springs, of the one that
 /// the data give by themselves.
@@ -36,12 +236,10 @@ void assume_reciprocity(Problem& problem, const FitOptions& options) {
   if (options.prior) {
     stiffness = *options.prior;
   } else {
-    const fit::Weighting equal{.error = {},
-                               .block = std::vector<double>(problem.blocks.size(), 1.0)};
-    stiffness = stiffness_of(fit::solve(problem, equal, {}).unknowns);
+    stiffness = solve(problem, equal_weights(problem, {}), {}).stiffness();
     if ((stiffness.diagonal().array() <= 0).any()) return;
   }
-  problem.reciprocity = fit::prior_sigma_of(stiffness, options.reciprocity);
+  problem.reciprocity = prior_sigma_of(stiffness, options.reciprocity);
 }
 
 /// Of the offset that the sensor will be used with.
@@ -64,7 +262,7 @@ WrenchModel model_of(const Problem& problem, const Judged& judged, int zero) {
   const Eigen::VectorXd& x = judged.solution.unknowns;
   const Eigen::MatrixXd& C = judged.solution.covariance;
   const int offset = problem.zero_at(zero);
-  model.K = stiffness_of(x);
+  model.K = judged.solution.stiffness();
   model.features = problem.features;
   model.extra = Eigen::Map<const Eigen::MatrixXd>(x.data() + 36, 6, columns - 6);
   model.B = x.segment<6>(offset);
@@ -84,8 +282,8 @@ void set_held_out(const Problem& problem, const Judged& judged, WrenchFit& out) 
   double n = 0;
   for (std::size_t b = 0; b < judged.held_out.size(); ++b) {
     if (judged.weighting.block[b] == 0) continue;
-    for (const fit::Prediction& p : judged.held_out[b]) {
-      const fit::Row& row = problem.rows[p.row];
+    for (const Prediction& p : judged.held_out[b]) {
+      const Row& row = problem.rows[p.row];
       const Vector6 variance = p.covariance.diagonal() + judged.weighting.error.variance(row.load);
       out.held_out.push_back({p.row, row.wrench - p.error, variance.cwiseSqrt()});
       squares += p.error.cwiseAbs2();
@@ -110,9 +308,9 @@ void set_held_out(const Problem& problem, const Judged& judged, WrenchFit& out) 
 
 /// Load shown over load applied: of forces, as torques also tell where they act; of torques where
 /// there is no force.
-double load_ratio(const Problem& problem, const std::vector<fit::Prediction>& block) {
+double load_ratio(const Problem& problem, const std::vector<Prediction>& block) {
   Vector6 shown = Vector6::Zero(), applied = Vector6::Zero();
-  for (const fit::Prediction& p : block) {
+  for (const Prediction& p : block) {
     const Vector6 wrench = problem.rows[p.row].wrench.cwiseQuotient(problem.scale);
     const Vector6 error = p.error.cwiseQuotient(problem.scale);
     shown += wrench.cwiseProduct(wrench - error);
@@ -146,7 +344,7 @@ std::string remark_on(const BlockFit& block) {
 
 void set_blocks(const Problem& problem, const Judged& judged, WrenchFit& out) {
   for (std::size_t b = 0; b < problem.blocks.size(); ++b) {
-    const fit::Block& block = problem.blocks[b];
+    const Block& block = problem.blocks[b];
     BlockFit fitted{.step = block.step,
                     .from = block.from,
                     .to = block.to,
@@ -168,13 +366,13 @@ void set_blocks(const Problem& problem, const Judged& judged, WrenchFit& out) {
 }
 
 void set_axes(const Problem& problem, const Judged& judged, WrenchFit& out) {
-  const auto missing = fit::missing_loads(problem, judged.weighting.block);
-  for (const Vector6& combination : missing) out.missing.push_back(fit::missing_name(combination));
-  const auto known = fit::axis_knowledge(problem, out.model.K, judged.solution.covariance);
+  const auto missing = missing_loads(problem, judged.weighting.block);
+  for (const Vector6& combination : missing) out.missing.push_back(missing_name(combination));
+  const auto known = axis_knowledge(problem, out.model.K, judged.solution.covariance);
   for (std::size_t i = 0; i < 6; ++i) {
     AxisFit& axis = out.axis[i];
     const auto row = static_cast<int>(i);
-    for (const fit::Row& r : problem.rows) {
+    for (const Row& r : problem.rows) {
       if (judged.weighting.block[static_cast<std::size_t>(r.block)] > 0)
         axis.largest = std::max(axis.largest, std::abs(r.wrench[row]));
     }
@@ -191,7 +389,7 @@ void set_axes(const Problem& problem, const Judged& judged, WrenchFit& out) {
       out.model.range[row] = axis.largest;
     } else {
       axis.state = problem.has_prior ? AxisState::spring_model : AxisState::not_determined;
-      axis.reason = fit::missing_reason(row, missing, axis.gain_sigma);
+      axis.reason = missing_reason(row, missing, axis.gain_sigma);
     }
   }
 }
@@ -253,22 +451,22 @@ void require_all(const WrenchFit& fitted) {
 
 WrenchFit fit_wrench(std::span<const Observation> observations, std::span<const PathPoint> path,
                      const FitOptions& options) {
-  Problem problem = fit::make_problem(observations, path, {}, options.prior, options.prior_width);
+  Problem problem = make_problem(observations, path, {}, options.prior, options.prior_width);
   assume_reciprocity(problem, options);
   WrenchFit out;
-  const fit::Explanation explanation = fit::explain(problem);
-  Judged judged = fit::judge_explained(problem, explanation, out.warnings);
+  const Explanation explanation = explain(problem);
+  Judged judged = judge_explained(problem, explanation, out.warnings);
   if (!explanation.found) {
     out.warnings.push_back(
         "the steps contradict each other, and no few of them explain it: the errors below are what "
         "they disagree by; check masses, points and directions of the plan");
   }
   if (options.try_richer) {
-    out.trials = fit::try_richer(problem, judged, observations, path);
+    out.trials = try_richer(problem, judged, observations, path);
     for (const ModelTrial& trial : out.trials) {
       if (!trial.adopted) continue;
-      problem = fit::with_features(problem, observations, path, trial.features);
-      judged = fit::judge(problem, explanation.left_out);
+      problem = with_features(problem, observations, path, trial.features);
+      judged = judge(problem, explanation.left_out);
       break;
     }
   }
@@ -288,13 +486,11 @@ Vector6 coverage(std::span<const Observation> observations, const Matrix6& stiff
                    [](const Observation& o) { return o.wrench.squaredNorm() > 0; })) {
     return Vector6::Zero();
   }
-  const Problem problem = fit::make_problem(observations, {}, {}, stiffness, prior_width);
-  constexpr double kModelError =
-      0.005;  // of the load: no answer is better than a small model error
-  const fit::Weighting weighting{.error = {Vector6::Zero(), kModelError * problem.scale},
-                                 .block = std::vector<double>(problem.blocks.size(), 1.0)};
-  const auto known =
-      fit::axis_knowledge(problem, stiffness, fit::solve(problem, weighting, {}).covariance);
+  const Problem problem = make_problem(observations, {}, {}, stiffness, prior_width);
+  constexpr double kModelError = 0.005;  // of the load: no answer is better than a small one
+  const Weighting weighting =
+      equal_weights(problem, {Vector6::Zero(), kModelError * problem.scale});
+  const auto known = axis_knowledge(problem, stiffness, solve(problem, weighting, {}).covariance);
   Vector6 out;
   for (int i = 0; i < 6; ++i) out[i] = known[static_cast<std::size_t>(i)].coverage;
   return out;

@@ -1,12 +1,80 @@
-// The weighted least squares of a fit, and the same without one block. Internal to the fit.
+// A fit's data put in order (blocks, unknowns, natural scales, features), its weighted least
+// squares, and the same without one block. Internal to the fit.
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
+#include <utility>
 #include <vector>
 
-#include "host/wrench/fit_problem.h"
+#include "host/wrench/fit.h"
 
 namespace tagwrench::fit {
+
+/// What is held out together.
+struct Block {
+  int step = 0;
+  double from = 0, to = 0;
+  std::vector<std::size_t> members;
+  bool is_long = false;  ///< part of a push or a movement: its residuals hang together in time
+};
+
+/// An observation whose numbers are ready for the normal equations.
+struct Row {
+  Vector6 displacement, wrench;
+  Matrix6 displacement_covariance, wrench_covariance;
+  FeatureVector phi;
+  FeatureJacobian jacobian;
+  int zero = 0;                                 ///< 0, 1, ...
+  int block = 0;                                ///< into Problem::blocks
+  std::vector<std::pair<int, Vector6>> common;  ///< index and effect
+  double load = 0;                              ///< squared, of the natural scales
+  struct Product {
+    int first = 0, second = 0;
+    Vector6 effect;
+  };
+  std::vector<Product> products;
+  /// Where the products of common errors are not told: variances that stand for them, what is
+  /// common times its relative size.
+  Vector6 second_order = Vector6::Zero();
+};
+
+/// Unknowns, in this order: M column by column (6 x features), an offset for each zero (6 each),
+/// the common errors in their prior standard deviations.
+struct Problem {
+  FeatureSpec features;
+  std::vector<Row> rows;
+  std::vector<Block> blocks;
+  std::vector<int> zeros;                 ///< Observation::zero of each
+  std::vector<std::string> common_names;  ///< of each
+  Vector6 scale;                          ///< of wrenches: largest force and torque, N, N m
+  Vector6 motion_scale;                   ///< of displacements: largest of each, m, rad
+  bool has_prior = false;
+  Matrix6 reciprocity = Matrix6::Zero();  ///< standard deviation of K_ij - K_ji; 0: not assumed
+  Eigen::MatrixXd prior_mean;             ///< 6 x features
+  Eigen::MatrixXd prior_sigma;            ///< 6 x features
+
+  int feature_columns() const { return static_cast<int>(prior_mean.cols()); }
+  int zero_at(int zero) const { return 6 * (feature_columns() + zero); }
+  int common_at(int common) const {
+    return 6 * (feature_columns() + static_cast<int>(zeros.size())) + common;
+  }
+  int unknowns() const { return common_at(static_cast<int>(common_names.size())); }
+};
+
+/// Throws ConfigError for numbers that cannot be fitted.
+Problem make_problem(std::span<const Observation> observations, std::span<const PathPoint> path,
+                     const FeatureSpec& features, const std::optional<Matrix6>& prior,
+                     double prior_width);
+
+/// The same data with other features.
+Problem with_features(const Problem& problem, std::span<const Observation> observations,
+                      std::span<const PathPoint> path, const FeatureSpec& features);
+
+/// Standard deviation of each entry of a stiffness: `width` times the geometric mean of the
+/// stiffnesses of its two axes, the natural unit of an entry (|K_ij| <= sqrt(K_ii K_jj) in any
+/// stable spring).
+Matrix6 prior_sigma_of(const Matrix6& stiffness, double width);
 
 inline constexpr double kConstantFraction = 0.1;  ///< of the model's error, without load
 
@@ -27,6 +95,8 @@ struct Weighting {
                               ///< frames would
 };
 
+Weighting equal_weights(const Problem& problem, const ErrorModel& error);
+
 struct Normal {
   Eigen::MatrixXd information;
   Eigen::VectorXd right;
@@ -37,6 +107,8 @@ struct Solution {
   Eigen::MatrixXd covariance;
   Normal total;                ///< the prior included
   std::vector<Normal> blocks;  ///< what each adds
+
+  Matrix6 stiffness() const { return Eigen::Map<const Matrix6>(unknowns.data()); }
 };
 
 /// Wrench minus what the model says, with the common errors as estimated.

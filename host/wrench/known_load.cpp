@@ -1,7 +1,7 @@
-#include "host/wrench/known_load.h"
-
 #include <Eigen/Geometry>
 #include <array>
+
+#include "host/wrench/fit.h"
 
 namespace tagwrench {
 namespace {

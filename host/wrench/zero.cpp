@@ -1,6 +1,9 @@
 #include "host/wrench/zero.h"
 
+#include <array>
 #include <cmath>
+
+#include "host/wrench/estimate.h"
 
 namespace tagwrench {
 namespace {
@@ -84,10 +87,9 @@ ZeroState ZeroTracking::judge(const Sample& sample, const Vector6& noise) noexce
 void ZeroTracking::answer(const Sample& sample) noexcept {
   const bool just_asked = !asked_at_;
   if (just_asked) asked_at_ = sample.capture_time;
-  const bool range_known = range_.maxCoeff() > 0;
   const bool at_rest =
       sample.zero_state == ZeroState::following || sample.zero_state == ZeroState::far;
-  if (!range_known) {
+  if (!(range_.maxCoeff() > 0)) {
     answer_ = ZeroAnswer::no_range;
   } else if (at_rest && within(reading(), asked_ ? options_.reach : options_.band)) {
     if (asked_) {
@@ -148,10 +150,18 @@ Vector6 range_through(const Matrix6& tool, const Vector6& range) {
 }
 
 Vector6 range_along(const Eigen::Matrix3d& turn, const Vector6& range) {
-  Matrix6 both = Matrix6::Zero();
-  both.topLeftCorner<3, 3>() = turn;
-  both.bottomRightCorner<3, 3>() = turn;
-  return range_through(both, range);
+  return range_through(wrench_transform(turn, Eigen::Vector3d::Zero()), range);
+}
+
+std::string_view zero_text(ZeroAnswer answer) noexcept {
+  constexpr std::array<std::string_view, 6> kTexts{
+      "",
+      "zero: waits until the platform rests; hands off",
+      "zero: what read is nothing now",
+      "zero: refused, something presses on the platform; take it off, or run `tagwrench zero`",
+      "zero: refused, the platform did not come to rest; let go of it",
+      "zero: refused, the sensor's range is not known; give wrench.range_n in sensor.yaml"};
+  return kTexts[static_cast<std::size_t>(answer)];
 }
 
 }  // namespace tagwrench

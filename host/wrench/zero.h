@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "host/core/types.h"
@@ -77,6 +78,9 @@ enum class ZeroAnswer : std::uint8_t {
   moving,    ///< it did not come to rest: somebody holds it
   no_range,  ///< without a range nobody knows what is still and what is a load
 };
+
+/// In words; empty for none.
+std::string_view zero_text(ZeroAnswer answer) noexcept;
 
 /// Ranges of a sensor whose range nobody has told are larger than this, N and N m.
 inline constexpr double kUnknownRange = 1e8;

@@ -1,11 +1,11 @@
 #include "host/calibration/wrench/guide.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "host/calibration/wrench/load.h"
 #include "host/calibration/wrench/reference.h"
 
 namespace tagwrench {
@@ -16,11 +16,48 @@ using Line = GuideLine::Kind;
 constexpr double kOtherClock = 1.0;  // s between what a reading says and when it came
 constexpr double kKeep = 3.0;        // s of readings
 constexpr double kWellCovered = 0.95;
+constexpr const char* kSilent = "nothing comes from the reference; look at its plug and its power";
 constexpr double kTouch = 0.1;    // of a push's force: it has begun
 constexpr double kFree = 0.05;    // of it: nobody pushes
 constexpr double kBegun = 0.05;   // of the range: a movement has begun
 constexpr double kExcited = 0.1;  // of the range, standard deviation over a movement
 constexpr double kMax = 1.5;      // times its seconds: a movement ends, whatever it has shown
+
+constexpr double kMoved = 0.02;  // of the range: more than this is somebody's doing
+constexpr double kBump = 0.01;   // of the range: a rest may differ by so much from the one before
+constexpr int kMaxBumps = 6;     // unattended
+constexpr double kOwnWeight = 0.03;  // of the range: less does not tell how the sensor lies
+constexpr double kTimeToAct = 8.0;   // s that a person has before it is said, or taken as done
+// All loads count from the rests: what is steady must have become so before the second that is
+// taken began, else the last of a push or of a swing is in it.
+constexpr double kSettled = 0.5;  // s
+
+/// Part of `felt` along `expected`, and the cosine between them.
+struct Likeness {
+  double ratio = 0;
+  double cosine = 0;
+};
+Likeness likeness(const Vector6& felt, const Vector6& expected) {
+  const double dot = felt.dot(expected);
+  const double norms = felt.norm() * expected.norm();
+  return {dot / expected.squaredNorm(), norms > 0 ? dot / norms : 0};
+}
+
+std::string axes_text(const Vector6& scaled) {
+  std::string out;
+  for (int i = 0; i < 6; ++i) {
+    if (std::abs(scaled[i]) > 0.3 * scaled.cwiseAbs().maxCoeff())
+      out +=
+          fmt::format("{}{} {:+.0f} %", out.empty() ? "" : ", ", wrench_axis(i), 100 * scaled[i]);
+  }
+  return out;
+}
+
+std::string worst_text(const Vector6& scaled) {
+  int axis = 0;
+  const double worst = scaled.cwiseAbs().maxCoeff(&axis);
+  return fmt::format("{:.1f} % of full load in {}", 100 * worst, wrench_axis(axis));
+}
 
 }  // namespace
 
@@ -31,10 +68,6 @@ WrenchGuide::WrenchGuide(const WrenchPlan& plan, const GuideOptions& options)
       coverage_(options.range) {
   for (std::size_t i = 0; i < plan.steps.size(); ++i) todo_.push_back(static_cast<int>(i));
   ask();
-}
-
-void WrenchGuide::say(GuideLine::Kind kind, std::string text) {
-  lines_.push_back({kind, std::move(text)});
 }
 
 bool WrenchGuide::next(GuideLine& line) {
@@ -101,10 +134,6 @@ void WrenchGuide::put_before(double time) {
   }
 }
 
-void WrenchGuide::complain_of_silence() {
-  complain("nothing comes from the reference; look at its plug and its power", false);
-}
-
 void WrenchGuide::frame(double time, const Track& track) {
   if (resumed_) put_before(time);
   resumed_ = false;
@@ -122,18 +151,12 @@ void WrenchGuide::frame(double time, const Track& track) {
   }
   hold_.add({time, track.displacement, track.covariance});
   if (!asked_at_) asked_at_ = track.displacement;
-  switch (step().kind) {
-    case StepKind::rest:
-    case StepKind::mass:
-      watch_hold();
-      break;
-    case StepKind::push:
-      watch_push(time);
-      break;
-    case StepKind::six_axis:
-      watch_movement(time);
-      break;
-  }
+  if (step().kind == StepKind::push)
+    watch_push(time);
+  else if (step().kind == StepKind::six_axis)
+    watch_movement(time);
+  else
+    watch_hold();
   if (!done()) watch_patience(time);
 }
 
@@ -165,7 +188,7 @@ const StepRecord* WrenchGuide::rest_of_reference(double time) {
   }
   if (last_reading_ && time - last_reading_->time <= kMaxSilence) return rest;
   phase_ = Phase::waiting;
-  complain_of_silence();
+  complain(kSilent, false);
   return nullptr;
 }
 
@@ -203,9 +226,7 @@ void WrenchGuide::watch_movement(double time) {
     finish_taking();
     return;
   }
-  complain(fmt::format("go on, and more of {}: it was hardly moved",
-                       kWrenchAxes[static_cast<std::size_t>(weakest)]),
-           false);
+  complain(fmt::format("go on, and more of {}: it was hardly moved", wrench_axis(weakest)), false);
 }
 
 void WrenchGuide::begin_taking(double time) {
@@ -220,17 +241,13 @@ void WrenchGuide::begin_taking(double time) {
 void WrenchGuide::finish_taking() {
   const ReferenceFinding found =
       check_reference(plan_, taking_, *last_rest(), options_.stiffness, options_.range);
-  switch (found.verdict) {
-    case ReferenceFinding::Verdict::fine:
-      accept(std::move(taking_));
-      break;
-    case ReferenceFinding::Verdict::again:
-      again(found.text);
-      break;
-    case ReferenceFinding::Verdict::hopeless:
-      failure_ = found.text;
-      break;
-  }
+  using Verdict = ReferenceFinding::Verdict;
+  if (found.verdict == Verdict::fine)
+    accept(std::move(taking_));
+  else if (found.verdict == Verdict::again)
+    again(found.text);
+  else
+    failure_ = found.text;
 }
 
 // ---- Going on ----
@@ -312,14 +329,10 @@ void WrenchGuide::resume(std::vector<StepRecord> records, const std::vector<int>
   std::erase_if(records_, [](const StepRecord& record) { return record.frames.empty(); });
   skipped_ = skipped;
   resumed_ = true;
-  std::deque<int> left;
-  for (const int s : todo_) {
-    const bool recorded = std::any_of(records_.begin(), records_.end(),
-                                      [s](const StepRecord& r) { return r.step == s; });
-    if (!recorded && std::find(skipped.begin(), skipped.end(), s) == skipped.end())
-      left.push_back(s);
-  }
-  todo_ = left;
+  std::erase_if(todo_, [&](int s) {
+    return std::ranges::find(records_, s, &StepRecord::step) != records_.end() ||
+           std::ranges::find(skipped, s) != skipped.end();
+  });
   for (const StepRecord& record : records_) zeros_ = std::max(zeros_, record.zero + 1);
   // The sensor may have been moved meanwhile: a rest shows it before anything else is loaded.
   const bool rest_again = !todo_.empty() && !records_.empty() && step().kind != StepKind::rest &&
@@ -341,6 +354,204 @@ void WrenchGuide::watch_patience(double time) {
   else
     say(Line::note,
         fmt::format("waiting: {} ({})", waiting_for(), instruction(plan_, todo_.front(), false)));
+}
+
+// What the guide says about how far it is.
+
+std::string coverage_bar(const WrenchCoverage& coverage) {
+  constexpr int kLength = 5;
+  const Vector6 covered = coverage.covered();
+  std::string out;
+  for (int i = 0; i < 6; ++i) {
+    const int full = std::clamp(static_cast<int>(kLength * covered[i] + 0.5), 0, kLength);
+    out += fmt::format("{}{} {}{}", i == 0 ? "" : " ", wrench_axis(i),
+                       std::string(static_cast<std::size_t>(full), '#'),
+                       std::string(static_cast<std::size_t>(kLength - full), '.'));
+  }
+  return out;
+}
+
+/// What the plan would leave open if nothing else were skipped.
+std::string WrenchGuide::still_missing() const {
+  WrenchCoverage all = coverage_;
+  for (const int s : todo_) all.add_expected(plan_, s);
+  return fmt::format("{}", fmt::join(all.missing(), "; "));
+}
+
+std::string WrenchGuide::most_useful() const {
+  const auto gain = [&](int s) { return coverage_.gain(expected_load(plan_, s)); };
+  const auto which = std::ranges::max_element(todo_, {}, gain);
+  if (which == todo_.end() || !(gain(*which) > 0)) return "";
+  return fmt::format("; of the steps left, {} tells most ({:.0f} % of what is open)",
+                     describe(plan_, *which), 100 * gain(*which));
+}
+
+std::string WrenchGuide::waiting_for() const {
+  if (hold_.frames().empty()) return "the tags are not seen";
+  const Hold hold = hold_.look();
+  const bool of_hold = step().kind == StepKind::rest || step().kind == StepKind::mass;
+  if (!of_hold) {
+    if (phase_ == Phase::taking)
+      return fmt::format("{:.0f} s of {:.0f} s", now_ - begun_, step().seconds);
+    return step().kind == StepKind::push && !let_go_ ? "take the cell off first"
+                                                     : "begin when you are ready";
+  }
+  if (!complaint_.empty()) return complaint_;
+  if (hold.unrest > 1)
+    return fmt::format("not steady yet: {:.1f} times too much in {}", hold.unrest,
+                       wrench_axis(hold.worst));
+  if (!hold.full) return fmt::format("steady for {:.1f} s", hold.to - hold.from);
+  return step().kind == StepKind::rest ? "nothing has moved yet" : "nothing hangs there yet";
+}
+
+std::string WrenchGuide::live() const {
+  if (done()) return "done";
+  return fmt::format("step {}/{}: {}  {}", todo_.front() + 1, plan_.steps.size(), waiting_for(),
+                     coverage_bar(coverage_));
+}
+
+// The guide at rests and masses: what is steady, and whether it is what the step asks for.
+
+/// Whether anything has happened to the platform since it was asked for.
+bool WrenchGuide::has_moved(const Hold& hold) {
+  const Vector6 way = hold_.scaled(hold_.frames().back().displacement - *asked_at_);
+  moved_ = moved_ || way.cwiseAbs().maxCoeff() > kMoved || hold.unrest > 3;
+  return moved_ || (repeated_ && now_ - *asked_time_ > kTimeToAct);  // it may be right as it hangs
+}
+
+void WrenchGuide::watch_hold() {
+  const Hold hold = hold_.look();
+  const bool of_cell = plan_.reference != ReferenceKind::masses;
+  if (of_cell && !(last_reading_ && now_ - last_reading_->time < kMaxSilence)) {
+    if (now_ - *asked_time_ > 2 * kMaxSilence) complain(kSilent, false);
+    return;
+  }
+  const bool had_moved = moved_;
+  const bool moved = has_moved(hold);
+  if (moved_ && !had_moved) {  // what was steady until now is what was asked for before
+    hold_.clear();
+    steady_since_.reset();
+    return;
+  }
+  if (!hold.steady) {
+    steady_since_.reset();
+    return;
+  }
+  if (!steady_since_) steady_since_ = now_;
+  if (step().kind == StepKind::mass) {
+    if (moved) watch_mass(hold);
+    return;
+  }
+  // The first rest of a mounting comes after the sensor was turned, but for the very first one.
+  const bool settled = now_ - *steady_since_ >= kSettled;
+  if (settled && (last_rest() != nullptr || moved || asks_ == 1)) watch_rest(hold);
+}
+
+void WrenchGuide::watch_rest(const Hold& hold) {
+  const StepRecord* before = last_rest();
+  if (before == nullptr) {
+    if (check_mounting(hold)) accept_hold();
+    return;
+  }
+  const Vector6 by = hold_.scaled(hold.mean - mean_of(*before).displacement);
+  const StepRecord& latest = records_.back();
+  if (step_of(latest).kind == StepKind::mass) {
+    const KnownLoad load = expected_load(plan_, latest.step);
+    const Likeness mass = likeness(by, load.wrench.cwiseQuotient(options_.range));
+    if (mass.cosine > 0.8 && mass.ratio > 0.3) {
+      if (now_ - *asked_time_ < kTimeToAct) return;
+      complain("the weight still hangs there; take it off", false);
+      return;
+    }
+  }
+  if (by.cwiseAbs().maxCoeff() > kBump)
+    take_again_from_rest(by);
+  else
+    accept_hold();
+}
+
+/// The platform's own weight tells how the sensor lies, once it is turned from how it lay first.
+bool WrenchGuide::check_mounting(const Hold& hold) {
+  if (records_.empty() || step_of(records_.front()).kind != StepKind::rest) return true;
+  const auto gravity = [&](const PlanStep& s) { return plan_.mounting_of(s).gravity; };
+  Vector6 expected = Vector6::Zero();
+  expected.head<3>() = (gravity(step()) - gravity(step_of(records_.front())))
+                           .cwiseQuotient(options_.range.head<3>());
+  Vector6 felt = hold_.scaled(hold.mean - mean_of(records_.front()).displacement);
+  felt.tail<3>().setZero();
+  if (expected.norm() < 1e-6 || felt.norm() < kOwnWeight) return true;
+  if (likeness(felt, expected).cosine > 0.6) return true;
+  complain(fmt::format("the platform's own weight pulls elsewhere than in this mounting ({}): the "
+                       "sensor lies otherwise than the plan says",
+                       axes_text(felt)),
+           true);
+  return false;
+}
+
+void WrenchGuide::watch_mass(const Hold& hold) {
+  const StepRecord* rest = last_rest();
+  if (rest == nullptr) {
+    leave_out("there is no rest to count it from");
+    return;
+  }
+  const Vector6 felt = hold_.scaled(hold.mean - mean_of(*rest).displacement);
+  const Vector6 expected = expected_load(plan_, todo_.front()).wrench.cwiseQuotient(options_.range);
+  const Likeness load = likeness(felt, expected);
+  if (felt.norm() < 0.2 * expected.norm()) return;  // nothing hangs yet
+  if (load.cosine < -0.5) {
+    complain(
+        fmt::format("it pulls the opposite way ({}): gravity or the point of the plan is other "
+                    "than how it hangs",
+                    axes_text(felt)),
+        true);
+  } else if (load.cosine < 0.6) {
+    complain(fmt::format("it pulls elsewhere ({}) than the plan says ({}): gravity or the point of "
+                         "the plan is other than how it hangs",
+                         axes_text(felt), axes_text(expected)),
+             true);
+  } else if (load.ratio < 0.3 || load.ratio > 3) {
+    complain(fmt::format("it pulls as {:.0f} g would: is it the weight that the plan says?",
+                         1e3 * step().mass * load.ratio),
+             true);
+  } else {
+    accept_hold();
+  }
+}
+
+void WrenchGuide::accept_hold() {
+  StepRecord record{todo_.front(), 0, hold_.frames(), {}};
+  for (const ReferenceSample& sample : readings_) {
+    if (sample.time >= record.frames.front().time && sample.time <= record.frames.back().time)
+      record.readings.push_back(sample);
+  }
+  accept(std::move(record));
+}
+
+/// The rest is not where it was: what was measured since counts from nowhere.
+void WrenchGuide::take_again_from_rest(const Vector6& by) {
+  std::vector<int> lost;
+  const StepRecord* rest = last_rest();
+  while (&records_.back() != rest) {
+    lost.insert(lost.begin(), records_.back().step);
+    records_.pop_back();
+  }
+  std::string text =
+      fmt::format("the rest is {} from where it was: the sensor was bumped, or a tag has slipped",
+                  worst_text(by));
+  if (options_.attempts > 0 && ++bumps_ > kMaxBumps) {
+    failure_ = text + " again and again; fix it better";
+    return;
+  }
+  if (!lost.empty()) {
+    text += "; to be done again:";
+    for (const int s : lost)
+      text += fmt::format(" {}{}", describe(plan_, s), s == lost.back() ? "" : ",");
+    lost.push_back(todo_.front());
+    todo_.insert(todo_.begin() + 1, lost.begin(), lost.end());
+  }
+  say(Line::warning, text);
+  new_zero_ = true;
+  accept_hold();
 }
 
 }  // namespace tagwrench

@@ -2,7 +2,7 @@
 // In:  a plan (masses in kg, points in m of the platform frame), tracks, readings of references.
 // Out: observations (displacement m and rad, wrench N and N m, covariances) for wrench/fit.h, and
 //      what people are asked to do.
-// Then: plan.h, hold.h (when it is steady), load.h (what a step applies), record.h.
+// Then: plan.h, record.h (and when it is steady), load.h (what a step applies), observations.h.
 //
 // Leads through a plan: asks for step after step, looks at frames and readings, accepts what is
 // steady and as it should be, and says what is not. Pure: it has no clock, no descriptor and no
@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "host/calibration/wrench/coverage.h"
+#include "host/calibration/wrench/load.h"
 #include "host/calibration/wrench/plan.h"
 #include "host/calibration/wrench/record.h"
 #include "host/core/types.h"
@@ -76,15 +76,12 @@ class WrenchGuide {
  private:
   enum class Phase : std::uint8_t { waiting, taking };
 
-  const PlanStep& step() const { return plan_.steps[static_cast<std::size_t>(todo_.front())]; }
-  const PlanStep& step_of(const StepRecord& record) const {
-    return plan_.steps[static_cast<std::size_t>(record.step)];
-  }
-  void say(GuideLine::Kind kind, std::string text);
+  const PlanStep& step() const { return plan_.step(todo_.front()); }
+  const PlanStep& step_of(const StepRecord& record) const { return plan_.step(record.step); }
+  void say(GuideLine::Kind kind, std::string text) { lines_.push_back({kind, std::move(text)}); }
   void ask();
   void again(const std::string& why);
   void complain(const std::string& why, bool counts);
-  void complain_of_silence();
   void watch_hold();
   void watch_rest(const Hold& hold);
   void watch_mass(const Hold& hold);
@@ -97,7 +94,7 @@ class WrenchGuide {
   void watch_patience(double time);
   void accept_hold();
   void accept(StepRecord record);
-  void bumped(const Vector6& by);
+  void take_again_from_rest(const Vector6& by);
   void recount();
   void leave_out(const std::string& why);
   const StepRecord* last_rest() const;

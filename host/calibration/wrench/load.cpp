@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 
-#include "host/wrench/known_load.h"
+#include "host/core/algebra/decompositions.h"
+#include "host/core/count_text.h"
+#include "host/tracker/rotation.h"
 
 namespace tagwrench {
 namespace {
@@ -21,43 +24,44 @@ constexpr double kStringForce = 0.3e-3;  // N
 constexpr double kOriginSigma = 0.3e-3;  // m
 constexpr double kTurnSigma = 0.003;     // rad
 
-const PlanStep& at(const WrenchPlan& plan, int step) {
-  return plan.steps[static_cast<std::size_t>(step)];
-}
-
-const PlanPoint& point_of(const WrenchPlan& plan, const PlanStep& step) {
-  return plan.points[static_cast<std::size_t>(step.point)];
-}
-
-Eigen::Vector3d moved(const Eigen::Vector3d& point, const Vector6& displacement) {
-  const Eigen::Vector3d r = displacement.tail<3>();
-  const double angle = r.norm();
-  const Eigen::Vector3d turned = angle > 0 ? Eigen::AngleAxisd(angle, r / angle) * point : point;
-  return displacement.head<3>() + turned;
+Eigen::Vector3d moved_point(const Eigen::Vector3d& point, const Vector6& displacement) {
+  return displacement.head<3>() + rotation_from_vector(displacement.tail<3>()) * point;
 }
 
 Matrix6 to_platform(const WrenchPlan& plan) {
-  const Eigen::Matrix3d& R = plan.camera_R_reference;
-  const Eigen::Vector3d& p = plan.reference_origin;
-  Eigen::Matrix3d arm;
-  arm << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
-  Matrix6 move = Matrix6::Zero();
-  move.topLeftCorner<3, 3>() = R;
-  move.bottomRightCorner<3, 3>() = R;
-  move.bottomLeftCorner<3, 3>() = arm * R;
-  return plan.reference_sign * move;
+  return plan.reference_sign * wrench_transform(plan.camera_R_reference, plan.reference_origin);
+}
+
+constexpr double kMinSigma = 0.003;  // of range: more than a good weight promises
+constexpr std::array<const char*, 6> kActs{"pushes along x", "pushes along y", "pushes along z",
+                                           "tilts about x",  "tilts about y",  "twists about z"};
+
+/// Names the axes that make up a direction.
+std::string complaint(const Vector6& direction) {
+  std::vector<std::string> names;
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (std::abs(direction[static_cast<int>(i)]) <= 0.4 * direction.cwiseAbs().maxCoeff()) continue;
+    names.emplace_back(kWrenchAxes[i]);
+    last = i;
+  }
+  if (names.size() == 1) return fmt::format("no load {}: {}", kActs[last], names[0]);
+  return fmt::format(
+      "no loads tell {} from each other; they come in one proportion only: add a step at another "
+      "point or along another line",
+      listed(names));
 }
 
 }  // namespace
 
 void set_hanging(const WrenchPlan& plan, int step, const Vector6& displacement,
                  Observation& observation) {
-  const PlanStep& s = at(plan, step);
-  const Mounting& mounting = plan.mountings[static_cast<std::size_t>(s.mounting)];
-  const PlanPoint& point = point_of(plan, s);
+  const PlanStep& s = plan.step(step);
+  const Mounting& mounting = plan.mounting_of(s);
+  const PlanPoint& point = plan.point_of(s);
   set_line_load({.force = s.mass * plan.gravity,
                  .direction = mounting.gravity,
-                 .point = moved(point.position, displacement),
+                 .point = moved_point(point.position, displacement),
                  .force_sigma = plan.mass_sigma,
                  .direction_sigma = mounting.sigma,
                  .point_sigma = point.sigma,
@@ -72,11 +76,11 @@ void set_hanging(const WrenchPlan& plan, int step, const Vector6& displacement,
 
 void set_push(const WrenchPlan& plan, int step, const CellForce& force, const Vector6& displacement,
               Observation& observation) {
-  const PlanStep& s = at(plan, step);
-  const PlanPoint& point = point_of(plan, s);
+  const PlanStep& s = plan.step(step);
+  const PlanPoint& point = plan.point_of(s);
   set_line_load({.force = force.value,
                  .direction = s.direction,
-                 .point = moved(point.position, displacement),
+                 .point = moved_point(point.position, displacement),
                  .force_sigma = force.gain_sigma,
                  .direction_sigma = plan.line_sigma,
                  .point_sigma = point.sigma,
@@ -123,7 +127,7 @@ void set_six_axis(const WrenchPlan& plan, const Vector6& value, const Vector6& s
 }
 
 KnownLoad expected_load(const WrenchPlan& plan, int step) {
-  const PlanStep& s = at(plan, step);
+  const PlanStep& s = plan.step(step);
   Observation observation;
   if (s.kind == StepKind::mass)
     set_hanging(plan, step, Vector6::Zero(), observation);
@@ -135,6 +139,76 @@ KnownLoad expected_load(const WrenchPlan& plan, int step) {
   for (const CorrelatedError& error : observation.common)
     load.covariance += error.effect * error.effect.transpose();
   return load;
+}
+
+WrenchCoverage::WrenchCoverage(const Vector6& range)
+    : range_(range), information_(Matrix6::Identity() / (kPrior * kPrior)) {}
+
+Vector6 WrenchCoverage::scaled(const KnownLoad& load) const {
+  return load.wrench.cwiseQuotient(range_);
+}
+
+double WrenchCoverage::relative_variance(const KnownLoad& load) const {
+  const Vector6 variances = load.covariance.diagonal().cwiseQuotient(range_.cwiseAbs2());
+  return variances.mean() + kMinSigma * kMinSigma;
+}
+
+void WrenchCoverage::add(const KnownLoad& load) {
+  const Vector6 w = scaled(load);
+  information_ += w * w.transpose() / relative_variance(load);
+}
+
+void WrenchCoverage::add_movement(const Matrix6& second_moment) {
+  const Vector6 inverse = range_.cwiseInverse();
+  information_ += inverse.asDiagonal() * second_moment * inverse.asDiagonal() /
+                  (kMovementSigma * kMovementSigma);
+}
+
+Matrix6 WrenchCoverage::posterior() const { return inverse(information_); }
+
+Vector6 WrenchCoverage::sigma() const { return posterior().diagonal().cwiseSqrt(); }
+
+Vector6 WrenchCoverage::covered() const { return (1 - sigma().array() / kPrior).max(0).matrix(); }
+
+std::vector<std::string> WrenchCoverage::missing() const {
+  const EigenSystem<6> eigen = symmetric_eigen(information_);
+  const auto open = static_cast<int>(
+      (eigen.values.array() < 1 / (kCovered * kCovered)).count());  // they come first
+  // Directions of equal information mix at will; the axes that lie among them wholly are named
+  // alone.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> span = eigen.vectors.leftCols(open);
+  std::vector<std::string> out;
+  for (int axis = 0; axis < 6; ++axis) {
+    if (span.row(axis).norm() < 0.9) continue;
+    out.push_back(complaint(Vector6::Unit(axis)));
+    span.row(axis).setZero();
+  }
+  const int rest = open - static_cast<int>(out.size());
+  if (rest <= 0) return out;
+  const Eigen::MatrixXd directions = left_singular_vectors(span);
+  for (int i = 0; i < rest; ++i) out.push_back(complaint(directions.col(i)));
+  return out;
+}
+
+double WrenchCoverage::gain(const KnownLoad& load) const {
+  const Matrix6 P = posterior();
+  const Vector6 w = scaled(load);
+  const Vector6 Pw = P * w;
+  return Pw.squaredNorm() / (relative_variance(load) + w.dot(Pw)) / P.trace();
+}
+
+void WrenchCoverage::add_expected(const WrenchPlan& plan, int step) {
+  if (plan.step(step).kind == StepKind::six_axis)
+    add_movement((0.25 * range_.cwiseAbs2()).asDiagonal());
+  else
+    add(expected_load(plan, step));
+}
+
+WrenchCoverage coverage_of(const WrenchPlan& plan, const Vector6& range) {
+  WrenchCoverage coverage(range);
+  for (std::size_t i = 0; i < plan.steps.size(); ++i)
+    coverage.add_expected(plan, static_cast<int>(i));
+  return coverage;
 }
 
 }  // namespace tagwrench

@@ -1,13 +1,10 @@
 #include "host/calibration/wrench/observations.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 
-#include "host/calibration/wrench/baseline.h"
 #include "host/calibration/wrench/load.h"
 #include "host/core/algebra/decompositions.h"
 #include "host/core/config_error.h"
@@ -15,6 +12,11 @@
 namespace tagwrench {
 namespace {
 
+constexpr double kMaxGap = 0.15;  // s between readings that are interpolated
+// A hand trembles at 8 to 12 Hz, which the springs and a cell's readings each follow in their own
+// way: of a push both are averaged alike, by a raised cosine that is nothing so far from its
+// middle (and passes less than 3 % of 8 Hz and above).
+constexpr double kPushWindow = 0.25;      // s
 constexpr std::size_t kMaxFrames = 1500;  // of pushes and movements in a fit
 // A hand leans and sways at half a hertz or so: what is closer together than this is off alike, and
 // would be taken for more than it is.
@@ -24,6 +26,67 @@ constexpr double kPushEvery = 1.0;  // s
 constexpr double kAxisLag = 1e-3;    // s
 constexpr double kNoRelation = 0.3;  // mean R^2
 constexpr const char* kFeatures[] = {"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
+
+/// Of a push's window, from -1 to 1.
+double raised_cosine(double off) { return 0.5 + 0.5 * std::cos(std::numbers::pi * off); }
+
+/// Where the records of one zero count from: its rests, in the order of their times, and what
+/// drifts between them.
+class Baseline {
+ public:
+  /// `records` may hold other zeros too.
+  Baseline(const WrenchPlan& plan, const std::vector<StepRecord>& records, int zero) {
+    for (const StepRecord& record : records) {
+      if (record.zero != zero || record.frames.empty() ||
+          plan.step(record.step).kind != StepKind::rest)
+        continue;
+      const RecordMean mean = mean_of(record);
+      rests_.push_back({mean.time, mean.displacement, mean_reading(record)});
+    }
+  }
+
+  bool empty() const { return rests_.empty(); }
+  /// Displacement of the first rest, m and rad.
+  const Vector6& displacement() const { return rests_.front().displacement; }
+  /// What the displacement has drifted since then: linear between rests, constant beyond.
+  Vector6 drift(double time) const {
+    const auto [before, after, share] = between(time);
+    return (1 - share) * before.displacement + share * after.displacement - displacement();
+  }
+  /// Of drift() between two rests: that of a change that may have come at any moment, whose
+  /// distribution over the change is uniform.
+  Matrix6 drift_covariance(double time) const {
+    const auto [before, after, share] = between(time);
+    const Vector6 change = after.displacement - before.displacement;
+    return change * change.transpose() / 12;
+  }
+  /// What the reference says when nothing is applied.
+  Vector6 reading(double time) const {
+    const auto [before, after, share] = between(time);
+    return (1 - share) * before.reading + share * after.reading;
+  }
+
+ private:
+  struct Rest {
+    double time = 0;
+    Vector6 displacement, reading;
+  };
+  /// The rests around `time` and the share of the later one.
+  struct Between {
+    const Rest& before;
+    const Rest& after;
+    double share;
+  };
+  Between between(double time) const {
+    const auto after = std::ranges::upper_bound(rests_, time, {}, &Rest::time);
+    if (after == rests_.begin()) return {*after, *after, 0};
+    const Rest& before = *(after - 1);
+    if (after == rests_.end()) return {before, before, 0};
+    return {before, *after, (time - before.time) / (after->time - before.time)};
+  }
+
+  std::vector<Rest> rests_;
+};
 
 /// Rows of a trial as they come.
 struct Rows {
@@ -70,20 +133,15 @@ class Collector {
         add_movement(record, baseline, stride);
     }
     finish_trial();
-    const bool loads = std::any_of(data_.observations.begin(), data_.observations.end(),
-                                   [](const Observation& o) { return !o.wrench.isZero(); });
-    if (!loads) {
+    if (std::ranges::all_of(data_.observations, [](const auto& o) { return o.wrench.isZero(); }))
       throw ConfigError(
           "no step with a load was recorded, only rests; do the steps that were skipped");
-    }
     data_.zero_in_use = records_.front().zero;
     return std::move(data_);
   }
 
  private:
-  const PlanStep& step_of(const StepRecord& record) const {
-    return plan_.steps[static_cast<std::size_t>(record.step)];
-  }
+  const PlanStep& step_of(const StepRecord& record) const { return plan_.step(record.step); }
   bool is_hold(const StepRecord& record) const {
     const StepKind kind = step_of(record).kind;
     return kind == StepKind::rest || kind == StepKind::mass;
@@ -120,11 +178,8 @@ class Collector {
         reference_.add(r.time, wrench_of(record, baseline, r), r.sigma, record.step);
       return;
     }
-    Vector6 sigma = Vector6::Zero();
-    if (mass) {
-      const KnownLoad known = expected_load(plan_, record.step);
-      sigma = known.covariance.diagonal().cwiseSqrt();
-    }
+    const Vector6 sigma =
+        expected_load(plan_, record.step).covariance.diagonal().cwiseSqrt();  // of a rest none
     for (const TrackedFrame* f : {&record.frames.front(), &record.frames.back()})
       reference_.add(f->time, o.wrench, sigma, record.step);
   }
@@ -184,7 +239,7 @@ class Collector {
     Eigen::VectorXd weight(to - from);
     for (Eigen::Index i = from; i < to; ++i) {
       const double off = i == middle ? 0 : (frame(i).time - time) / reach;
-      weight[i - from] = 0.5 + 0.5 * std::cos(std::numbers::pi * off);
+      weight[i - from] = raised_cosine(off);
     }
     weight /= weight.sum();
     Said said{.frame = &frame(middle),
@@ -207,8 +262,7 @@ class Collector {
   /// the springs follow, which an error that many observations share would otherwise explain.
   static Eigen::MatrixXd smooth(const std::vector<Said>& said) {
     const auto n = static_cast<Eigen::Index>(said.size());
-    Eigen::MatrixXd X(n, 7);
-    Eigen::MatrixXd V(n, 6);
+    Eigen::MatrixXd X(n, 7), V(n, 6);
     for (Eigen::Index i = 0; i < n; ++i) {
       const Said& s = said[static_cast<std::size_t>(i)];
       X.row(i) << s.displacement.transpose(), 1;
@@ -262,25 +316,11 @@ class Collector {
     if (plan_.reference == ReferenceKind::six_axis) return six_axis_wrench(plan_, value);
     if (step_of(record).kind != StepKind::push) return Vector6::Zero();
     const auto frame =
-        std::lower_bound(record.frames.begin(), record.frames.end(), r.time + data_.lag.value,
-                         [](const TrackedFrame& f, double t) { return f.time < t; });
+        std::ranges::lower_bound(record.frames, r.time + data_.lag.value, {}, &TrackedFrame::time);
     const TrackedFrame& at = frame == record.frames.end() ? record.frames.back() : *frame;
     Observation o;
     set_push(plan_, record.step, {value[0], 0, 0}, at.displacement, o);
     return o.wrench;
-  }
-
-  static Eigen::VectorXd frame_times(const StepRecord& record) {
-    Eigen::VectorXd t(static_cast<Eigen::Index>(record.frames.size()));
-    for (Eigen::Index i = 0; i < t.size(); ++i)
-      t[i] = record.frames[static_cast<std::size_t>(i)].time;
-    return t;
-  }
-  static Eigen::VectorXd reading_times(const StepRecord& record) {
-    Eigen::VectorXd t(static_cast<Eigen::Index>(record.readings.size()));
-    for (Eigen::Index i = 0; i < t.size(); ++i)
-      t[i] = record.readings[static_cast<std::size_t>(i)].time;
-    return t;
   }
 
   void find_lag() {
@@ -332,12 +372,76 @@ class Collector {
   WrenchData data_;
 };
 
+/// At the frame in the middle of a push's window, which `rows` are. What it says beside the mean
+/// has an error of its own: that of the frame, and how far platform and cell follow a hand's tremor
+/// apart, which is what they scatter against each other within the window.
+void predict_push(const Matrix6& K, const Eigen::MatrixXd& felt, double time,
+                  const std::vector<Eigen::Index>& rows, const HeldOut& held, study::Trial& trial) {
+  Eigen::VectorXd weight(static_cast<Eigen::Index>(rows.size()));
+  Eigen::Index middle = rows.front();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double off = (trial.time[rows[i]] - time) / kPushWindow;
+    weight[static_cast<Eigen::Index>(i)] = raised_cosine(off);
+    if (off == 0) middle = rows[i];
+  }
+  weight /= weight.sum();
+  const Eigen::MatrixXd seen = trial.features(rows, Eigen::all) * K.transpose();
+  const Eigen::MatrixXd apart = felt(rows, Eigen::all) - seen;
+  const Eigen::RowVectorXd mean = weight.transpose() * apart;
+  const Vector6 scatter = ((apart.rowwise() - mean).cwiseAbs2().transpose() * weight).cwiseMax(0.0);
+  const Eigen::RowVectorXd seen_mean = weight.transpose() * seen;
+  trial.predicted.row(middle) =
+      held.predicted.transpose() + trial.features.row(middle) * K.transpose() - seen_mean;
+  trial.predicted_sigma.row(middle) = (held.sigma.cwiseAbs2() + scatter).cwiseSqrt().transpose();
+}
+
 }  // namespace
 
 WrenchData collect(const WrenchPlan& plan, const std::vector<StepRecord>& records,
                    double cell_gain_sigma) {
   if (records.empty()) throw ConfigError("nothing was recorded; do at least one step with a load");
   return Collector(plan, records, cell_gain_sigma).collect();
+}
+
+void add_predictions(const WrenchPlan& plan, const WrenchFit& fit, WrenchData& data) {
+  study::Trial& trial = data.trial;
+  const Eigen::Index n = trial.time.size();
+  trial.predicted.setConstant(n, 6, std::nan(""));
+  trial.predicted_sigma.setConstant(n, 6, std::nan(""));
+  Eigen::MatrixXd felt;
+  if (plan.reference == ReferenceKind::load_cell) {
+    felt = study::reference_at(trial.time, data.lag.value, trial.reference_time, trial.reference,
+                               kMaxGap);
+  }
+  for (const HeldOut& held : fit.held_out) {
+    const Observation& o = data.observations[held.observation];
+    const StepKind kind = plan.step(o.step).kind;
+    const bool hold = kind == StepKind::rest || kind == StepKind::mass;
+    const bool push = kind == StepKind::push;
+    const double reach = push ? kPushWindow : 0;
+    std::vector<Eigen::Index> rows;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (trial.step[i] == o.step && (hold || std::abs(trial.time[i] - o.time) <= reach))
+        rows.push_back(i);
+    }
+    if (rows.empty()) continue;
+    if (push) {
+      predict_push(fit.model.K, felt, o.time, rows, held, trial);
+      continue;
+    }
+    const Eigen::RowVectorXd mean = trial.features(rows, Eigen::all).colwise().mean();
+    for (const Eigen::Index row : rows) {
+      const Vector6 apart = (trial.features.row(row) - mean).transpose();
+      trial.predicted.row(row) = (held.predicted + fit.model.K * apart).transpose();
+      // Its own noise beside that of the hold's mean; of a single frame the fit has counted it.
+      Vector6 variance = held.sigma.cwiseAbs2();
+      if (hold) {
+        const Vector6 own = trial.feature_sigma.row(row).transpose();
+        variance += fit.model.K.cwiseAbs2() * own.cwiseAbs2();
+      }
+      trial.predicted_sigma.row(row) = variance.cwiseSqrt().transpose();
+    }
+  }
 }
 
 }  // namespace tagwrench

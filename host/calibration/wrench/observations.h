@@ -2,7 +2,6 @@
 // certificate.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "host/calibration/analysis/lag.h"
@@ -12,12 +11,6 @@
 #include "host/wrench/fit.h"
 
 namespace tagwrench {
-
-inline constexpr double kMaxGap = 0.15;  ///< s between readings that are interpolated
-/// A hand trembles at 8 to 12 Hz, which the springs and a cell's readings each follow in their own
-/// way: of a push both are averaged alike, by a raised cosine that is nothing so far from its
-/// middle (and passes less than 3 % of 8 Hz and above).
-inline constexpr double kPushWindow = 0.25;  // s
 
 struct WrenchData {
   std::vector<Observation> observations;

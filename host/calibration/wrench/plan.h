@@ -1,8 +1,8 @@
-// The plan of a calibration: which known loads act along which lines, one after the other.
+// The plan of a calibration: which known loads act along which lines, one after the other; a plan
+// file -> WrenchPlan, and the ready-made plans that are part of the program.
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -41,8 +41,7 @@ struct PlanStep {
   int visit = 0;     ///< counts the changes of mounting: steps of one visit share a zero
   int point = -1;    ///< index; -1: none
   double mass = 0;   ///< kg
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of a push: unit, of the force on the
-                                                        ///< platform, camera axes
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of a push's force on the platform: unit
   double seconds = 0;  ///< how long a push or a movement is taken; 0 for holds
   double force = 0;    ///< of a push: as hard as this, N
 };
@@ -55,18 +54,25 @@ struct WrenchPlan {
   std::string about;  ///< one line: what is needed
   int minutes = 0;    ///< that a person takes, about; 0: nobody says
   ReferenceKind reference = ReferenceKind::masses;
-  int cell_channel = 0;                                        ///< of a load cell
-  double mass_sigma = 0.005;                                   ///< relative, of each mass
-  double gravity = 9.80665;                                    ///< m/s^2
-  double line_sigma = 0.03;                                    ///< of a push's direction, rad
-  Eigen::Vector3d reference_origin = Eigen::Vector3d::Zero();  ///< of a six-axis reference: where
-                                                               ///< its torque counts from, platform
-                                                               ///< frame, m
+  int cell_channel = 0;       ///< of a load cell
+  double mass_sigma = 0.005;  ///< relative, of each mass
+  double gravity = 9.80665;   ///< m/s^2
+  double line_sigma = 0.03;   ///< of a push's direction, rad
+  /// Of a six-axis reference: where its torque counts from, platform frame, m; and its axes.
+  Eigen::Vector3d reference_origin = Eigen::Vector3d::Zero();
   Eigen::Matrix3d camera_R_reference = Eigen::Matrix3d::Identity();
   double reference_sign = 1;  ///< -1: it feels what the platform's base does to it
   std::vector<PlanPoint> points;
   std::vector<Mounting> mountings;
   std::vector<PlanStep> steps;
+
+  const PlanStep& step(int index) const { return steps[static_cast<std::size_t>(index)]; }
+  const PlanPoint& point_of(const PlanStep& step) const {
+    return points[static_cast<std::size_t>(step.point)];
+  }
+  const Mounting& mounting_of(const PlanStep& step) const {
+    return mountings[static_cast<std::size_t>(step.mounting)];
+  }
 };
 
 /// "step 7 (50 g at left, on its right side)", counted from 1.
@@ -74,5 +80,32 @@ std::string describe(const WrenchPlan& plan, int step);
 
 /// What to do now, for people: how to fix the sensor where that has changed, and the load.
 std::string instruction(const WrenchPlan& plan, int step, bool new_mounting);
+
+/// Throws ConfigError: "file:line: key: what is wrong and what to do". Keys, with their defaults in
+/// brackets:
+///
+///   about: one line for people
+///   minutes [0]: that a person takes, about; 0: nobody says
+///   reference: masses | load_cell | six_axis
+///   gravity_m_s2 [9.80665], mass_sigma_percent [0.5]
+///   cell_channel [0], line_sigma_deg [1.5]                 of pushes with a load cell
+///   reference_origin_mm [0 0 0], reference_rotation_rad [0 0 0], reference_sign [1]
+///                                                  of a six-axis reference, in the platform frame
+///   points:    [{name, position_mm: [x, y, z], sigma_mm [0.3]}]
+///   mountings: [{name, say, gravity: [x, y, z], sigma_deg [1], steps: [...]}]
+///   a step:    {do: rest} | {do: mass, mass_g, at} | {do: push, at, along: [x, y, z], up_to_n,
+///              seconds [8]} | {do: move, seconds}, each with its own `say` if that is clearer
+///
+/// The sensor is used as the first mounting has it. Each mounting begins with a rest.
+WrenchPlan parse_plan(const std::string& text, const std::string& name);
+
+struct ReadyPlan {
+  std::string name;
+  std::string text;
+};
+const std::vector<ReadyPlan>& ready_plans();
+
+/// The text of a ready-made plan or, if there is none of that name, of a file. Throws ConfigError.
+std::string plan_text(const std::string& name_or_file);
 
 }  // namespace tagwrench

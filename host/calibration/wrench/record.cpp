@@ -1,7 +1,6 @@
 #include "host/calibration/wrench/record.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace tagwrench {
 namespace {
@@ -11,6 +10,13 @@ constexpr int kMinFrames = 5;  // a mean and a slope of fewer tell nothing
 // This share of the tracker's noise variance does not average away over a second: errors of
 // geometry and grey levels stay while the platform stands.
 constexpr double kSlowShare = 0.05;
+
+template <class Item>
+Eigen::VectorXd times(const std::vector<Item>& items) {
+  Eigen::VectorXd t(static_cast<Eigen::Index>(items.size()));
+  for (std::size_t i = 0; i < items.size(); ++i) t[static_cast<Eigen::Index>(i)] = items[i].time;
+  return t;
+}
 
 }  // namespace
 
@@ -68,9 +74,11 @@ Hold HoldDetector::look() const {
   return hold;
 }
 
+Eigen::VectorXd frame_times(const StepRecord& record) { return times(record.frames); }
+Eigen::VectorXd reading_times(const StepRecord& record) { return times(record.readings); }
+
 RecordMean mean_of(const StepRecord& record) {
-  RecordMean mean;
-  if (record.frames.empty()) return mean;
+  if (record.frames.empty()) return {};
   HoldDetector hold({.seconds = 2 * (record.frames.back().time - record.frames.front().time) + 1});
   for (const TrackedFrame& frame : record.frames) hold.add(frame);
   const Hold all = hold.look();

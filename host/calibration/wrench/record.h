@@ -1,4 +1,5 @@
-// What a calibration recorded, step by step: enough to fit anew, to show, and to go on from.
+// What a calibration recorded, step by step: enough to fit anew, to show, and to go on from; and
+// whether the platform stands still, and where.
 #pragma once
 
 #include <vector>
@@ -6,8 +7,6 @@
 #include "host/core/types.h"
 
 namespace tagwrench {
-
-// Whether the platform stands still, and where.
 
 /// What the tracker saw at a time.
 struct TrackedFrame {
@@ -58,9 +57,8 @@ class HoldDetector {
 
 /// What the reference said at a time of its own.
 struct ReferenceSample {
-  double time = 0;  ///< s, on the frames' clock
-  Vector6 value =
-      Vector6::Zero();  ///< a load cell: the first alone, N; six axes: N and N m, as read
+  double time = 0;                  ///< s, on the frames' clock
+  Vector6 value = Vector6::Zero();  ///< N and N m, as read; of a load cell the first alone, N
   Vector6 sigma = Vector6::Zero();  ///< one standard deviation
   bool saturated = false;
 };
@@ -79,6 +77,10 @@ struct RecordMean {
   Matrix6 covariance = Matrix6::Zero();
 };
 RecordMean mean_of(const StepRecord& record);
+
+/// Of its frames, and of its readings, s.
+Eigen::VectorXd frame_times(const StepRecord& record);
+Eigen::VectorXd reading_times(const StepRecord& record);
 
 /// Mean of what the reference said, axis by axis; zero if it said nothing.
 Vector6 mean_reading(const StepRecord& record);

@@ -22,9 +22,6 @@ struct ReferenceReading {
 
 class Reference {
  public:
-  Reference() = default;
-  Reference(const Reference&) = delete;
-  Reference& operator=(const Reference&) = delete;
   virtual ~Reference() = default;
 
   /// Readable when service() has something to do; -1: call it with every frame.
@@ -40,7 +37,7 @@ class Reference {
   virtual std::string trouble() = 0;
 };
 
-// Whether what a reference said while the platform was pushed or moved can be believed.
+// Whether what a reference said while the platform was pushed or moved can be used.
 
 struct ReferenceFinding {
   enum class Verdict : std::uint8_t {

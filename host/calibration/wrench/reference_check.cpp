@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
@@ -19,17 +18,6 @@ constexpr double kWeakPush = 0.25;   // of what the plan asks for
 constexpr double kStill = 0.03;      // of the range: an axis that moves less says nothing
 constexpr double kNoRelation = 0.3;  // mean R^2 below which there is none
 constexpr double kOpposite = -0.5;   // correlation
-
-const PlanStep& step_of(const WrenchPlan& plan, const StepRecord& record) {
-  return plan.steps[static_cast<std::size_t>(record.step)];
-}
-
-Eigen::VectorXd times(const std::vector<ReferenceSample>& readings) {
-  Eigen::VectorXd t(static_cast<Eigen::Index>(readings.size()));
-  for (std::size_t i = 0; i < readings.size(); ++i)
-    t[static_cast<Eigen::Index>(i)] = readings[i].time;
-  return t;
-}
 
 double deviation(const Eigen::VectorXd& v) {
   return std::sqrt((v.array() - v.mean()).square().mean());
@@ -74,11 +62,11 @@ ReferenceFinding check_presence(const WrenchPlan& plan, const StepRecord& record
       std::minmax_element(record.readings.begin(), record.readings.end(),
                           [](const auto& a, const auto& b) { return a.value[0] < b.value[0]; });
   const double felt = high->value[0] - low->value[0];
-  if (felt < kWeakPush * step_of(plan, record).force)
+  if (felt < kWeakPush * plan.step(record.step).force)
     return {
         Verdict::again,
         fmt::format("the cell felt no more than {:.2g} N of {:g} N; push harder (is it cell {}?)",
-                    felt, step_of(plan, record).force, plan.cell_channel)};
+                    felt, plan.step(record.step).force, plan.cell_channel)};
   return {};
 }
 
@@ -109,14 +97,13 @@ ReferenceFinding check_reference(const WrenchPlan& plan, const StepRecord& recor
   const auto n = static_cast<Eigen::Index>(record.frames.size());
   const Vector6 zero = mean_of(rest).displacement;
   study::Segment segment;
-  segment.time.resize(n);
+  segment.time = frame_times(record);
   segment.features.resize(n, 6);
   for (Eigen::Index i = 0; i < n; ++i) {
     const TrackedFrame& frame = record.frames[static_cast<std::size_t>(i)];
-    segment.time[i] = frame.time;
     segment.features.row(i) = (stiffness * (frame.displacement - zero)).transpose();
   }
-  segment.reference_time = times(record.readings);
+  segment.reference_time = reading_times(record);
   segment.reference = reference_wrenches(plan, record, rest);
   const study::Lag lag = study::estimate_lag({&segment, 1});
   if (!lag.known || lag.explained < kNoRelation)

@@ -9,9 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "host/wrench/estimate.h"
 #include "host/wrench/fit.h"
-#include "host/wrench/known_load.h"
-#include "host/wrench/spring_model.h"
 
 namespace tagwrench::test {
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "host/wrench/features.h"
+#include "host/wrench/estimate.h"
 #include "tests/support/differences.h"
 #include "tests/unit/wrench/known_loads.h"
 

@@ -1,9 +1,8 @@
-#include "host/wrench/spring_model.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 
+#include "host/wrench/estimate.h"
 #include "tests/support/six.h"
 
 namespace tagwrench {

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "host/calibration/wrench/plan_config.h"
+#include "host/calibration/wrench/plan.h"
 #include "tests/unit/calibration/wrench/wrench_bench.h"
 
 namespace tagwrench::test {

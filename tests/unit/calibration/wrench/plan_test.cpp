@@ -1,11 +1,12 @@
+#include "host/calibration/wrench/plan.h"
+
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <iterator>
 #include <set>
 
-#include "host/calibration/wrench/coverage.h"
-#include "host/calibration/wrench/plan_config.h"
+#include "host/calibration/wrench/load.h"
 #include "host/core/config_error.h"
 #include "tests/unit/calibration/wrench/wrench_bench.h"
 

@@ -13,9 +13,9 @@
 
 #include "host/calibration/wrench/guide.h"
 #include "host/calibration/wrench/observations.h"
-#include "host/calibration/wrench/plan_config.h"
+#include "host/calibration/wrench/plan.h"
 #include "host/commands/calibrate_wrench/simulated_person.h"
-#include "host/source/simulator/bench_references.h"
+#include "host/source/simulator/bench.h"
 #include "host/source/simulator/mechanics.h"
 #include "tests/unit/calibration/wrench/wrench_bench.h"
 

@@ -1,13 +1,30 @@
-// Steps that contradict the others: which few are wrong, or whether it is the fit's assumptions.
-// Internal to the fit.
+// What a fit leaves unexplained: outlier steps, the model's own error, residuals that hang
+// together; steps that contradict the others, which few are wrong, or whether it is the fit's
+// assumptions. Internal to the fit.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "host/wrench/fit_errors.h"
+#include "host/wrench/fit_solve.h"
 
 namespace tagwrench::fit {
+
+/// A solution with weights, error model and rejections that agree with its hold-out residuals.
+struct Judged {
+  Solution solution;
+  Weighting weighting;
+  std::vector<std::vector<Prediction>> held_out;  ///< by block
+  std::vector<double> chi2;        ///< of each block's held-out residual, per degree of freedom
+  bool too_many_outliers = false;  ///< so many steps disagree that none was rejected
+};
+
+/// `left_out`: blocks that are not used whatever they say.
+Judged judge(const Problem& problem, const std::vector<bool>& left_out);
+
+/// e^T (V + model's error)^-1 e for an error in the place of the prediction.
+double chi2_of(const Problem& problem, const Prediction& held_out, const ErrorModel& model,
+               const Vector6& error);
 
 /// What makes the steps agree with each other. The least far-fetched is taken, in about this order:
 /// all is as stated; K is not symmetric; the model is off by 1 % of full load; a step is wrong; the
