@@ -1,12 +1,11 @@
 #include "host/tracker/acquire.h"
 
-#include <algorithm>
-#include <optional>
+#include <limits>
 #include <string>
 
+#include "host/core/algebra/levenberg_marquardt.h"
 #include "host/core/config_error.h"
-#include "host/tracker/square_pose.h"
-#include "host/tracker/tag_patterns.h"
+#include "host/tracker/rotation.h"
 
 namespace tagwrench {
 namespace {
@@ -18,24 +17,23 @@ constexpr unsigned kFlipEvery = 4;
 constexpr int kFineCells = 8;
 
 void check(const TargetDescription& target) {
-  if (target.tags.empty()) throw ConfigError("target.tags: is empty; list at least one tag id");
-  if (target.tags.size() > static_cast<std::size_t>(kMaxTags)) {
-    throw ConfigError("target.tags: " + std::to_string(target.tags.size()) + " tags; use at most " +
-                      std::to_string(kMaxTags));
-  }
-  if (!(target.tag_size > 0)) throw ConfigError("target.tag_size_mm: must be positive");
-  if (!(target.border >= 0)) throw ConfigError("target.border_mm: must not be negative");
+  const auto refuse = [](const std::string& line) { throw ConfigError("target." + line); };
+  const auto text = [](auto number) { return std::to_string(number); };
+  const std::size_t count = target.tags.size();
+  if (count == 0) refuse("tags: is empty; list at least one tag id");
+  if (count > std::size_t{kMaxTags})
+    refuse("tags: " + text(count) + " tags; use at most " + text(kMaxTags));
+  if (!(target.tag_size > 0)) refuse("tag_size_mm: must be positive");
+  if (!(target.border >= 0)) refuse("border_mm: must not be negative");
   const int ids = id_count(target.family);
   for (auto tag = target.tags.begin(); tag != target.tags.end(); ++tag) {
     if (tag->id < 0 || tag->id >= ids) {
-      throw ConfigError("target.tags: id " + std::to_string(tag->id) + " is not in " +
-                        std::string(name(target.family)) + "; use 0 to " + std::to_string(ids - 1));
+      refuse("tags: id " + text(tag->id) + " is not in " + std::string(name(target.family)) +
+             "; use 0 to " + text(ids - 1));
     }
     const auto same = [tag](const Tag& other) { return other.id == tag->id; };
-    if (std::any_of(target.tags.begin(), tag, same)) {
-      throw ConfigError("target.tags: id " + std::to_string(tag->id) +
-                        " is listed twice; give each tag its own");
-    }
+    if (std::any_of(target.tags.begin(), tag, same))
+      refuse("tags: id " + text(tag->id) + " is listed twice; give each tag its own");
   }
 }
 
@@ -80,11 +78,9 @@ Finding sorted(const CameraModel& camera, const TargetDescription& target, Squar
     const std::optional<std::size_t> seen = only(target.tags[t].id, list, twice);
     if (twice) finding.twice.push_back(target.tags[t].id);
     if (!seen) continue;
-    FoundTag tag;
-    tag.index = t;
-    tag.corners_px = list.tags[*seen];
-    tag.camera_T_tag = square_poses(camera, target.tag_size, tag.corners_px);
-    if (!tag.camera_T_tag.empty()) finding.tags.push_back(std::move(tag));
+    const Square& corners_px = list.tags[*seen];
+    auto poses = square_poses(camera, target.tag_size, corners_px);
+    if (!poses.empty()) finding.tags.push_back({t, corners_px, std::move(poses)});
   }
   finding.squares = std::move(list.others);
   for (std::size_t i = 0; i < list.ids.size(); ++i) {
@@ -96,6 +92,36 @@ Finding sorted(const CameraModel& camera, const TargetDescription& target, Squar
       others.push_back(list.ids[i]);
   }
   return finding;
+}
+
+constexpr double kReachRotation = 0.6;  ///< rad
+constexpr double kReachDistance = 0.5;  ///< translation, of the distance from the lens at rest
+constexpr double kUnfit_px = 8.0;       ///< RMS beyond which corners are not the target's
+
+struct CornerPair {
+  Eigen::Vector3d p_platform;
+  Eigen::Vector2d pixel;
+};
+
+/// Moves `pose` to the least squares near it; their RMS, px, infinite where a point is behind the
+/// camera.
+double fit_corners(const CameraModel& camera, const std::vector<CornerPair>& pairs,
+                   Eigen::Isometry3d& pose) {
+  const auto look = [&](const Eigen::Isometry3d& at) {
+    FitSums<6> sums;
+    for (const CornerPair& pair : pairs) {
+      const Eigen::Vector3d arm = at.linear() * pair.p_platform;
+      const ProjectedPoint projected = project(camera, arm + at.translation());
+      if (!projected.valid) sums.squares = std::numeric_limits<double>::infinity();
+      Eigen::Matrix<double, 2, 6> rows;
+      rows << projected.jacobian, -projected.jacobian * cross_matrix(arm);
+      const Eigen::Vector2d error = pair.pixel - projected.pixel;
+      for (int i = 0; i < 2; ++i) sums.add(rows.row(i).transpose(), error[i]);
+    }
+    return sums;
+  };
+  const double squares = levenberg_marquardt(pose, look, moved).squares;
+  return std::sqrt(squares / (2.0 * static_cast<double>(pairs.size())));
 }
 
 }  // namespace
@@ -128,11 +154,7 @@ void Acquirer::add_sharpened(const ImageView& image, SquareList& list) {
 
 Finding Acquirer::detect(const ImageView& image) {
   std::optional<SquareList> list = finder_.find(image, false);
-  if (!list) {
-    Finding nobody;
-    nobody.looked = false;
-    return nobody;
-  }
+  if (!list) return {.looked = false};
   if (bits_per_side(target_.family) >= kFineCells) add_sharpened(image, *list);
   return sorted(camera_, target_, std::move(*list));
 }
@@ -149,6 +171,58 @@ Finding Acquirer::find(const ImageView& image) {
   if (!flipped) flipped.emplace(image);
   finding.other_way_round = !detect(camera_.mirrored ? image : flipped->view()).tags.empty();
   return finding;
+}
+
+bool within_reach(const Eigen::Isometry3d& reference, const Eigen::Isometry3d& camera_T_platform) {
+  const Vector6 motion = motion_between(reference, camera_T_platform);
+  return motion.tail<3>().norm() < kReachRotation &&
+         motion.head<3>().norm() < kReachDistance * reference.translation().norm();
+}
+
+std::optional<Eigen::Isometry3d> pose_from_corners(
+    const CameraModel& camera, double tag_size, const std::vector<FoundTag>& found,
+    const std::vector<Eigen::Isometry3d>& platform_T_tag, const Eigen::Isometry3d& reference) {
+  const std::array<Eigen::Vector3d, 4> corners = square_corners(0.5 * tag_size);
+  std::vector<CornerPair> pairs;
+  std::vector<Eigen::Isometry3d> starts = {reference};
+  for (const FoundTag& tag : found) {
+    for (std::size_t c = 0; c < 4; ++c)
+      pairs.push_back({platform_T_tag[tag.index] * corners[c], tag.corners_px[c]});
+    for (const Eigen::Isometry3d& pose : tag.camera_T_tag)
+      starts.push_back(pose * platform_T_tag[tag.index].inverse());
+  }
+  if (pairs.empty()) return std::nullopt;
+  std::optional<Eigen::Isometry3d> best;
+  double best_px = kUnfit_px;
+  for (Eigen::Isometry3d& pose : starts) {
+    const double rms_px = fit_corners(camera, pairs, pose);
+    if (!(rms_px < best_px) || !within_reach(reference, pose)) continue;
+    best = pose;
+    best_px = rms_px;
+  }
+  return best;
+}
+
+void set_corners(const CameraModel& camera, const TargetDescription& target,
+                 const std::vector<Eigen::Isometry3d>& platform_T_tag,
+                 const Eigen::Isometry3d& camera_T_platform, Track& track) noexcept {
+  track.corner_count = 0;
+  if (platform_T_tag.size() != target.tags.size() || target.tags.size() > track.corners.size())
+    return;
+  const std::array<Eigen::Vector3d, 4> corners = square_corners(0.5 * target.tag_size);
+  for (std::size_t t = 0; t < target.tags.size(); ++t) {
+    TagCorners& out = track.corners[t];
+    out.id = target.tags[t].id;
+    for (std::size_t c = 0; c < 4; ++c) {
+      const ProjectedPoint at =
+          project(camera, camera_T_platform * (platform_T_tag[t] * corners[c]));
+      if (!at.valid) return;
+      const double x = at.pixel.x();
+      out.px[2 * c] = camera.mirrored ? camera.width_px - 1 - x : x;
+      out.px[2 * c + 1] = at.pixel.y();
+    }
+  }
+  track.corner_count = static_cast<std::uint8_t>(target.tags.size());
 }
 
 }  // namespace tagwrench

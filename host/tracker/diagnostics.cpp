@@ -1,18 +1,40 @@
 #include "host/tracker/diagnostics.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <iterator>
 #include <span>
 
-#include "host/tracker/corner_pose.h"
+#include "host/core/count_text.h"
 #include "host/tracker/picture_quality.h"
-#include "host/tracker/predictor.h"
-#include "host/tracker/rotation.h"
-#include "host/tracker/square_reader.h"
+#include "host/tracker/squares.h"
+#include "host/tracker/tracker.h"
 
 namespace tagwrench {
 namespace {
+
+/// Times that cameras take from the first row to the last, in kUnit.
+constexpr double kUnit = 10e-3;  // s
+constexpr double kReadouts[] = {1, 2, 3, 4};
+/// A shear must be seen to be mended: motion of the platform in the image during kUnit, px.
+constexpr double kMinMotion_px = 0.5;
+constexpr int kEnough = 8;         ///< pictures mended
+constexpr double kMaxOfAll = 0.5;  ///< of the pictures tried
+
+/// Only the product of readout and velocity matters.
+bool mended(PhotometricAligner& aligner, const PixelWindow& image, const Eigen::Isometry3d& pose,
+            const Vector6& velocity, const PhotometricState& before) noexcept {
+  const auto fits = [&](double readout) {
+    PhotometricState state = before;
+    const PhotometricFit fit = aligner.align(image, pose, {kUnit, readout * velocity}, state);
+    return accepted(fit, state);
+  };
+  const auto fits_backwards = [&](double readout) { return fits(-readout); };
+  return std::any_of(std::begin(kReadouts), std::end(kReadouts), fits) &&
+         std::none_of(std::begin(kReadouts), std::end(kReadouts), fits_backwards);
+}
 
 using std::chrono::milliseconds;
 
@@ -28,8 +50,7 @@ constexpr double kMaxWhite = 0.4;    ///< of the picture
 constexpr double kUnsharp_px = 4.5;  ///< tags of the published size decode up to about this blur
 
 constexpr double kOtherScale = 0.03;
-constexpr double kSameScale =
-    0.01;  ///< motion shears the picture of a rolling shutter, never alike
+constexpr double kSameScale = 0.01;  ///< motion shears a rolling shutter's picture, never alike
 /// Between tags, as four corners each tell it: rad.
 constexpr double kOtherTurn = 0.25;
 constexpr double kOtherDirection = 0.2;
@@ -82,8 +103,7 @@ std::optional<PairMisfit> compare(const FoundTag& a, const FoundTag& b,
   return best;
 }
 
-/// Tags that are where the description has them, to each other and to the reference? A cause if
-/// not.
+/// Are tags where the description has them, to each other and to the reference? A cause if not.
 Diagnostic judge_geometry(const TargetDescription& target, const KnownReference& reference,
                           const Finding& finding, DiagnosticDetails& details) {
   const std::vector<FoundTag>& tags = finding.tags;
@@ -124,37 +144,20 @@ Diagnostic judge_geometry(const TargetDescription& target, const KnownReference&
   return nearest < 1e9 ? Diagnostic::rest_elsewhere : Diagnostic::none;
 }
 
-/// What is printed in the picture's squares that are not the target's tags.
-std::vector<ReadSquare> read_others(const CameraModel& camera, const ImageView& image,
-                                    const Finding& finding, TagFamily family,
-                                    const DiagnosticDetails::Ids& missing) {
-  const std::span<const std::int16_t> ids(missing.id.data(), missing.count);
-  if (!camera.mirrored) return read_squares(image, finding.squares, family, ids);
-  return read_squares(FlippedImage(image).view(), finding.squares, family, ids);
-}
-
 /// Light and focus, if they are so bad that tags may not be found.
 Diagnostic judge_light(const PictureQuality& quality, DiagnosticDetails& details) {
-  const double was = details.amount;
-  details.amount = quality.bright_counts;
-  if (quality.bright_counts < kBlack) return Diagnostic::image_black;
-  details.amount = quality.white_fraction;
-  if (quality.white_fraction > kMaxWhite) return Diagnostic::image_saturated;
-  details.amount = quality.bright_counts;
-  if (quality.bright_counts - quality.dark_counts < kEvenContrast) return Diagnostic::image_empty;
-  details.amount = quality.blur_px.value_or(0);
-  if (quality.blur_px > kUnsharp_px) return Diagnostic::image_unsharp;
-  details.amount = was;
+  const auto because = [&](Diagnostic cause, double amount) {
+    details.amount = amount;
+    return cause;
+  };
+  const int bright = quality.bright_counts;
+  if (bright < kBlack) return because(Diagnostic::image_black, bright);
+  if (quality.white_fraction > kMaxWhite)
+    return because(Diagnostic::image_saturated, quality.white_fraction);
+  if (bright - quality.dark_counts < kEvenContrast) return because(Diagnostic::image_empty, bright);
+  if (quality.blur_px > kUnsharp_px)
+    return because(Diagnostic::image_unsharp, quality.blur_px.value_or(0));
   return Diagnostic::none;
-}
-
-Diagnostic name_family(const std::vector<ReadSquare>& others, DiagnosticDetails& details) {
-  details.family = name(others.front().family);
-  for (const ReadSquare& tag : others) {
-    if (tag.family == others.front().family && !holds(details.seen, tag.id))
-      details.seen.add(tag.id);
-  }
-  return Diagnostic::wrong_family;
 }
 
 /// Why not all of the target's tags are found.
@@ -163,8 +166,11 @@ Diagnostic judge_missing(const CameraModel& camera, const TargetDescription& tar
                          DiagnosticDetails& details) {
   DiagnosticDetails::Ids mirrored;
   std::vector<ReadSquare> others;
+  const std::span<const std::int16_t> missing(details.concerned.id.data(), details.concerned.count);
+  const std::optional<FlippedImage> flipped =
+      camera.mirrored ? std::optional<FlippedImage>(image) : std::nullopt;
   for (const ReadSquare& tag :
-       read_others(camera, image, finding, target.family, details.concerned)) {
+       read_squares(flipped ? flipped->view() : image, finding.squares, target.family, missing)) {
     if (tag.mirrored && !holds(mirrored, tag.id)) mirrored.add(tag.id);
     if (tag.family != target.family) others.push_back(tag);
   }
@@ -177,10 +183,17 @@ Diagnostic judge_missing(const CameraModel& camera, const TargetDescription& tar
     return Diagnostic::tag_printed_mirrored;
   }
   if (!finding.other_ids.empty()) return Diagnostic::wrong_ids;
-  if (finding.tags.empty() && !others.empty()) return name_family(others, details);
+  if (finding.tags.empty() && !others.empty()) {
+    details.family = name(others.front().family);
+    for (const ReadSquare& tag : others) {
+      if (tag.family == others.front().family && !holds(details.seen, tag.id))
+        details.seen.add(tag.id);
+    }
+    return Diagnostic::wrong_family;
+  }
   const PictureQuality quality = picture_quality(image);
-  const Diagnostic light = judge_light(quality, details);
-  if (light != Diagnostic::none) return light;
+  if (const Diagnostic light = judge_light(quality, details); light != Diagnostic::none)
+    return light;
   if (!finding.tags.empty()) return Diagnostic::tag_missing;
   details.amount = quality.bright_counts;
   return quality.blur_px ? Diagnostic::no_tag : Diagnostic::image_empty;
@@ -192,7 +205,35 @@ bool same(const Diagnosis& a, const Diagnosis& b) {
          a.details.concerned == b.details.concerned && a.details.family == b.details.family;
 }
 
+/// "tag 5", "tags 5 and 2", "tags 5, 2 and 7".
+std::string tags(const DiagnosticDetails::Ids& ids) {
+  std::vector<std::string> numbers;
+  for (std::size_t i = 0; i < ids.count; ++i) numbers.push_back(std::to_string(ids.id[i]));
+  return (ids.count == 1 ? "tag " : "tags ") + listed(numbers);
+}
+
+const char* is(const DiagnosticDetails::Ids& ids) { return ids.count == 1 ? "is" : "are"; }
+
+std::string from_rest(const DiagnosticDetails& d) {
+  const Eigen::Vector3d mm = d.offset.head<3>() * 1e3;
+  return fmt::format("{:.1f} mm (x {:+.1f}, y {:+.1f}, z {:+.1f}) and {:.0f} degrees from",
+                     mm.norm(), mm.x(), mm.y(), mm.z(), d.offset.tail<3>().norm() * 180 / M_PI);
+}
+
 }  // namespace
+
+bool ShutterCheck::rolls(PhotometricAligner& aligner, const PixelWindow& image, TimePoint time,
+                         const Eigen::Isometry3d& pose, const PhotometricState& before) noexcept {
+  if (done_) return false;
+  const Vector6 velocity = predictor_.velocity(time, pose);
+  const double speed_px = aligner.pixels().camera.fy_px * velocity.head<2>().norm() /
+                          std::max(1e-3, pose.translation().z());
+  if (!(speed_px * kUnit > kMinMotion_px)) return false;
+  ++tried_;
+  if (mended(aligner, image, pose, velocity, before)) ++mended_;
+  done_ = mended_ >= kEnough && mended_ > kMaxOfAll * tried_;
+  return done_;
+}
 
 Diagnosis diagnose(const CameraModel& camera, const TargetDescription& target,
                    const KnownReference& reference, const ImageView& image,
@@ -246,9 +287,8 @@ void TrackingDiagnostics::check_shutter(const FrameFacts& facts, Track& track) {
   const PixelWindow window{image.pixels, image.stride, 0, 0, image.width, image.height};
   if (shutter_.rolls(facts.aligner, window, facts.frame.capture_time, *facts.pose,
                      facts.photometric) &&
-      track.diagnostic == Diagnostic::none) {
+      track.diagnostic == Diagnostic::none)
     track.diagnostic = Diagnostic::shutter_rolls;
-  }
 }
 
 /// When a picture of the target that was given does not show what the camera sees.
@@ -320,14 +360,108 @@ void TrackingDiagnostics::add(const FrameFacts& facts, Track& track) {
     shutter_.lost();
   }
   if (facts.accepted || facts.learning == Progress::learning) {
-    if (not_held_since_) {
-      not_held_since_.reset();
-      said_ = {};
-    }
+    if (not_held_since_) said_ = {};
+    not_held_since_.reset();
     if (facts.accepted && track.diagnostic == Diagnostic::none) check_geometry(facts, track);
   } else if (facts.searched && track.diagnostic == Diagnostic::none) {
     explain(facts, track);
   }
+}
+
+std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& d) {
+  switch (diagnostic) {
+    case Diagnostic::none:
+      return {};
+    case Diagnostic::image_looks_mirrored:
+      return "the image looks mirrored (tags decode only when it is flipped left to right); set "
+             "camera.mirrored: true in sensor.yaml, unless the tags themselves are printed "
+             "mirrored";
+    case Diagnostic::image_looks_unmirrored:
+      return "the image does not look mirrored, but sensor.yaml says so; set camera.mirrored: "
+             "false in sensor.yaml";
+    case Diagnostic::rest_learned:
+      return "rest pose learned; the wrench counts from here";
+    case Diagnostic::moved_while_learning:
+      return "the platform moved while its rest pose was learned; let it rest for a moment";
+    case Diagnostic::appearance_does_not_fit:
+      return "the target does not look like its picture at rest (light, focus, dirt or another "
+             "lens?); run `tagwrench calibrate target`, or remove the picture";
+    case Diagnostic::far_from_rest:
+      return fmt::format(
+          "the target stands still {} rest as sensor.yaml has it; if nothing presses on it, run "
+          "`tagwrench calibrate target`",
+          from_rest(d));
+    case Diagnostic::shutter_rolls:
+      return "pictures are sheared when the platform moves: the camera exposes row by row (rolling "
+             "shutter); set camera.readout_ms in sensor.yaml (`tagwrench calibrate target` "
+             "measures it)";
+    case Diagnostic::image_black:
+      return fmt::format(
+          "the image is black (its brightest parts have grey level {:.0f} of 255); is the lens cap "
+          "off, the LED on, the exposure long enough?",
+          d.amount);
+    case Diagnostic::image_saturated:
+      return fmt::format(
+          "{:.0f} % of the image is white (saturated); shorten the camera's exposure or dim the "
+          "light",
+          100 * d.amount);
+    case Diagnostic::image_empty:
+      return fmt::format(
+          "the image shows nothing but smooth grey (up to level {:.0f} of 255); is something right "
+          "before the lens, or the focus lost?",
+          d.amount);
+    case Diagnostic::image_unsharp:
+      return fmt::format(
+          "the image is not sharp (its edges are blurred over {:.0f} pixels); focus the lens on "
+          "the tags, and turn its autofocus off",
+          2 * d.amount);
+    case Diagnostic::no_tag:
+      return fmt::format(
+          "no tag is seen, neither {} of {} nor any other; are they in view, whole, flat and with "
+          "their white margin?",
+          tags(d.expected), d.expected_family);
+    case Diagnostic::wrong_family:
+      return fmt::format(
+          "{} of {} {} seen, but sensor.yaml has {} of {}; correct target.family and target.tags, "
+          "or print the tags it names",
+          tags(d.seen), d.family, is(d.seen), tags(d.expected), d.expected_family);
+    case Diagnostic::wrong_ids:
+      return fmt::format(
+          "{} {} seen, but sensor.yaml has {}; correct target.tags, or show the tags it names",
+          tags(d.seen), is(d.seen), tags(d.expected));
+    case Diagnostic::tag_missing:
+      return fmt::format(
+          "{} {} seen, {} {} not; uncover it, bring it into view and light, or take it out of "
+          "target.tags in sensor.yaml",
+          tags(d.seen), is(d.seen), tags(d.concerned), is(d.concerned));
+    case Diagnostic::tag_twice:
+      return fmt::format(
+          "{} {} seen in two places at once; take the one that is not the sensor's out of view",
+          tags(d.concerned), is(d.concerned));
+    case Diagnostic::tag_printed_mirrored:
+      return fmt::format("{} {} printed mirrored ({} as it should be); print anew, not mirrored",
+                         tags(d.concerned), is(d.concerned), tags(d.seen));
+    case Diagnostic::other_scale:
+      return fmt::format(
+          "{} are {:.0f} % {} than target.tag_size_mm in sensor.yaml for the distance between "
+          "them; "
+          "measure the print (100 %?), or place the tags anew with `tagwrench calibrate target`",
+          tags(d.concerned), 100 * std::abs(d.amount - 1), d.amount > 1 ? "larger" : "smaller");
+    case Diagnostic::other_places:
+      return fmt::format(
+          "{} sit differently to each other than target.tags in sensor.yaml says (swapped, turned "
+          "or glued anew?); run `tagwrench calibrate target`",
+          tags(d.concerned));
+    case Diagnostic::rest_elsewhere:
+      return fmt::format(
+          "{} {} seen, but the target is {} {}, farther than its springs let it go; {}",
+          tags(d.seen), is(d.seen), from_rest(d),
+          d.rest_given ? "rest as sensor.yaml has it" : "where it was at rest",
+          d.rest_given ? "run `tagwrench calibrate target`, or put camera and platform "
+                         "back"
+                       : "put camera and platform back, or start again");
+  }
+  return {};
 }
 
 }  // namespace tagwrench

@@ -1,6 +1,9 @@
 #include "host/tracker/edges.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "host/core/robust_statistics.h"
 
 namespace tagwrench {
 namespace {
@@ -12,28 +15,17 @@ constexpr int kPointsPerCell = 4;
 /// Kept clear on both sides of a corner or crossing, in cells.
 constexpr double kCornerMargin = 0.28;
 
-/// The pattern with its white margin as a further ring of cells; true is white.
-class Grid {
- public:
-  explicit Grid(const TagPattern& pattern) : pattern_(pattern) {}
-  int cells() const { return pattern_.cells; }
-  bool white(int row, int column) const {
-    if (row < 0 || column < 0 || row >= cells() || column >= cells()) return true;
-    return pattern_.is_white(row, column);
-  }
-
- private:
-  const TagPattern& pattern_;
-};
-
-/// Looks at the grid in rows or in columns, so that one routine serves both directions of edges.
+/// Looks at the pattern, with its white margin as a further ring of cells, in rows or in columns,
+/// so that one routine serves both directions of edges.
 struct Walk {
-  const Grid& grid;
+  const TagPattern& pattern;
   bool vertical_edges;  ///< edges between left and right neighbours
 
   /// `across` counts along the edge's normal, `along` along the edge.
   bool white(int across, int along) const {
-    return vertical_edges ? grid.white(along, across) : grid.white(across, along);
+    const int n = pattern.cells;
+    if (across < 0 || along < 0 || across >= n || along >= n) return true;
+    return vertical_edges ? pattern.is_white(along, across) : pattern.is_white(across, along);
   }
 
   /// The edge before cell `across`: does it go straight on past the vertex at the lower end of
@@ -48,7 +40,7 @@ struct Walk {
   int run(int across, int along, int step) const {
     const int first = step > 0 ? across : across - 1;
     int count = 0;
-    for (int i = first; i >= 0 && i < grid.cells(); i += step) {
+    for (int i = first; i >= 0 && i < pattern.cells; i += step) {
       if (white(i, along) != white(first, along)) return count;
       ++count;
     }
@@ -56,16 +48,8 @@ struct Walk {
   }
 };
 
-double reach_of(const Walk& walk, int across, int along, double cell, double border) {
-  double reach = 1e9;
-  for (const int step : {-1, 1}) {
-    const int run = walk.run(across, along, step);
-    reach = std::min(reach, run < 0 ? border : run * cell);
-  }
-  return reach;
-}
-
-void add_points(const TagPattern& pattern, const Walk& walk, std::vector<EdgePoint>& points) {
+void add_points(const Walk& walk, std::vector<EdgePoint>& points) {
+  const TagPattern& pattern = walk.pattern;
   const int n = pattern.cells;
   const double cell = pattern.size / n;
   const double half = 0.5 * pattern.size;
@@ -77,43 +61,71 @@ void add_points(const TagPattern& pattern, const Walk& walk, std::vector<EdgePoi
       const double low = walk.straight_at(across, along) ? 0.0 : kCornerMargin;
       const double high = walk.straight_at(across, along + 1) ? 1.0 : 1.0 - kCornerMargin;
       EdgePoint point;
-      point.reach = reach_of(walk, across, along, cell, pattern.border);
+      point.reach = 1e9;
+      for (const int step : {-1, 1}) {
+        const int run = walk.run(across, along, step);
+        point.reach = std::min(point.reach, run < 0 ? pattern.border : run * cell);
+      }
+      point.normal = walk.vertical_edges ? (after ? EdgeNormal::plus_x : EdgeNormal::minus_x)
+                                         : (after ? EdgeNormal::plus_y : EdgeNormal::minus_y);
       const double fixed = across * cell - half;
       for (int i = 0; i < kPointsPerCell; ++i) {
         const double moving =
             (along + low + (high - low) * (i + 0.5) / kPointsPerCell) * cell - half;
-        if (walk.vertical_edges) {
-          point.x = fixed;
-          point.y = moving;
-          point.normal = after ? EdgeNormal::plus_x : EdgeNormal::minus_x;
-        } else {
-          point.x = moving;
-          point.y = fixed;
-          point.normal = after ? EdgeNormal::plus_y : EdgeNormal::minus_y;
-        }
+        point.x = walk.vertical_edges ? fixed : moving;
+        point.y = walk.vertical_edges ? moving : fixed;
         points.push_back(point);
       }
     }
   }
 }
 
+double median_of_valid(std::span<const EdgeMeasurement> measured, double EdgeMeasurement::*member) {
+  std::vector<double> values;
+  for (const EdgeMeasurement& m : measured) {
+    if (m.valid) values.push_back(m.*member);
+  }
+  return median(std::move(values));
+}
+
+/// Part of the way to the next edge that a profile may take.
+constexpr double kReachUsed = 0.85;
+
+/// Less contrast than this is noise, grey levels.
+constexpr float kMinContrast = 12.0F;
+
+/// And less than this part of the contrast at rest is not the edge that was learned.
+constexpr float kMinContrastFraction = 0.35F;
+
+/// A falling gradient of up to this size is noise as well, grey levels per px.
+constexpr float kCoarseNoise = 3.0F;
+
+template <class Pixel>
+float sample(const Pixel* pixels, int stride, float x, float y) {
+  const int column = static_cast<int>(x);
+  const int row = static_cast<int>(y);
+  const float fx = x - static_cast<float>(column);
+  const float fy = y - static_cast<float>(row);
+  const Pixel* p = pixels + static_cast<std::ptrdiff_t>(row) * stride + column;
+  const Pixel* q = p + stride;
+  const float upper =
+      static_cast<float>(p[0]) + fx * (static_cast<float>(p[1]) - static_cast<float>(p[0]));
+  const float lower =
+      static_cast<float>(q[0]) + fx * (static_cast<float>(q[1]) - static_cast<float>(q[0]));
+  return upper + fy * (lower - upper);
+}
+
+/// Bilinear sampling reads one pixel to the right and below. False for NaN too.
+template <class Pixel>
+bool inside(const PixelView<Pixel>& image, double x, double y) {
+  return x >= 0.0 && y >= 0.0 && x < image.width - 1.001 && y < image.height - 1.001;
+}
+
 }  // namespace
 
 EdgePoint shifted(EdgePoint point, double distance) {
-  switch (point.normal) {
-    case EdgeNormal::plus_x:
-      point.x += distance;
-      break;
-    case EdgeNormal::minus_x:
-      point.x -= distance;
-      break;
-    case EdgeNormal::plus_y:
-      point.y += distance;
-      break;
-    case EdgeNormal::minus_y:
-      point.y -= distance;
-      break;
-  }
+  const bool reversed = point.normal == EdgeNormal::minus_x || point.normal == EdgeNormal::minus_y;
+  (is_along_x(point.normal) ? point.x : point.y) += reversed ? -distance : distance;
   return point;
 }
 
@@ -121,20 +133,166 @@ EdgeTag make_edge_tag(const TagPattern& pattern, const Eigen::Isometry3d& platfo
   EdgeTag tag;
   tag.id = pattern.id;
   tag.platform_T_tag = platform_T_tag;
-  const Grid grid(pattern);
-  add_points(pattern, Walk{grid, true}, tag.points);
-  add_points(pattern, Walk{grid, false}, tag.points);
+  for (const bool vertical : {true, false}) add_points({pattern, vertical}, tag.points);
   const double cell = pattern.size / pattern.cells;
   for (int row = 0; row < pattern.cells; ++row) {
     for (int column = 0; column < pattern.cells; ++column) {
-      CellPoint point;
-      point.x = (column + 0.5) * cell - 0.5 * pattern.size;
-      point.y = (row + 0.5) * cell - 0.5 * pattern.size;
-      point.grey = pattern.is_white(row, column) ? 255.0F : 0.0F;
-      tag.cells.push_back(point);
+      tag.cells.push_back({.x = (column + 0.5) * cell - 0.5 * pattern.size,
+                           .y = (row + 0.5) * cell - 0.5 * pattern.size,
+                           .grey = pattern.is_white(row, column) ? 255.0F : 0.0F});
     }
   }
   return tag;
 }
+
+double median_gain(std::span<const EdgeMeasurement> measured) {
+  return std::clamp(median_of_valid(measured, &EdgeMeasurement::gain), 0.3, 1.3);
+}
+
+double median_contrast(std::span<const EdgeMeasurement> measured) {
+  return median_of_valid(measured, &EdgeMeasurement::contrast);
+}
+
+EdgeMeter::EdgeMeter(const CameraModel& camera) : camera_(camera) {
+  for (int k = 0; k < kWindows; ++k) {
+    const double half = kMinHalf_px + k * kHalfStep_px;
+    Window& window = windows_[static_cast<std::size_t>(k)];
+    window.reach_px = std::min(kReach_px, static_cast<int>(std::ceil(half)));
+    for (int i = 0; i < 2 * window.reach_px; ++i) {
+      const double s = i + 0.5 - window.reach_px;
+      const double q = s * s / (half * half);
+      if (q >= 1.0) continue;
+      const auto at = static_cast<std::size_t>(i);
+      const double w = (1 - q) * (1 - q);
+      const double dw = -4 * s / (half * half) * (1 - q);
+      window.weight[at] = static_cast<float>(w);
+      window.moment[at] = static_cast<float>(s * w);
+      window.slope[at] = static_cast<float>(w + s * dw);
+      window.drift[at] = static_cast<float>(dw);
+    }
+  }
+}
+
+template <class Pixel>
+void EdgeMeter::take(const PixelView<Pixel>& image, const Eigen::Vector2d& centre,
+                     const Eigen::Vector2d& direction, const Window& window, bool coarse,
+                     float min_contrast, EdgeMeasurement& out) const noexcept {
+  const int reach = window.reach_px;
+  double x0 = centre.x() - reach * direction.x();
+  double x1 = centre.x() + reach * direction.x();
+  double step_x = direction.x();
+  if (camera_.mirrored) {
+    x0 = image.width - 1 - x0;
+    x1 = image.width - 1 - x1;
+    step_x = -step_x;
+  }
+  const double y0 = centre.y() - reach * direction.y();
+  const double y1 = centre.y() + reach * direction.y();
+  if (!inside(image, x0, y0) || !inside(image, x1, y1)) return;
+
+  const auto fx = static_cast<float>(x0);
+  const auto fy = static_cast<float>(y0);
+  const auto sx = static_cast<float>(step_x);
+  const auto sy = static_cast<float>(direction.y());
+  std::array<float, kSteps + 1> levels;
+  for (int i = 0; i <= 2 * reach; ++i) {
+    const auto t = static_cast<float>(i);
+    // Rounding may step past the border by a hair at the far end.
+    levels[static_cast<std::size_t>(i)] = sample(
+        image.pixels, image.stride, std::max(0.0F, fx + t * sx), std::max(0.0F, fy + t * sy));
+  }
+  float mass = 0;
+  float moment = 0;
+  float slope = 0;
+  float drift = 0;
+  for (int i = 0; i < 2 * reach; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    float gradient = levels[at + 1] - levels[at];
+    if (coarse) gradient = std::max(0.0F, gradient - kCoarseNoise);
+    mass += window.weight[at] * gradient;
+    moment += window.moment[at] * gradient;
+    slope += window.slope[at] * gradient;
+    drift += window.drift[at] * gradient;
+  }
+  out.contrast = mass;
+  if (!(mass > min_contrast)) return;
+  out.offset_px = moment / mass;
+  out.gain = (slope - out.offset_px * drift) / mass;
+  out.valid = true;
+}
+
+template <class Pixel>
+void EdgeMeter::measure(const PixelView<Pixel>& image, const EdgeTag& tag,
+                        const Eigen::Isometry3d& camera_T_platform, double half_width_px,
+                        bool coarse, std::span<EdgeMeasurement> out) const noexcept {
+  const Eigen::Isometry3d camera_T_tag = camera_T_platform * tag.platform_T_tag;
+  const Eigen::Vector3d origin = camera_T_tag.translation();
+  const Eigen::Vector3d axis_x = camera_T_tag.linear().col(0);
+  const Eigen::Vector3d axis_y = camera_T_tag.linear().col(1);
+  const Eigen::Vector3d centre = camera_T_platform.translation();
+  const std::size_t count = std::min(out.size(), tag.points.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const EdgePoint& point = tag.points[i];
+    EdgeMeasurement& m = out[i];
+    m.valid = false;
+    m.too_near = false;
+    m.weight = 0;
+    const Eigen::Vector3d p = origin + point.x * axis_x + point.y * axis_y;
+    const ProjectedPoint projected = project(camera_, p);
+    if (!projected.valid) continue;
+
+    const Eigen::Vector2d along_x = projected.jacobian * axis_x;
+    const Eigen::Vector2d along_y = projected.jacobian * axis_y;
+    const bool normal_x = is_along_x(point.normal);
+    const bool reversed =
+        point.normal == EdgeNormal::minus_x || point.normal == EdgeNormal::minus_y;
+    const Eigen::Vector2d& tangent = normal_x ? along_y : along_x;
+    Eigen::Vector2d toward_white = normal_x ? along_x : along_y;
+    if (reversed) toward_white = -toward_white;
+    const double length = tangent.norm();
+    if (!(length > 0)) continue;
+    Eigen::Vector2d direction(-tangent.y() / length, tangent.x() / length);
+    m.px_per_m = direction.dot(toward_white);
+    if (m.px_per_m < 0) {
+      direction = -direction;
+      m.px_per_m = -m.px_per_m;
+    }
+    const double half =
+        std::min({half_width_px, kReachUsed * point.reach * m.px_per_m, kWidestHalf_px});
+    m.too_near = !(half >= kMinHalf_px);
+    if (m.too_near) continue;
+    const auto window = static_cast<std::size_t>(std::lround((half - kMinHalf_px) / kHalfStep_px));
+    take(image, projected.pixel, direction, windows_[std::min<std::size_t>(window, kWindows - 1)],
+         coarse, std::max(kMinContrast, kMinContrastFraction * point.contrast), m);
+    if (!m.valid) continue;
+    const Eigen::Vector3d pull = projected.jacobian.transpose() * direction;
+    m.row.head<3>() = pull;
+    m.row.tail<3>() = (p - centre).cross(pull);
+  }
+}
+
+template <class Pixel>
+double EdgeMeter::cell_grey(const PixelView<Pixel>& image, const EdgeTag& tag,
+                            const CellPoint& cell,
+                            const Eigen::Isometry3d& camera_T_platform) const noexcept {
+  const Eigen::Vector3d p =
+      camera_T_platform * (tag.platform_T_tag * Eigen::Vector3d(cell.x, cell.y, 0));
+  const ProjectedPoint projected = project(camera_, p);
+  if (!projected.valid) return -1;
+  const double x = camera_.mirrored ? image.width - 1 - projected.pixel.x() : projected.pixel.x();
+  if (!inside(image, x, projected.pixel.y())) return -1;
+  return sample(image.pixels, image.stride, static_cast<float>(x),
+                static_cast<float>(projected.pixel.y()));
+}
+
+template void EdgeMeter::measure(const PixelView<std::uint8_t>&, const EdgeTag&,
+                                 const Eigen::Isometry3d&, double, bool,
+                                 std::span<EdgeMeasurement>) const noexcept;
+template void EdgeMeter::measure(const PixelView<float>&, const EdgeTag&, const Eigen::Isometry3d&,
+                                 double, bool, std::span<EdgeMeasurement>) const noexcept;
+template double EdgeMeter::cell_grey(const PixelView<std::uint8_t>&, const EdgeTag&,
+                                     const CellPoint&, const Eigen::Isometry3d&) const noexcept;
+template double EdgeMeter::cell_grey(const PixelView<float>&, const EdgeTag&, const CellPoint&,
+                                     const Eigen::Isometry3d&) const noexcept;
 
 }  // namespace tagwrench

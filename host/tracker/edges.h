@@ -1,37 +1,32 @@
-// What a printed tag offers to measure: the boundaries between its black and white cells, and the
-// cells themselves.
+// What a printed tag offers to measure, the boundaries between its black and white cells and the
+// cells themselves, and where they really are in an image, seen from a pose that is nearly right.
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
+
+#include "host/core/types.h"
+#include "host/tracker/camera_model.h"
+#include "host/tracker/target.h"
 
 namespace tagwrench {
 
-/// A tag as printed.
-struct TagPattern {
-  int id = 0;
-  int cells = 0;      ///< along one side of the black square, its black border included
-  double size = 0;    ///< edge of the black square, m
-  double border = 0;  ///< white margin around it, m
-  std::vector<std::uint8_t>
-      white;  ///< cells x cells, row by row from the top left: 1 white, 0 black
-
-  bool is_white(int row, int column) const {
-    return white[static_cast<std::size_t>(row * cells + column)] != 0;
-  }
-};
-
 /// The direction along which an edge goes from black to white, in the tag's axes.
 enum class EdgeNormal : std::uint8_t { plus_x, minus_x, plus_y, minus_y };
+
+constexpr bool is_along_x(EdgeNormal normal) {
+  return normal == EdgeNormal::plus_x || normal == EdgeNormal::minus_x;
+}
 
 /// One place on a black-white boundary, in the tag's plane.
 struct EdgePoint {
   double x = 0;  ///< m, tag axes, learned offset included
   double y = 0;
   EdgeNormal normal = EdgeNormal::plus_x;
-  double reach =
-      0;  ///< distance to the nearest other edge along the normal, m: no profile may be longer
+  double reach = 0;    ///< to the nearest other edge along the normal, m: no profile is longer
   float contrast = 0;  ///< grey levels from black to white at rest; 0 when not learned
 };
 
@@ -61,5 +56,85 @@ struct EdgeTarget {
 /// Points along every boundary of the pattern, away from the places where boundaries meet: blur
 /// rounds these off.
 EdgeTag make_edge_tag(const TagPattern& pattern, const Eigen::Isometry3d& platform_T_tag);
+
+/// Luminance of any number type, borrowed. Row r starts at pixels + r * stride.
+template <class Pixel>
+struct PixelView {
+  const Pixel* pixels = nullptr;
+  int width = 0;
+  int height = 0;
+  int stride = 0;
+};
+
+inline PixelView<std::uint8_t> pixel_view(const ImageView& image) {
+  return {image.pixels, image.width, image.height, image.stride};
+}
+
+/// One edge point's place in the image.
+struct EdgeMeasurement {
+  Vector6 row = Vector6::Zero();  ///< d offset_px / d motion of the platform (m, rad, camera axes;
+                                  ///< see rotation.h)
+  double offset_px = 0;           ///< of the edge from its predicted place, toward the white side
+  double gain = 1;      ///< d offset_px / d true offset: below 1, for profiles are cut and blurred
+  double contrast = 0;  ///< weighted grey levels across the edge, positive when as printed
+  double px_per_m = 0;  ///< image distance per distance along the normal in the tag's plane
+  double weight = 0;    ///< for the solver
+  bool too_near = false;  ///< another edge is so near that no profile fits between
+  bool valid = false;     ///< projected, inside the image, and with contrast
+};
+
+/// Medians over the valid ones: of the gain, kept within what is sensible, as a single profile's is
+/// noisy; and of the contrast.
+double median_gain(std::span<const EdgeMeasurement> measured);
+double median_contrast(std::span<const EdgeMeasurement> measured);
+
+/// Takes profiles across edges and finds the edge in each by the centroid of its gradient under a
+/// symmetric window. Where the predicted place is right, the centroid of any symmetric edge is
+/// zero, whatever its blur: the truncation of the profile slows convergence and leaves no bias. The
+/// gain is the exact derivative of the centroid.
+class EdgeMeter {
+ public:
+  static constexpr double kWidestHalf_px = 10.0;
+
+  explicit EdgeMeter(const CameraModel& camera);
+
+  /// Fills `out`, one for each point of the tag. Profiles reach half_width_px to each side or as
+  /// far as the pattern allows. `coarse` ignores falling gradients, so that a neighbouring edge in
+  /// the window does not pull.
+  template <class Pixel>
+  void measure(const PixelView<Pixel>& image, const EdgeTag& tag,
+               const Eigen::Isometry3d& camera_T_platform, double half_width_px, bool coarse,
+               std::span<EdgeMeasurement> out) const noexcept;
+
+  /// Grey level in the middle of a cell; negative outside the image.
+  template <class Pixel>
+  double cell_grey(const PixelView<Pixel>& image, const EdgeTag& tag, const CellPoint& cell,
+                   const Eigen::Isometry3d& camera_T_platform) const noexcept;
+
+  const CameraModel& camera() const noexcept { return camera_; }
+
+ private:
+  static constexpr int kReach_px = 10;          // samples to each side at most
+  static constexpr int kSteps = 2 * kReach_px;  // gradients lie between samples
+  static constexpr double kMinHalf_px = 1.5;
+  static constexpr double kHalfStep_px = 0.25;
+  static constexpr int kWindows = 35;  // 1.5 .. 10 px
+
+  struct Window {
+    int reach_px = 0;                    // samples -reach..reach
+    std::array<float, kSteps> weight{};  // w(s) at s = -reach + 1/2 + i
+    std::array<float, kSteps> moment{};  // s w(s)
+    std::array<float, kSteps> slope{};   // d(s w)/ds
+    std::array<float, kSteps> drift{};   // dw/ds
+  };
+
+  template <class Pixel>
+  void take(const PixelView<Pixel>& image, const Eigen::Vector2d& centre,
+            const Eigen::Vector2d& direction, const Window& window, bool coarse, float min_contrast,
+            EdgeMeasurement& out) const noexcept;
+
+  CameraModel camera_;
+  std::array<Window, kWindows> windows_{};
+};
 
 }  // namespace tagwrench

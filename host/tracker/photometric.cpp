@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "host/core/algebra/decompositions.h"
-#include "host/tracker/projection.h"
+#include "host/tracker/camera_model.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -66,6 +66,18 @@ Eigen::Matrix<double, kIlluminationParameters, 1> illumination_prior() {
   Eigen::Matrix<double, kIlluminationParameters, 1> sigma;
   sigma << kGainPrior, kGainSlopePrior, kGainSlopePrior, kGainSlopePrior, kOffsetPrior;
   return sigma.cwiseAbs2().cwiseInverse();
+}
+
+constexpr double kTry = 0.2e-3;        // m, displacement for the numeric derivative
+constexpr double kTryAngle = 0.01;     // rad
+constexpr double kTagTry = 20e-6;      // m, of a tag
+constexpr double kTagTryAngle = 2e-3;  // rad
+
+/// Where the line of sight through `p` (camera frame) meets the plane through `origin` with
+/// `normal`.
+Eigen::Vector3d on_plane(const Eigen::Vector3d& p, const Eigen::Vector3d& origin,
+                         const Eigen::Vector3d& normal) {
+  return p * (normal.dot(origin) / normal.dot(p));
 }
 
 }  // namespace
@@ -351,7 +363,7 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
         ++groups->count;
       }
     }
-    // StaticVector groups leave little to compare: then the patches must do.
+    // Few groups leave little to compare: then the patches must do.
     if (groups->count < 1.2 * kFitted) continue;
     const double freedom = groups->count - kGroupsFitted;
     const double excess = groups->ratio * groups->count / freedom - 1;
@@ -398,6 +410,69 @@ Vector6 PhotometricAligner::motion_of(const Eigen::Isometry3d& pose,
   unit << 1e-3, 1e-3, 1e-3, 0.05, 0.05, 0.05;
   const Matrix6 scaled = unit.asDiagonal() * normal * unit.asDiagonal();
   return unit.asDiagonal() * Ldlt<6>(scaled).solve(unit.asDiagonal() * rhs);
+}
+
+void GeometryUncertainty::set(PhotometricAligner& aligner,
+                              const Eigen::Isometry3d& camera_T_platform,
+                              std::vector<Matrix6> tag_covariance, bool origin_follows) {
+  const std::vector<PixelPatch>& patches = aligner.pixels().patches;
+  const CameraModel& camera = aligner.pixels().camera;
+  const auto tags = static_cast<double>(tag_covariance.size());
+  std::vector<Eigen::Vector2d> shifts(patches.size());
+  Vector6 unit;
+  unit << Eigen::Vector3d::Constant(kTagTry), Eigen::Vector3d::Constant(kTagTryAngle);
+  slopes_.assign(tag_covariance.size(), {});
+  for (std::size_t t = 0; t < tag_covariance.size(); ++t) {
+    for (Matrix6& slope : slopes_[t]) slope.setZero();
+    // One plane for each tag, from a patch of it.
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+    double count = 0;
+    for (const PixelPatch& patch : patches) {
+      if (patch.tag != t) continue;
+      centre += camera_T_platform * patch.middle;
+      normal = camera_T_platform.linear() *
+               (patch.right - patch.middle).cross(patch.below - patch.middle);
+      ++count;
+    }
+    if (count == 0) continue;
+    centre /= count;
+    const EigenSystem<6> eigen = symmetric_eigen(Matrix6(
+        unit.cwiseInverse().asDiagonal() * tag_covariance[t] * unit.cwiseInverse().asDiagonal()));
+    for (int k = 0; k < 6; ++k) {
+      const Vector6 error = unit.cwiseProduct(eigen.vectors.col(k));
+      const double size = std::sqrt(std::max(0.0, eigen.values[k]));
+      const Eigen::Matrix3d turn = rotation_from_vector(error.tail<3>());
+      Eigen::Vector3d origin = camera_T_platform.translation();
+      if (origin_follows) origin += error.head<3>() / tags;
+      for (int axis = 0; axis < 6; ++axis) {
+        Vector6 displacement = Vector6::Zero();
+        displacement[axis] = axis < 3 ? kTry : kTryAngle;
+        const Eigen::Isometry3d displaced = moved(camera_T_platform, displacement);
+        const Eigen::Matrix3d rotation = rotation_from_vector(displacement.tail<3>());
+        for (std::size_t n = 0; n < patches.size(); ++n) {
+          Eigen::Vector3d real = camera_T_platform * patches[n].middle;
+          if (patches[n].tag == t) real = on_plane(real, centre + error.head<3>(), turn * normal);
+          const Eigen::Vector3d now = origin + displacement.head<3>() + rotation * (real - origin);
+          shifts[n] =
+              project(camera, now).pixel - project(camera, displaced * patches[n].middle).pixel;
+        }
+        slopes_[t][static_cast<std::size_t>(axis)].col(k) =
+            size / displacement[axis] * aligner.motion_of(displaced, shifts);
+      }
+    }
+  }
+}
+
+Matrix6 GeometryUncertainty::covariance(const Vector6& displacement) const noexcept {
+  Matrix6 sum = Matrix6::Zero();
+  for (const std::array<Matrix6, 6>& slope : slopes_) {
+    Matrix6 spread = Matrix6::Zero();
+    for (int axis = 0; axis < 6; ++axis)
+      spread += displacement[axis] * slope[static_cast<std::size_t>(axis)];
+    sum += spread * spread.transpose();
+  }
+  return sum;
 }
 
 }  // namespace tagwrench

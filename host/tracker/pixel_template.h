@@ -10,10 +10,37 @@
 
 #include "host/core/types.h"
 #include "host/tracker/camera_model.h"
-#include "host/tracker/edge_measure.h"
 #include "host/tracker/edges.h"
 
 namespace tagwrench {
+
+/// I(x + dx, y + dy) for |dx|, |dy| <= 1/2, as a full cubic. Order of the coefficients:
+/// 1, dx, dy, dx^2, dx dy, dy^2, dx^3, dx^2 dy, dx dy^2, dy^3.
+using PixelPolynomial = std::array<double, 10>;
+
+/// A rectangle of a picture as a smooth function: quintic B-spline interpolation, and the
+/// polynomial that describes it best over one pixel. A cubic spline would leave a few thousandths
+/// of a pixel at edges that run along the pixels' rows. Coordinates are those of the picture, pixel
+/// centres at integers.
+class SplineImage {
+ public:
+  /// `levels`: width * height numbers, row by row; the rectangle's first pixel is (left, top).
+  /// Mirror boundary (Unser, "Splines: a perfect fit", IEEE SPM 16(6), 1999).
+  SplineImage(std::vector<float> levels, int left, int top, int width, int height);
+
+  /// The interpolated level; at integers, the given one. Outside, the nearest border repeats.
+  double level(double x, double y) const;
+
+  /// Least squares over the pixel's area: within a pixel the cubic is closer to the spline than a
+  /// Taylor series about its centre.
+  PixelPolynomial polynomial(int x, int y) const;
+
+ private:
+  double coefficient(int column, int row) const;
+
+  std::vector<float> coefficients_;
+  int left_, top_, width_, height_;
+};
 
 /// Parameters of the linear model of one patch, in this order: motion of the platform (camera axes,
 /// m and rad; see rotation.h), blur (2), illumination of the patch's tag (5). The residual image
@@ -22,8 +49,7 @@ namespace tagwrench {
 ///   blur     the Laplacian, times 1 and times depth: a Gaussian point spread whose variance grows
 ///            by 2 b adds b times the Laplacian (heat equation) and, to second order, b^2 / 2 times
 ///            the Laplacian of that; defocus changes the variance in proportion to depth,
-///   illumination  gain times (1, x, y, y^2) over the tag's picture, and an offset: y^2 for the
-///   bands
+///   light    gain times (1, x, y, y^2) over the tag's picture, and an offset: y^2 for the bands
 ///            that a flickering lamp leaves with a rolling shutter. An offset with slopes would
 ///            cost a fifth of the precision.
 constexpr int kMotionParameters = 6;
@@ -98,8 +124,8 @@ struct PixelTemplate {
 CameraModel raw_camera(const CameraModel& camera);
 
 struct PixelTemplateOptions {
-  std::size_t most_pixels = 10240;
-  double least_information = 0.99;  ///< stop choosing pixels when they carry this part
+  std::size_t max_pixels = 10240;
+  double min_information = 0.99;  ///< stop choosing pixels when they carry this part
 };
 
 /// Chooses the pixels. `mean` is the averaged picture as delivered (not flipped).

@@ -3,9 +3,11 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
-#include "host/tracker/appearance.h"
-#include "host/tracker/projection.h"
+#include "host/core/algebra/decompositions.h"
+#include "host/core/robust_statistics.h"
+#include "host/tracker/camera_model.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {
@@ -18,6 +20,203 @@ constexpr double kMoved_px = 0.5;
 /// Light, blur and profiles of finite length displace edges by about this much, px; scatter does
 /// not show it.
 constexpr double kEdgeBias_px = 0.015;
+
+constexpr double kHalf_px = 6.0;  // as the fine stage of the refinement
+/// Of the pose: longer profiles reach the paper's edge and take the tag for tilted.
+constexpr double kPoseHalf_px = 3.5;
+constexpr int kSpreadIterations = 15;
+constexpr int kClusterPoints = 12;  // in a row, of three cells' sides
+constexpr int kOffsetPasses = 3;
+constexpr double kMaxOffset_px = 2.0;
+constexpr double kMinContrastFraction = 0.3;  // of the tag's median
+constexpr double kMinFraction = 0.5;          // of a tag's points
+constexpr double kMinScale_px = 0.05;
+constexpr double kLengthScale = 5e-3;    // m per unit of translation in the normal equations
+constexpr double kSpreadScale = 1e-4;    // m
+constexpr double kSpreadPrior_px = 1.0;  // keeps a spread that the pattern cannot tell near zero
+
+using Measurements = std::vector<std::vector<EdgeMeasurement>>;
+
+Measurements measure_all(const EdgeMeter& meter, const PixelView<float>& image,
+                         const EdgeTarget& target, const Eigen::Isometry3d& pose) {
+  Measurements all;
+  for (const EdgeTag& tag : target.tags) {
+    all.emplace_back(tag.points.size());
+    meter.measure(image, tag, pose, kPoseHalf_px, false, all.back());
+  }
+  return all;
+}
+
+double robust_cut(const Measurements& all) {
+  std::vector<double> offsets;
+  for (const auto& tag : all) {
+    for (const EdgeMeasurement& m : tag) {
+      if (m.valid) offsets.push_back(std::abs(m.offset_px));
+    }
+  }
+  return kTukey95 * std::max(kMinScale_px, kMadToSigma * median(std::move(offsets)));
+}
+
+/// Fits the platform's pose together with one ink spread for each tag (the distance by which black
+/// has grown on all sides) and moves the tags' edge points by it. Interior cells shrink where the
+/// outer square grows, which is what separates spread from distance. Fills the covariance of the
+/// pose (its motion, camera axes, m and rad) from what the residuals say. False when the fit fails.
+bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, EdgeTarget& target,
+                         Eigen::Isometry3d& camera_T_platform, Matrix6& covariance) {
+  const auto tags = static_cast<Eigen::Index>(target.tags.size());
+  Eigen::VectorXd units(6 + tags);
+  units << Eigen::Vector3d::Constant(kLengthScale), Eigen::Vector3d::Ones(),
+      Eigen::VectorXd::Constant(tags, kSpreadScale);
+  for (int i = 0; i < kSpreadIterations; ++i) {
+    const Measurements all = measure_all(meter, image, target, camera_T_platform);
+    const double cut = robust_cut(all);
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(6 + tags, 6 + tags);
+    Eigen::VectorXd rhs = Eigen::VectorXd::Zero(6 + tags);
+    Eigen::VectorXd row(6 + tags);
+    // What neighbouring points have in common (ragged ink, a neighbour's blur) moves the fit more
+    // than noise of the same size: the sandwich estimator for clustered errors, three cells'
+    // sides each.
+    Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(6 + tags, 6 + tags);
+    Eigen::VectorXd pull = Eigen::VectorXd::Zero(6 + tags);
+    int in_cluster = 0;
+    double clusters = 0;
+    for (Eigen::Index t = 0; t < tags; ++t) {
+      const auto& tag = all[static_cast<std::size_t>(t)];
+      const double gain = median_gain(tag);
+      for (const EdgeMeasurement& m : tag) {
+        const double weight = m.valid ? biweight(m.offset_px / cut) : 0;
+        if (weight == 0) continue;
+        row.setZero();
+        row.head<6>() = m.row;
+        row[6 + t] = m.px_per_m;
+        row.array() *= units.array();
+        const Eigen::VectorXd own_pull = weight * (m.offset_px / gain) * row;
+        normal += weight * row * row.transpose();
+        rhs += own_pull;
+        pull += own_pull;
+        if (++in_cluster == kClusterPoints) {
+          meat += pull * pull.transpose();
+          pull.setZero();
+          in_cluster = 0;
+          ++clusters;
+        }
+      }
+    }
+    for (Eigen::Index t = 0; t < tags; ++t) {
+      const auto& tag = all[static_cast<std::size_t>(t)];
+      const double px = tag.empty() ? 1.0 : tag.front().px_per_m * kSpreadScale / kSpreadPrior_px;
+      normal(6 + t, 6 + t) += px * px * 1e-3;
+    }
+    const Ldlt<Eigen::Dynamic> ldlt(normal);
+    if (!ldlt.positive(1e-12)) return false;
+    const Eigen::VectorXd step = ldlt.solve(rhs).cwiseProduct(units);
+    if (!step.allFinite()) return false;
+    camera_T_platform = moved(camera_T_platform, step.head<6>());
+    const auto parameters = static_cast<double>(6 + tags);
+    const Eigen::MatrixXd inverse = ldlt.inverse();
+    const double few = clusters > parameters ? clusters / (clusters - parameters) : 10.0;
+    covariance = few * (units.asDiagonal() * (inverse * meat * inverse) * units.asDiagonal())
+                           .topLeftCorner<6, 6>();
+    for (Eigen::Index t = 0; t < tags; ++t) {
+      for (EdgePoint& point : target.tags[static_cast<std::size_t>(t)].points)
+        point = shifted(point, step[6 + t]);
+    }
+  }
+  renormalise(camera_T_platform);
+  return camera_T_platform.matrix().allFinite() && camera_T_platform.translation().z() > 0;
+}
+
+/// Moves every point onto its own edge as seen at rest, drops points that have none, and notes
+/// contrasts and the cells' grey levels. From then on the fit at rest is exact and tracking
+/// measures changes only, so that ragged print costs little. False when too few points are left.
+bool learn_appearance(const EdgeMeter& meter, const PixelView<float>& image, EdgeTarget& target,
+                      const Eigen::Isometry3d& camera_T_platform) {
+  double squares = 0;
+  double count = 0;
+  for (EdgeTag& tag : target.tags) {
+    const std::size_t before = tag.points.size();
+    std::vector<double> moved_px(before, 0.0);
+    std::vector<EdgeMeasurement> measured(before);
+    for (int pass = 0; pass < kOffsetPasses; ++pass) {
+      meter.measure(image, tag, camera_T_platform, kHalf_px, false, measured);
+      const double gain = median_gain(measured);
+      for (std::size_t i = 0; i < before; ++i) {
+        if (!measured[i].valid) continue;
+        const double step_px = std::clamp(measured[i].offset_px / gain, -0.5, 0.5);
+        moved_px[i] += step_px;
+        tag.points[i] = shifted(tag.points[i], step_px / measured[i].px_per_m);
+      }
+    }
+    meter.measure(image, tag, camera_T_platform, kHalf_px, false, measured);
+    const double least = kMinContrastFraction * median_contrast(measured);
+    std::vector<EdgePoint> kept;
+    std::size_t measurable = 0;  // a narrow white margin leaves nothing of the outer edge
+    for (std::size_t i = 0; i < before; ++i) {
+      const EdgeMeasurement& m = measured[i];
+      measurable += m.too_near ? 0 : 1;
+      if (!m.valid || m.contrast < least || std::abs(moved_px[i]) > kMaxOffset_px) continue;
+      kept.push_back(tag.points[i]);
+      kept.back().contrast = static_cast<float>(m.contrast);
+      squares += moved_px[i] * moved_px[i];
+      count += 1;
+    }
+    if (kept.empty() ||
+        static_cast<double>(kept.size()) < kMinFraction * static_cast<double>(measurable))
+      return false;
+    tag.points = std::move(kept);
+    for (CellPoint& cell : tag.cells) {
+      const double grey = meter.cell_grey(image, tag, cell, camera_T_platform);
+      if (grey >= 0) cell.grey = static_cast<float>(grey);
+    }
+  }
+  target.residual_px = std::sqrt(squares / std::max(1.0, count));
+  return true;
+}
+
+constexpr double kMinLikeness = 0.7;  // glare over a quarter of a tag leaves more
+constexpr double kMinSeen = 0.5;      // of a tag's cells
+constexpr double kMinContrast = 4;    // grey levels, standard deviation over the cells
+
+/// Grey level at a pixel of the image after flipping back; empty outside.
+std::optional<double> level_at(const ReferenceImage& image, bool mirrored,
+                               const Eigen::Vector2d& pixel) {
+  if (!(pixel.x() > -0.5 && pixel.x() < image.width - 0.5 && pixel.y() > -0.5 &&
+        pixel.y() < image.height - 0.5))
+    return std::nullopt;
+  const auto column = static_cast<int>(std::lround(pixel.x()));
+  const auto row = static_cast<int>(std::lround(pixel.y()));
+  const int stored = mirrored ? image.width - 1 - column : column;
+  return image.level[static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
+                     static_cast<std::size_t>(stored)];
+}
+
+/// Of the cells within the black frame, which all tags share.
+double likeness(const CameraModel& camera, const ReferenceImage& image, const TagPattern& pattern,
+                const Eigen::Isometry3d& camera_T_tag) {
+  const double cell = pattern.size / pattern.cells;
+  Eigen::ArrayXd levels(pattern.cells * pattern.cells);
+  Eigen::ArrayXd printed(levels.size());
+  Eigen::Index seen = 0;
+  for (int row = 1; row < pattern.cells - 1; ++row) {
+    for (int column = 1; column < pattern.cells - 1; ++column) {
+      const Eigen::Vector3d middle((column + 0.5) * cell - 0.5 * pattern.size,
+                                   (row + 0.5) * cell - 0.5 * pattern.size, 0);
+      const ProjectedPoint at = project(camera, camera_T_tag * middle);
+      const auto level =
+          at.valid ? level_at(image, camera.mirrored, at.pixel) : std::optional<double>();
+      if (!level) continue;
+      levels[seen] = *level;
+      printed[seen++] = pattern.is_white(row, column) ? 1 : 0;
+    }
+  }
+  const int inside = pattern.cells - 2;
+  if (static_cast<double>(seen) < kMinSeen * inside * inside) return 0;
+  const Eigen::ArrayXd a = levels.head(seen) - levels.head(seen).mean();
+  const Eigen::ArrayXd b = printed.head(seen) - printed.head(seen).mean();
+  if (!(std::sqrt(a.square().mean()) > kMinContrast)) return 0;
+  const double size = std::sqrt(a.square().sum() * b.square().sum());
+  return size > 0 ? (a * b).sum() / size : 0;
+}
 
 }  // namespace
 
@@ -37,7 +236,7 @@ ReferenceEstimator::Progress ReferenceEstimator::add(const ImageView& image,
   if (frames_ == 0) {
     if (!start(image, finding)) return Progress::waiting;
   } else {
-    const Refinement fit = joint_.refine(pixel_view(image), last_pose_);
+    const Refinement fit = joint_.refine(image, last_pose_);
     tags_seen_ = fit.tags_held;
     const bool all = fit.verdict == Verdict::held && fit.tags_held == description_.tags.size();
     const bool has_moved = all && motion_px(fit.camera_T_platform) > kMoved_px;
@@ -65,7 +264,8 @@ bool ReferenceEstimator::start(const ImageView& image, const Finding& finding) {
   }
   if (!place(camera_T_tag)) return false;
   joint_.set_target(learned_.target);
-  const Refinement fit = joint_.refine(pixel_view(image), seen_from(camera_T_tag));
+  const Refinement fit =
+      joint_.refine(image, by_given_tag(camera_T_tag).value_or(learned_.camera_T_platform));
   if (fit.verdict != Verdict::held || fit.tags_held != description_.tags.size()) return false;
   first_pose_ = last_pose_ = fit.camera_T_platform;
   return true;
@@ -78,7 +278,7 @@ std::optional<Eigen::Isometry3d> ReferenceEstimator::tag_pose(const ImageView& i
   std::optional<Eigen::Isometry3d> best;
   double least_px = 1e9;
   for (const Eigen::Isometry3d& candidate : found.camera_T_tag) {
-    const Refinement fit = single_.refine(pixel_view(image), candidate);
+    const Refinement fit = single_.refine(image, candidate);
     if (fit.verdict != Verdict::held || fit.residual_px >= least_px) continue;
     if (fit.camera_T_platform.linear().col(2).dot(fit.camera_T_platform.translation()) <= 0)
       continue;
@@ -91,24 +291,10 @@ std::optional<Eigen::Isometry3d> ReferenceEstimator::tag_pose(const ImageView& i
 /// The platform frame and the tags in it, as far as the description leaves them open; fills
 /// learned_.
 bool ReferenceEstimator::place(const std::vector<Eigen::Isometry3d>& camera_T_tag) {
-  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
-  bool placed = false;
-  if (options_.camera_T_platform) {
-    camera_T_platform = *options_.camera_T_platform;
-    placed = true;
-  } else {
-    for (std::size_t t = 0; t < camera_T_tag.size() && !placed; ++t) {
-      const auto& given = description_.tags[t].platform_T_tag;
-      if (!given) continue;
-      camera_T_platform = camera_T_tag[t] * given->inverse();
-      placed = true;
-    }
-  }
-  if (!placed) {
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    for (const Eigen::Isometry3d& pose : camera_T_tag) centre += pose.translation();
-    camera_T_platform.translation() = centre / static_cast<double>(camera_T_tag.size());
-  }
+  const Eigen::Isometry3d camera_T_platform =
+      options_.camera_T_platform
+          ? *options_.camera_T_platform
+          : by_given_tag(camera_T_tag).value_or(midpoint_frame(camera_T_tag));
   learned_.camera_T_platform = camera_T_platform;
   learned_.target = {};
   for (std::size_t t = 0; t < camera_T_tag.size(); ++t) {
@@ -120,14 +306,15 @@ bool ReferenceEstimator::place(const std::vector<Eigen::Isometry3d>& camera_T_ta
   return camera_T_platform.matrix().allFinite();
 }
 
-/// Where the platform is, which need not be where the reference was given.
-Eigen::Isometry3d ReferenceEstimator::seen_from(
+/// Where the platform is by the first tag whose place is given, which need not be where the
+/// reference was given.
+std::optional<Eigen::Isometry3d> ReferenceEstimator::by_given_tag(
     const std::vector<Eigen::Isometry3d>& camera_T_tag) const {
   for (std::size_t t = 0; t < camera_T_tag.size(); ++t) {
     const auto& given = description_.tags[t].platform_T_tag;
     if (given) return camera_T_tag[t] * given->inverse();
   }
-  return learned_.camera_T_platform;
+  return std::nullopt;
 }
 
 void ReferenceEstimator::accumulate(const ImageView& image) {
@@ -154,8 +341,7 @@ void ReferenceEstimator::accumulate(const ImageView& image) {
 
 /// RMS motion of the tags' centres and edges in the image since the first frame.
 double ReferenceEstimator::motion_px(const Eigen::Isometry3d& camera_T_platform) const {
-  double squares = 0;
-  double count = 0;
+  double squares = 0, count = 0;
   for (const EdgeTag& tag : joint_.target().tags) {
     for (const EdgePoint& point : tag.points) {
       const Eigen::Vector3d p = tag.platform_T_tag * Eigen::Vector3d(point.x, point.y, 0);
@@ -187,11 +373,9 @@ PixelNoise ReferenceEstimator::measure_noise() const {
   Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
   for (std::size_t b = 0; b + 1 < kBins; ++b) {  // the last one saturates
     if (bins[b].size() < kMin) continue;
-    const auto middle = bins[b].begin() + static_cast<std::ptrdiff_t>(bins[b].size() / 2);
-    std::nth_element(bins[b].begin(), middle, bins[b].end());
-    const double variance = kMedianToMean * *middle;
-    const Eigen::Vector2d row(1, (static_cast<double>(b) + 0.5) * (256.0 / kBins));
     const auto weight = static_cast<double>(bins[b].size());
+    const double variance = kMedianToMean * median(std::move(bins[b]));
+    const Eigen::Vector2d row(1, (static_cast<double>(b) + 0.5) * (256.0 / kBins));
     normal += weight * row * row.transpose();
     rhs += weight * variance * row;
   }
@@ -257,9 +441,8 @@ bool ReferenceEstimator::finish() {
     learned_.pose_covariance = covariance + distance_covariance(fitted);
     if (!options_.camera_T_platform) learned_.camera_T_platform = fitted;
     for (std::size_t t = 0; t < patterns_.size(); ++t) {
-      if (!description_.tags[t].platform_T_tag) {
+      if (!description_.tags[t].platform_T_tag)
         learned_.target.tags[t].platform_T_tag = fitted.inverse() * camera_T_tag[t];
-      }
     }
   }
   if (!learn_appearance(meter_, mean, learned_.target, fitted)) return false;
@@ -267,6 +450,21 @@ bool ReferenceEstimator::finish() {
   learned_.seen_from = fitted;
   learned_.image = {mean.width, mean.height, frames_, std::move(sum_)};
   return true;
+}
+
+std::optional<AppearanceMismatch> check_appearance(const CameraModel& camera,
+                                                   const TargetDescription& target,
+                                                   const ReferenceOptions& reference) {
+  if (!reference.appearance || !reference.camera_T_platform) return std::nullopt;
+  for (const Tag& tag : target.tags) {
+    if (!tag.platform_T_tag) continue;
+    const double found =
+        likeness(camera, *reference.appearance,
+                 tag_pattern(target.family, tag.id, target.tag_size, target.border),
+                 *reference.camera_T_platform * *tag.platform_T_tag);
+    if (!(found >= kMinLikeness)) return AppearanceMismatch{tag.id, found};
+  }
+  return std::nullopt;
 }
 
 }  // namespace tagwrench

@@ -1,12 +1,16 @@
-// The reference pose, the tags' placement and their looks, learned from the first frames.
+// The reference pose, the tags' placement and their looks (ink spread, ragged print, contrast,
+// light), learned from the first frames; and the check of a picture that was loaded.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "host/tracker/acquire.h"
+#include "host/tracker/camera_model.h"
+#include "host/tracker/edges.h"
 #include "host/tracker/pixel_template.h"
 #include "host/tracker/refine.h"
+#include "host/tracker/target.h"
 
 namespace tagwrench {
 
@@ -15,10 +19,9 @@ struct LearnedReference {
   Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
   EdgeTarget target;
   Eigen::Isometry3d seen_from = Eigen::Isometry3d::Identity();  ///< camera_T_platform in `image`
-  Matrix6 pose_covariance =
-      Matrix6::Zero();   ///< of seen_from; matters when the reference was given
-  ReferenceImage image;  ///< the average of the first frames, as delivered
-  PixelNoise noise;      ///< of one frame
+  Matrix6 pose_covariance = Matrix6::Zero();  ///< of seen_from; for a reference that was given
+  ReferenceImage image;                       ///< the average of the first frames, as delivered
+  PixelNoise noise;                           ///< of one frame
   /// How well each tag's pose is known: of its motion, camera axes, m and rad.
   std::vector<Matrix6> tag_covariance;
 };
@@ -50,7 +53,8 @@ class ReferenceEstimator {
   bool start(const ImageView& image, const Finding& finding);
   std::optional<Eigen::Isometry3d> tag_pose(const ImageView& image, const FoundTag& found);
   bool place(const std::vector<Eigen::Isometry3d>& camera_T_tag);
-  Eigen::Isometry3d seen_from(const std::vector<Eigen::Isometry3d>& camera_T_tag) const;
+  std::optional<Eigen::Isometry3d> by_given_tag(
+      const std::vector<Eigen::Isometry3d>& camera_T_tag) const;
   void accumulate(const ImageView& image);
   double motion_px(const Eigen::Isometry3d& camera_T_platform) const;
   bool finish();
@@ -73,5 +77,19 @@ class ReferenceEstimator {
   std::vector<std::uint8_t> previous_;
   LearnedReference learned_;
 };
+
+struct AppearanceMismatch {
+  int id = 0;  ///< of the tag that is not where the poses put it
+  /// Correlation of the picture's grey levels with the tag's cells, -1 to 1; of a picture that is
+  /// flat there, zero.
+  double likeness = 0;
+};
+
+/// Does a loaded picture of the sensor at rest show this target at its reference pose? The first
+/// tag whose cells it does not show. Empty where all are shown, and where nothing can be said:
+/// without a picture, a reference pose or the tags' places.
+std::optional<AppearanceMismatch> check_appearance(const CameraModel& camera,
+                                                   const TargetDescription& target,
+                                                   const ReferenceOptions& reference);
 
 }  // namespace tagwrench

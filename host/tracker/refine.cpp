@@ -16,15 +16,11 @@ constexpr double kFineHalf_px = 6.0;
 constexpr int kCoarseSteps = 4;
 constexpr int kFineSteps = 5;
 constexpr double kCoarseEnough_px = 1.0;  ///< a step below this ends the coarse stage
-constexpr double kFineEnough_px =
-    0.03;  ///< and this the fine one: the error left after it is far smaller
+constexpr double kFineEnough_px = 0.03;   ///< and this the fine one: what is left is far smaller
 
-/// Robust scales below these would throw away good points, px.
-constexpr double kCoarseLeastScale_px = 0.7;
-constexpr double kFineLeastScale_px = 0.04;
-
-/// Tukey's biweight at 95 % efficiency for normal errors (Holland and Welsch 1977).
-constexpr double kTukey = 4.685;
+/// Robust scales below these would throw away inliers, px.
+constexpr double kCoarseMinScale_px = 0.7;
+constexpr double kFineMinScale_px = 0.04;
 
 constexpr int kMinPoints = 24;
 constexpr double kMinInlierFraction = 0.5;  ///< of a tag's points, for the tag to be held
@@ -49,8 +45,6 @@ bool sane(const Eigen::Isometry3d& pose) {
 
 }  // namespace
 
-Refiner::Refiner(const CameraModel& camera) : meter_(camera) {}
-
 void Refiner::set_target(EdgeTarget target) {
   target_ = std::move(target);
   first_.assign(1, 0);
@@ -64,30 +58,15 @@ std::span<EdgeMeasurement> Refiner::of_tag(std::size_t tag) noexcept {
   return std::span(measurements_).subspan(first_[tag], first_[tag + 1] - first_[tag]);
 }
 
-Refinement Refiner::refine(const PixelView<std::uint8_t>& image,
-                           const Eigen::Isometry3d& predicted) noexcept {
-  return run(image, predicted);
-}
-
-Refinement Refiner::refine(const PixelView<float>& image,
-                           const Eigen::Isometry3d& predicted) noexcept {
-  return run(image, predicted);
-}
-
-template <class Pixel>
-Refinement Refiner::run(const PixelView<Pixel>& image,
-                        const Eigen::Isometry3d& predicted) noexcept {
+Refinement Refiner::refine(const ImageView& image, const Eigen::Isometry3d& predicted) noexcept {
   Refinement fit;
-  fit.points = static_cast<int>(measurements_.size());
   if (image.pixels == nullptr || target_.tags.empty() || !sane(predicted)) return fit;
   fit.camera_T_platform = predicted;
   std::fill(excluded_.begin(), excluded_.end(), false);
 
-  if (!converge(image, fit)) return fit;
-  int held = judge_tags(image, fit);
-  if (held == 0) return fit;
-  if (held < static_cast<int>(target_.tags.size())) {
-    // The covered tags' few stray points pulled at the fit: once more without them.
+  // Where tags are covered, their few stray points pulled at the fit: once more without them.
+  int held = 0;
+  for (int round = 0; round < 2 && held < static_cast<int>(target_.tags.size()); ++round) {
     if (!converge(image, fit)) return fit;
     held = judge_tags(image, fit);
     if (held == 0) return fit;
@@ -100,32 +79,28 @@ Refinement Refiner::run(const PixelView<Pixel>& image,
   return fit;
 }
 
-template <class Pixel>
-bool Refiner::converge(const PixelView<Pixel>& image, Refinement& fit) noexcept {
-  for (int i = 0; i < kCoarseSteps; ++i) {
-    const Step step = iterate(image, kCoarseHalf_px, true, fit);
-    if (!step.solved) return false;
-    if (step.size_px < kCoarseEnough_px) break;
-  }
-  for (int i = 0; i < kFineSteps; ++i) {
-    const Step step = iterate(image, kFineHalf_px, false, fit);
-    if (!step.solved) return false;
-    if (step.size_px < kFineEnough_px) break;
+bool Refiner::converge(const ImageView& image, Refinement& fit) noexcept {
+  for (const bool coarse : {true, false}) {
+    for (int i = 0; i < (coarse ? kCoarseSteps : kFineSteps); ++i) {
+      const Step step = iterate(image, coarse, fit);
+      if (!step.solved) return false;
+      if (step.size_px < (coarse ? kCoarseEnough_px : kFineEnough_px)) break;
+    }
   }
   return true;
 }
 
-template <class Pixel>
-Refiner::Step Refiner::iterate(const PixelView<Pixel>& image, double half_width_px, bool coarse,
-                               Refinement& fit) noexcept {
+Refiner::Step Refiner::iterate(const ImageView& image, bool coarse, Refinement& fit) noexcept {
+  const double half_width_px = coarse ? kCoarseHalf_px : kFineHalf_px;
   for (std::size_t t = 0; t < target_.tags.size(); ++t) {
     if (excluded_[t]) {
       for (EdgeMeasurement& m : of_tag(t)) m.valid = false;
       continue;
     }
-    meter_.measure(image, target_.tags[t], fit.camera_T_platform, half_width_px, coarse, of_tag(t));
+    meter_.measure(pixel_view(image), target_.tags[t], fit.camera_T_platform, half_width_px, coarse,
+                   of_tag(t));
   }
-  return solve(coarse ? kCoarseLeastScale_px : kFineLeastScale_px, fit);
+  return solve(coarse ? kCoarseMinScale_px : kFineMinScale_px, fit);
 }
 
 /// Standard deviation of the valid offsets about zero, from their median: half of the points may be
@@ -141,20 +116,18 @@ double Refiner::robust_scale_px() noexcept {
   return kMadToSigma * static_cast<double>(*middle);
 }
 
-Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
+Refiner::Step Refiner::solve(double min_scale_px, Refinement& fit) noexcept {
   Vector6 units;
   units << Eigen::Vector3d::Constant(kLengthScale), Eigen::Vector3d::Ones();
-  const double cut = kTukey * std::max(robust_scale_px(), least_scale_px);
+  const double cut = kTukey95 * std::max(robust_scale_px(), min_scale_px);
   Matrix6 normal = Matrix6::Zero();
   Vector6 rhs = Vector6::Zero();
   double weights = 0;
   double gains = 0;
   int inliers = 0;
   for (EdgeMeasurement& m : measurements_) {
-    m.weight = 0;
-    const double q = m.offset_px / cut;
-    if (!m.valid || q * q >= 1) continue;
-    m.weight = (1 - q * q) * (1 - q * q);
+    m.weight = m.valid ? biweight(m.offset_px / cut) : 0;
+    if (m.weight == 0) continue;
     ++inliers;
     weights += m.weight;
     gains += m.weight * m.gain;
@@ -162,7 +135,6 @@ Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
     normal.selfadjointView<Eigen::Lower>().rankUpdate(row, m.weight);
     rhs += m.weight * m.offset_px * row;
   }
-  fit.inliers = inliers;
   if (inliers < kMinPoints) return {};
   // All points share one gain: a single profile's is noisy.
   const double gain = std::clamp(gains / weights, 0.3, 1.3);
@@ -191,8 +163,7 @@ Refiner::Step Refiner::solve(double least_scale_px, Refinement& fit) noexcept {
 }
 
 /// Excludes the tags that the fit or their looks speak against; the number of those left.
-template <class Pixel>
-int Refiner::judge_tags(const PixelView<Pixel>& image, const Refinement& fit) noexcept {
+int Refiner::judge_tags(const ImageView& image, const Refinement& fit) noexcept {
   int held = 0;
   for (std::size_t t = 0; t < target_.tags.size(); ++t) {
     if (excluded_[t]) continue;
@@ -203,28 +174,19 @@ int Refiner::judge_tags(const PixelView<Pixel>& image, const Refinement& fit) no
       measurable += m.too_near ? 0 : 1;
     }
     const bool enough = measurable > 0 && inliers >= kMinInlierFraction * measurable;
-    if (enough && looks_like_tag(image, target_.tags[t], fit.camera_T_platform)) {
-      ++held;
-    } else {
-      excluded_[t] = true;
-    }
+    excluded_[t] = !enough || !looks_like_tag(image, target_.tags[t], fit.camera_T_platform);
+    held += excluded_[t] ? 0 : 1;
   }
   return held;
 }
 
 /// Correlation of the cells' grey levels with those expected: indifferent to gain and offset of the
 /// light.
-template <class Pixel>
-bool Refiner::looks_like_tag(const PixelView<Pixel>& image, const EdgeTag& tag,
+bool Refiner::looks_like_tag(const ImageView& image, const EdgeTag& tag,
                              const Eigen::Isometry3d& pose) noexcept {
-  double n = 0;
-  double sa = 0;
-  double sb = 0;
-  double saa = 0;
-  double sbb = 0;
-  double sab = 0;
+  double n = 0, sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
   for (const CellPoint& cell : tag.cells) {
-    const double a = meter_.cell_grey(image, tag, cell, pose);
+    const double a = meter_.cell_grey(pixel_view(image), tag, cell, pose);
     if (a < 0) continue;
     const auto b = static_cast<double>(cell.grey);
     n += 1;

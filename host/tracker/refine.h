@@ -2,14 +2,14 @@
 // take over.
 //
 // The method here is model-based edge fitting: every black-white boundary of all tags gives points,
-// each measured by a profile across the edge (edge_measure.h), and one rigid pose is fitted to all
+// each measured by a profile across the edge (edges.h), and one rigid pose is fitted to all
 // of them by Gauss-Newton with Tukey weights. Compare Drummond and Cipolla, "Real-time visual
 // tracking of complex structures", PAMI 24(7), 2002.
 #pragma once
 
 #include <vector>
 
-#include "host/tracker/edge_measure.h"
+#include "host/tracker/edges.h"
 
 namespace tagwrench {
 
@@ -21,19 +21,15 @@ enum class Verdict : std::uint8_t {
 
 struct Refinement {
   Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
-  Matrix6 covariance =
-      Matrix6::Zero();     ///< of the motion of the platform, camera axes: m^2, m rad, rad^2
-  double residual_px = 0;  ///< weighted RMS
-  int inliers = 0;         ///< points that carried the fit
-  int points = 0;          ///< points of the target
-  std::uint8_t tags_held =
-      0;  ///< tags that carried the fit and whose cells still look like the tag
+  Matrix6 covariance = Matrix6::Zero();  ///< of the platform's motion, camera axes: m, rad
+  double residual_px = 0;                ///< weighted RMS
+  std::uint8_t tags_held = 0;  ///< that carried the fit and whose cells still look like the tag
   Verdict verdict = Verdict::lost;
 };
 
 class Refiner {
  public:
-  explicit Refiner(const CameraModel& camera);
+  explicit Refiner(const CameraModel& camera) : meter_(camera) {}
 
   /// Allocates; everything else does not.
   void set_target(EdgeTarget target);
@@ -41,9 +37,7 @@ class Refiner {
 
   /// `predicted` must be within about half a cell of the truth in the image. Never throws, never
   /// allocates. A lost verdict leaves the other fields meaningless, but finite.
-  Refinement refine(const PixelView<std::uint8_t>& image,
-                    const Eigen::Isometry3d& predicted) noexcept;
-  Refinement refine(const PixelView<float>& image, const Eigen::Isometry3d& predicted) noexcept;
+  Refinement refine(const ImageView& image, const Eigen::Isometry3d& predicted) noexcept;
 
  private:
   struct Step {
@@ -51,19 +45,12 @@ class Refiner {
     double size_px = 0;  // RMS change of the image points
   };
 
-  template <class Pixel>
-  Refinement run(const PixelView<Pixel>& image, const Eigen::Isometry3d& predicted) noexcept;
-  template <class Pixel>
-  bool converge(const PixelView<Pixel>& image, Refinement& fit) noexcept;
-  template <class Pixel>
-  Step iterate(const PixelView<Pixel>& image, double half_width_px, bool coarse,
-               Refinement& fit) noexcept;
-  Step solve(double least_scale_px, Refinement& fit) noexcept;
+  bool converge(const ImageView& image, Refinement& fit) noexcept;
+  Step iterate(const ImageView& image, bool coarse, Refinement& fit) noexcept;
+  Step solve(double min_scale_px, Refinement& fit) noexcept;
   double robust_scale_px() noexcept;
-  template <class Pixel>
-  int judge_tags(const PixelView<Pixel>& image, const Refinement& fit) noexcept;
-  template <class Pixel>
-  bool looks_like_tag(const PixelView<Pixel>& image, const EdgeTag& tag,
+  int judge_tags(const ImageView& image, const Refinement& fit) noexcept;
+  bool looks_like_tag(const ImageView& image, const EdgeTag& tag,
                       const Eigen::Isometry3d& pose) noexcept;
   std::span<EdgeMeasurement> of_tag(std::size_t tag) noexcept;
 

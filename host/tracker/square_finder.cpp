@@ -1,9 +1,8 @@
-#include "host/tracker/square_finder.h"
-
 #include <opencv2/aruco.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "host/tracker/squares.h"
 #include "host/tracker/tag_dictionary.h"
 
 namespace tagwrench {

@@ -3,7 +3,6 @@
 #include <array>
 
 #include "host/core/grid_tags.h"
-#include "host/tracker/tag_patterns.h"
 
 namespace tagwrench {
 namespace {

@@ -1,5 +1,5 @@
-// The rigid target under the platform: which tags, how large, and where they sit, as far as that is
-// known.
+// The rigid target under the platform: which tags, how large, their cells as printed, and where
+// they sit, as far as that is known.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -42,6 +42,28 @@ int bits_per_side(TagFamily family);
 /// Number of ids in the family: ids run from 0 to one less.
 int id_count(TagFamily family);
 
+/// A tag as printed.
+struct TagPattern {
+  int id = 0;
+  int cells = 0;      ///< along one side of the black square, its black border included
+  double size = 0;    ///< edge of the black square, m
+  double border = 0;  ///< white margin around it, m
+  std::vector<std::uint8_t> white;  ///< cells x cells, row by row from the top left: 1 white
+
+  bool is_white(int row, int column) const {
+    return white[static_cast<std::size_t>(row * cells + column)] != 0;
+  }
+};
+
+/// The tag of this id, `size` (edge of the black square) and `border` (white margin) in m. The id
+/// must be one of the family's: 0 to id_count(family) - 1. Uses OpenCV inside, for its tables of
+/// bits.
+TagPattern tag_pattern(TagFamily family, int id, double size, double border);
+
+/// The id of the family's tag with exactly these cells inside its border, row by row, 1 white,
+/// turned any way. There must be bits_per_side(family) squared of them.
+std::optional<int> identify_tag(TagFamily family, const std::vector<std::uint8_t>& white);
+
 struct Tag {
   int id = 0;
   std::optional<Eigen::Isometry3d> platform_T_tag;  ///< learned at rest when absent
@@ -66,10 +88,9 @@ struct ReferenceImage {
 };
 
 struct ReferenceOptions {
-  int frames = 25;  ///< the first frames, taken at rest
-  std::optional<Eigen::Isometry3d>
-      camera_T_platform;  ///< known reference pose; learned from the first frames when absent
-  std::optional<ReferenceImage> appearance;  ///< as calibrated, seen from camera_T_platform
+  int frames = 25;                                       ///< the first frames, taken at rest
+  std::optional<Eigen::Isometry3d> camera_T_platform{};  ///< at rest; learned at first when absent
+  std::optional<ReferenceImage> appearance{};  ///< as calibrated, seen from camera_T_platform
 };
 
 /// What is known of the target at rest so far.

@@ -5,13 +5,11 @@
 #include <optional>
 
 #include "host/tracker/acquire.h"
-#include "host/tracker/corner_pose.h"
 #include "host/tracker/diagnostics.h"
-#include "host/tracker/geometry_uncertainty.h"
 #include "host/tracker/photometric.h"
-#include "host/tracker/predictor.h"
 #include "host/tracker/reference.h"
 #include "host/tracker/refine.h"
+#include "host/tracker/rotation.h"
 
 namespace tagwrench {
 namespace {
@@ -209,7 +207,7 @@ PhotometricFit Tracker::Impl::align(const Frame& frame, const Eigen::Isometry3d&
 }
 
 Refinement Tracker::Impl::refine_within_reach(const Frame& frame, const Eigen::Isometry3d& start) {
-  Refinement fit = refiner.refine(pixel_view(frame.image), start);
+  Refinement fit = refiner.refine(frame.image, start);
   if (fit.verdict != Verdict::lost &&
       !within_reach(reference.camera_T_platform, fit.camera_T_platform))
     fit = {};
@@ -271,9 +269,8 @@ void Tracker::Impl::conclude(const Estimate& found, FrameFacts& facts, Track& tr
     predictor.start(time, pose);
   }
   enter_held();
-  const bool good = is_accepted(fit);
+  facts.accepted = is_accepted(fit);
   facts.pose = pose;
-  facts.accepted = good;
   facts.by_picture = state == TrackingState::held_by_picture;
   track.tags_held = fit.converged ? fit.tags_held : found.edges.tags_held;
   track.residual_px = found.edges.residual_px;
@@ -283,7 +280,7 @@ void Tracker::Impl::conclude(const Estimate& found, FrameFacts& facts, Track& tr
   }
   track.status = Status::doubtful;
   set_corners(camera, target, reference.platform_T_tag, pose, track);
-  if (!good) return;
+  if (!facts.accepted) return;
   track.status = Status::ok;
   track.displacement = motion_between(reference.camera_T_platform, pose);
   track.covariance = displacement_covariance(fit.covariance, track.displacement) +

@@ -7,18 +7,19 @@
 //
 // learn     the first frames at rest -> reference pose, tags' placement, averaged picture
 //           (reference.h), and of the picture a template (pixel_template.h)
-// predict   constant velocity (predictor.h)
+// predict   constant velocity (rotation.h)
 // align     prediction + pixels -> pose: photometric alignment with the template, six motions with
 //           illumination and blur (photometric.h)
 // refine    where that fails, or while there is no template: model-based edges from the prediction
-//           (refine.h), then tags in the whole image, by OpenCV (acquire.h, corner_pose.h), edges,
+//           (refine.h), then tags in the whole image, by OpenCV (acquire.h, squares.h), edges,
 //           and alignment once more
-// conclude  covariance: noise and residuals, the tags' placement (geometry_uncertainty.h), and
+// conclude  covariance: noise and residuals, the tags' placement (photometric.h), and
 //           where the reference pose was given, that of the picture
 // diagnose  what a person should know (diagnostics.h)
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "host/core/types.h"
 #include "host/tracker/camera_model.h"
@@ -33,6 +34,9 @@ enum class TrackingState : std::uint8_t {
   held_by_picture,  ///< aligned with the template
   lost,             ///< was held
 };
+
+/// A diagnostic as one line for people: what is seen, where, and what to do.
+std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& details);
 
 class Tracker {
  public:

@@ -1,12 +1,11 @@
 #include "host/calibration/target/adjust.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
-#include "host/calibration/target/derivatives.h"
 #include "host/calibration/target/normal.h"
-#include "host/calibration/target/print.h"
 #include "host/core/algebra/decompositions.h"
 #include "host/core/robust_statistics.h"
 #include "host/tracker/rotation.h"
@@ -23,7 +22,6 @@ constexpr double kStillRotation = 1e-5;  // rad
 constexpr double kStillFocal = 1e-5;     // of the ratio
 constexpr double kMaxFocalStep = 0.03;
 
-constexpr double kTukey = 4.685;  // Holland and Welsch 1977
 constexpr double kMinNoise_px = 0.01;
 constexpr double kMinNoiseFraction = 0.5;  // of a point, to the median of all
 constexpr int kFewSeen = 8;                // frames that show too little of a point's noise
@@ -39,27 +37,71 @@ constexpr double kReadoutPrior = 30e-3;       // s, a rolling shutter's
 constexpr double kSpreadPrior = 50e-6;        // m
 constexpr double kMinContrastFraction = 0.3;  // of the tag's median, for a point to be used
 
-double tukey(double offset, double sigma) {
-  const double q = offset / (kTukey * sigma);
-  return q * q < 1 ? (1 - q * q) * (1 - q * q) : 0;
-}
-
 CameraModel with_focal(CameraModel camera, double ratio) {
   camera.fx_px *= ratio;
   camera.fy_px *= ratio;
   return camera;
 }
 
+constexpr double kMinScatter = 0.5e-6;  // m
+constexpr double kFirstScatter = 5e-6;  // m, before anything is known
+constexpr double kCut = 4.0;            // sigmas, for an outlier
+constexpr int kLags = 5;                // points along an edge over which errors may be alike
+
+bool same_edge(const EdgePoint& a, const EdgePoint& b) {
+  return a.normal == b.normal && (is_along_x(a.normal) ? a.x == b.x : a.y == b.y);
+}
+
+/// How far the edges of printed tags lie off the pattern.
+struct PrintScatter {
+  double robust = 0;     ///< standard deviation of one edge point about pattern and spread, m
+  double effective = 0;  ///< what a point counts as: neighbours along an edge err alike, m
+};
+
+/// `shift` of every point of all tags in order (tag t has first[t] .. first[t+1]) and `spread` of
+/// every tag, both toward white, m.
+PrintScatter print_scatter(const std::vector<EdgeTag>& printed,
+                           const std::vector<Eigen::Index>& first, const Eigen::VectorXd& shift,
+                           const std::vector<double>& spread) {
+  Eigen::VectorXd error = shift;
+  for (std::size_t t = 0; t < printed.size(); ++t)
+    error.segment(first[t], first[t + 1] - first[t]).array() -= spread[t];
+  if (error.size() == 0 || error.isZero()) return {kFirstScatter, kFirstScatter};
+  const Eigen::VectorXd sizes = error.cwiseAbs();
+  PrintScatter out;
+  out.robust = std::max(kMinScatter, kMadToSigma * median({sizes.begin(), sizes.end()}));
+  error = error.cwiseMax(-kCut * out.robust).cwiseMin(kCut * out.robust);
+
+  // The mean of n errors with autocorrelation r_l has the variance of n / (1 + 2 sum r_l)
+  // independent ones.
+  std::array<double, kLags + 1> sums{}, counts{};
+  for (std::size_t t = 0; t < printed.size(); ++t) {
+    const std::vector<EdgePoint>& points = printed[t].points;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      for (std::size_t lag = 0; lag <= kLags && i + lag < points.size(); ++lag) {
+        if (!same_edge(points[i], points[i + lag])) break;
+        const Eigen::Index at = first[t] + static_cast<Eigen::Index>(i);
+        sums[lag] += error[at] * error[at + static_cast<Eigen::Index>(lag)];
+        counts[lag] += 1;
+      }
+    }
+  }
+  double alike = 1;
+  for (std::size_t lag = 1; lag <= kLags; ++lag) {
+    if (counts[lag] > 0)
+      alike += 2 * std::max(0.0, sums[lag] / counts[lag]) / (sums[0] / counts[0]);
+  }
+  out.effective = out.robust * std::sqrt(alike);
+  return out;
+}
+
 struct Observation {
   bool valid = false;
-  double by_readout = 0;  // px/s
-  double offset = 0;      // px, true to scale
+  double offset = 0;  // px, true to scale
   EdgeDerivatives by;
 };
 
-}  // namespace
-
-struct TargetAdjuster::Problem {
+struct Problem {
   // What moves while iterating.
   struct State {
     std::vector<Eigen::Isometry3d> camera_T_tag;
@@ -70,13 +112,10 @@ struct TargetAdjuster::Problem {
     double focal_ratio = 1;
   };
 
-  explicit Problem(TargetAtRest given) : rest(std::move(given)) {
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    for (const Eigen::Isometry3d& pose : rest.camera_T_tag) centre += pose.translation();
-    rest_pose.translation() = centre / static_cast<double>(rest.camera_T_tag.size());
-    for (const TagPattern& pattern : rest.patterns) {
+  explicit Problem(const TargetAtRest& given)
+      : rest(given), rest_pose(midpoint_frame(given.camera_T_tag)) {
+    for (const TagPattern& pattern : rest.patterns)
       printed.push_back(make_edge_tag(pattern, Eigen::Isometry3d::Identity()));
-    }
     keep_visible();
   }
 
@@ -96,8 +135,8 @@ struct TargetAdjuster::Problem {
   TargetNormal equations(const State& state, bool at_rest_only) const;
   bool iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal);
 
-  TargetAtRest rest;
-  Eigen::Isometry3d rest_pose = Eigen::Isometry3d::Identity();
+  const TargetAtRest& rest;
+  Eigen::Isometry3d rest_pose;
   std::vector<EdgeTag> printed;
   std::vector<Eigen::Index> first;  // point of each tag, and the end
   Eigen::Index points = 0;
@@ -109,7 +148,7 @@ struct TargetAdjuster::Problem {
 };
 
 /// Leaves out the points that have no clear edge in the rest image.
-void TargetAdjuster::Problem::keep_visible() {
+void Problem::keep_visible() {
   const EdgeMeter meter(rest.camera);
   first.assign(1, 0);
   for (std::size_t t = 0; t < printed.size(); ++t) {
@@ -117,11 +156,7 @@ void TargetAdjuster::Problem::keep_visible() {
     tag.platform_T_tag = rest_pose.inverse() * rest.camera_T_tag[t];
     std::vector<EdgeMeasurement> seen(tag.points.size());
     meter.measure(rest_view(), tag, rest_pose, kHalf_px, false, seen);
-    std::vector<double> contrasts;
-    for (const EdgeMeasurement& m : seen) {
-      if (m.valid) contrasts.push_back(m.contrast);
-    }
-    const double least = kMinContrastFraction * median(contrasts);
+    const double least = kMinContrastFraction * median_contrast(seen);
     std::vector<EdgePoint> kept;
     for (std::size_t i = 0; i < seen.size(); ++i) {
       if (!seen[i].valid || seen[i].contrast < least) continue;
@@ -134,32 +169,29 @@ void TargetAdjuster::Problem::keep_visible() {
   points = first.back();
 }
 
-EdgeTag TargetAdjuster::Problem::edges(const State& state, std::size_t tag) const {
+EdgeTag Problem::edges(const State& state, std::size_t tag) const {
   EdgeTag out = printed[tag];
   out.platform_T_tag = rest_pose.inverse() * state.camera_T_tag[tag];
-  for (std::size_t i = 0; i < out.points.size(); ++i) {
+  for (std::size_t i = 0; i < out.points.size(); ++i)
     out.points[i] = shifted(out.points[i], state.shift[first[tag] + static_cast<Eigen::Index>(i)]);
-  }
   return out;
 }
 
 /// How far (m, along its normal) the rolling shutter shows each point off its place.
-Eigen::VectorXd TargetAdjuster::Problem::lateness(const std::vector<Observation>& seen,
-                                                  double readout) const {
+Eigen::VectorXd Problem::lateness(const std::vector<Observation>& seen, double readout) const {
   Eigen::VectorXd late = Eigen::VectorXd::Zero(points);
   for (std::size_t p = 0; p < seen.size(); ++p) {
     if (seen[p].valid)
-      late[static_cast<Eigen::Index>(p)] = seen[p].by_readout * readout / seen[p].by.normal;
+      late[static_cast<Eigen::Index>(p)] = seen[p].by.readout * readout / seen[p].by.normal;
   }
   return late;
 }
 
 /// Profiles are taken `late` off the points' places, and offsets count from there.
 template <class Pixel>
-void TargetAdjuster::Problem::observe(const EdgeMeter& meter, const PixelView<Pixel>& image,
-                                      const State& state, const Eigen::Isometry3d& pose,
-                                      const Eigen::VectorXd& late,
-                                      std::vector<Observation>& out) const {
+void Problem::observe(const EdgeMeter& meter, const PixelView<Pixel>& image, const State& state,
+                      const Eigen::Isometry3d& pose, const Eigen::VectorXd& late,
+                      std::vector<Observation>& out) const {
   out.assign(static_cast<std::size_t>(points), {});
   for (std::size_t t = 0; t < printed.size(); ++t) {
     EdgeTag tag = edges(state, t);
@@ -167,11 +199,7 @@ void TargetAdjuster::Problem::observe(const EdgeMeter& meter, const PixelView<Pi
       tag.points[i] = shifted(tag.points[i], late[first[t] + static_cast<Eigen::Index>(i)]);
     std::vector<EdgeMeasurement> measured(tag.points.size());
     meter.measure(image, tag, pose, kHalf_px, false, measured);
-    std::vector<double> gains;
-    for (const EdgeMeasurement& m : measured) {
-      if (m.valid) gains.push_back(m.gain);
-    }
-    const double gain = std::clamp(median(gains), 0.3, 1.3);
+    const double gain = median_gain(measured);
     for (std::size_t i = 0; i < measured.size(); ++i) {
       if (!measured[i].valid) continue;
       Observation& seen = out[static_cast<std::size_t>(first[t]) + i];
@@ -183,7 +211,7 @@ void TargetAdjuster::Problem::observe(const EdgeMeter& meter, const PixelView<Pi
   }
 }
 
-void TargetAdjuster::Problem::observe_all(const std::vector<Keyframe>& frames, const State& state) {
+void Problem::observe_all(const std::vector<Keyframe>& frames, const State& state) {
   observe(EdgeMeter(with_focal(rest.camera, state.focal_ratio)), rest_view(), state, rest_pose,
           Eigen::VectorXd::Zero(points), at_rest);
   moving.resize(frames.size());
@@ -197,22 +225,21 @@ void TargetAdjuster::Problem::observe_all(const std::vector<Keyframe>& frames, c
     const double middle = 0.5 * (frame.image_rows - 1) - frame.first_row;
     for (std::size_t p = 0; p < moving[k].size(); ++p) {
       Observation& seen = moving[k][p];
-      seen.by_readout =
+      seen.by.readout =
           seen.by.frame.dot(frame.velocity) * (seen.by.row_px - middle) / frame.image_rows;
       seen.offset +=
-          late[static_cast<Eigen::Index>(p)] * seen.by.normal - seen.by_readout * state.readout;
+          late[static_cast<Eigen::Index>(p)] * seen.by.normal - seen.by.readout * state.readout;
     }
   }
 }
 
 /// Of each point, from its own offsets in all keyframes: points differ in contrast and in the
 /// length of their profiles.
-void TargetAdjuster::Problem::learn_noise() {
+void Problem::learn_noise() {
   noise_px = Eigen::VectorXd::Zero(points);
   std::vector<double> all;
-  std::vector<double> offsets;
   for (Eigen::Index p = 0; p < points; ++p) {
-    offsets.clear();
+    std::vector<double> offsets;
     for (const auto& frame : moving) {
       const Observation& seen = frame[static_cast<std::size_t>(p)];
       if (seen.valid) offsets.push_back(std::abs(seen.offset));
@@ -222,45 +249,34 @@ void TargetAdjuster::Problem::learn_noise() {
     all.push_back(noise_px[p]);
   }
   const double typical = std::max(kMinNoise_px, median(all));
-  for (double& noise : noise_px) {
+  for (double& noise : noise_px)
     noise = noise > 0 ? std::max(noise, kMinNoiseFraction * typical) : typical;
-  }
 }
 
-TargetNormal TargetAdjuster::Problem::equations(const State& state, bool at_rest_only) const {
+TargetNormal Problem::equations(const State& state, bool at_rest_only) const {
   const int frames = at_rest_only ? 0 : static_cast<int>(moving.size());
   TargetNormal normal(frames, static_cast<int>(printed.size()), points);
-  normal.add_readout(-state.readout, 1 / (kReadoutPrior * kReadoutPrior));
+  normal.add_prior(normal.readout_index(), -state.readout, 1 / (kReadoutPrior * kReadoutPrior));
   for (std::size_t t = 0; t < printed.size(); ++t) {
     const int tag = static_cast<int>(t);
-    normal.add_spread(tag, -state.spread[t], 1 / (kSpreadPrior * kSpreadPrior));
+    normal.add_prior(normal.spread_index(tag), -state.spread[t], 1 / (kSpreadPrior * kSpreadPrior));
     for (Eigen::Index p = first[t]; p < first[t + 1]; ++p) {
       const double off_print = state.shift[p] - state.spread[t];
-      const double print =
-          tukey(off_print, scatter.robust) / (scatter.effective * scatter.effective);
+      const double print = biweight(off_print / (kTukey95 * scatter.robust)) /
+                           (scatter.effective * scatter.effective);
       // A point off the print tells nothing of the scale, but still of the motion.
       normal.add_print(p, tag, -off_print, std::max(print, 1 / (kSpreadPrior * kSpreadPrior)));
-      EdgeEquation equation;
-      equation.tag = tag;
-      equation.point = p;
       const double variance = noise_px[p] * noise_px[p];
       const auto add = [&](const Observation& seen, int frame, double weight) {
-        if (!seen.valid || !(weight > 0)) return;
-        equation.frame = frame;
-        equation.by_frame = seen.by.frame;
-        equation.by_tag = seen.by.tag;
-        equation.by_normal = seen.by.normal;
-        equation.by_readout = seen.by_readout;
-        equation.by_focal = seen.by.focal;
-        equation.offset = seen.offset;
-        equation.weight = weight;
-        normal.add(equation);
+        if (seen.valid && weight > 0) normal.add({frame, tag, p, seen.by, seen.offset, weight});
       };
       add(at_rest[static_cast<std::size_t>(p)], -1,
           1 / (variance / std::max(1, rest.image.frames) + kRestFloor_px * kRestFloor_px));
       for (int k = 0; k < frames; ++k) {
         const Observation& seen = moving[static_cast<std::size_t>(k)][static_cast<std::size_t>(p)];
-        add(seen, k, tukey(seen.offset, noise_px[p]) / (variance + frames * kModel_px * kModel_px));
+        add(seen, k,
+            biweight(seen.offset / (kTukey95 * noise_px[p])) /
+                (variance + frames * kModel_px * kModel_px));
       }
     }
   }
@@ -269,8 +285,7 @@ TargetNormal TargetAdjuster::Problem::equations(const State& state, bool at_rest
 
 /// One step; true once it is so small that another would change nothing. Throws nothing; a step
 /// without a solution leaves NaN in the state.
-bool TargetAdjuster::Problem::iterate(const std::vector<Keyframe>& frames, State& state,
-                                      bool free_focal) {
+bool Problem::iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal) {
   observe_all(frames, state);
   learn_noise();
   scatter = print_scatter(printed, first, state.shift, state.spread);
@@ -303,16 +318,13 @@ bool TargetAdjuster::Problem::iterate(const std::vector<Keyframe>& frames, State
   return still && std::abs(zoom) < kStillFocal;
 }
 
-TargetAdjuster::TargetAdjuster(TargetAtRest rest)
-    : problem_(std::make_unique<Problem>(std::move(rest))) {}
+}  // namespace
 
-TargetAdjuster::~TargetAdjuster() = default;
-
-TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
-                                      const std::function<bool(double)>& progress) {
-  Problem& problem = *problem_;
+TargetEstimate adjust_target(const TargetAtRest& rest, const std::vector<Keyframe>& frames,
+                             const std::function<bool(double)>& progress) {
+  Problem problem(rest);
   Problem::State state;
-  state.camera_T_tag = problem.rest.camera_T_tag;
+  state.camera_T_tag = rest.camera_T_tag;
   state.spread.assign(state.camera_T_tag.size(), 0.0);
   state.shift = Eigen::VectorXd::Zero(problem.points);
   for (const Keyframe& frame : frames)
@@ -329,9 +341,8 @@ TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
   };
   TargetEstimate estimate;
   estimate.points = static_cast<int>(problem.points);
-  Problem::State zoomed;
   if (!settle(state, false)) return estimate;
-  zoomed = state;
+  Problem::State zoomed = state;
   if (!settle(zoomed, true)) return estimate;
   estimate.focal_ratio = zoomed.focal_ratio;
 
@@ -358,10 +369,8 @@ TargetEstimate TargetAdjuster::adjust(const std::vector<Keyframe>& frames,
   estimate.camera_T_tag = state.camera_T_tag;
   estimate.ink_spread = state.spread;
   estimate.print_scatter = problem.scatter.robust;
-  std::vector<double> noise(problem.noise_px.begin(), problem.noise_px.end());
-  estimate.noise_px = median(noise);
-  double squares = 0;
-  double count = 0;
+  estimate.noise_px = median({problem.noise_px.begin(), problem.noise_px.end()});
+  double squares = 0, count = 0;
   for (const auto& frame : problem.moving) {
     for (const Observation& seen : frame) {
       if (!seen.valid) continue;

@@ -16,11 +16,9 @@
 #pragma once
 
 #include <functional>
-#include <memory>
-#include <string>
 #include <vector>
 
-#include "host/calibration/target/keyframes.h"
+#include "host/tracker/edges.h"
 #include "host/tracker/target.h"
 
 namespace tagwrench {
@@ -54,22 +52,24 @@ struct TargetAtRest {
   std::vector<Eigen::Isometry3d> camera_T_tag;
 };
 
-class TargetAdjuster {
- public:
-  explicit TargetAdjuster(TargetAtRest rest);
-  ~TargetAdjuster();
-  TargetAdjuster(const TargetAdjuster&) = delete;
-  TargetAdjuster& operator=(const TargetAdjuster&) = delete;
+/// One picture of the moved target, flipped back where the camera mirrors it.
+struct Keyframe {
+  Vector6 displacement = Vector6::Zero();  ///< from rest, as tracked: m, rad (types.h)
+  Vector6 velocity = Vector6::Zero();      ///< m/s, rad/s along the camera's axes
+  int first_row = 0;                       ///< of the crop in the image
+  int image_rows = 1;                      ///< of the whole image
+  CameraModel camera;                ///< of the crop: the principal point counts from its corner
+  std::vector<std::uint8_t> pixels;  ///< no padding
 
-  /// `frames` carry displacements of the platform whose origin at rest is the midpoint of the given
-  /// tag centres. `progress` is told the share that is done, 0..1; false from it gives up (not
-  /// solved).
-  TargetEstimate adjust(const std::vector<Keyframe>& frames,
-                        const std::function<bool(double)>& progress = {});
-
- private:
-  struct Problem;
-  std::unique_ptr<Problem> problem_;
+  PixelView<std::uint8_t> view() const {
+    return {pixels.data(), camera.width_px, camera.height_px, camera.width_px};
+  }
 };
+
+/// `frames` carry displacements of the platform whose origin at rest is the midpoint of the given
+/// tag centres. `progress` is told the share that is done, 0..1; false from it gives up (not
+/// solved).
+TargetEstimate adjust_target(const TargetAtRest& rest, const std::vector<Keyframe>& frames,
+                             const std::function<bool(double)>& progress = {});
 
 }  // namespace tagwrench

@@ -1,6 +1,7 @@
 #include "host/calibration/target/normal.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 #include "host/core/algebra/decompositions.h"
 
@@ -23,6 +24,33 @@ Eigen::VectorXd unit_vector(Eigen::Index frames, Eigen::Index tags) {
 
 }  // namespace
 
+EdgeDerivatives edge_derivatives(const CameraModel& camera, const EdgeMeasurement& measurement,
+                                 const Eigen::Isometry3d& camera_T_platform,
+                                 const Eigen::Isometry3d& rest_camera_T_platform,
+                                 const Eigen::Isometry3d& camera_T_tag,
+                                 const Eigen::Vector3d& point) {
+  EdgeDerivatives by;
+  by.frame = measurement.row;
+  by.normal = measurement.px_per_m;
+  // A motion (t, r) of the tag at rest moves the point by t + r x arm at rest, and by that turned
+  // in the picture.
+  const Eigen::Matrix3d turn =
+      camera_T_platform.linear() * rest_camera_T_platform.linear().transpose();
+  const Eigen::Vector3d pull = turn.transpose() * measurement.row.head<3>();
+  const Eigen::Vector3d arm = camera_T_tag.linear() * point;
+  by.tag << pull, arm.cross(pull);
+  // measurement.row begins with J^T n, n the direction of the profile and J the projection's
+  // derivative; the image grows about the principal point.
+  const Eigen::Vector3d p =
+      camera_T_platform * (rest_camera_T_platform.inverse() * (camera_T_tag * point));
+  const ProjectedPoint seen = project(camera, p);
+  const Eigen::Matrix2d square = seen.jacobian * seen.jacobian.transpose();
+  const Eigen::Vector2d direction = square.inverse() * (seen.jacobian * measurement.row.head<3>());
+  by.focal = direction.dot(seen.pixel - Eigen::Vector2d(camera.cx_px, camera.cy_px));
+  by.row_px = seen.pixel.y();
+  return by;
+}
+
 TargetNormal::TargetNormal(int frames, int tags, Eigen::Index points)
     : tags_(tags), moving_(6 * frames), shared_(7 * tags + 2), units_(unit_vector(frames, tags)) {
   const Eigen::Index all = moving_ + shared_;
@@ -42,34 +70,33 @@ void TargetNormal::add(const EdgeEquation& equation) {
   Eigen::Matrix<Eigen::Index, 14, 1> at;
   at << Places::LinSpaced(frame, frame + 5), Places::LinSpaced(tag, tag + 5), camera, camera + 1;
   Eigen::Matrix<double, 14, 1> by;
-  by << (moves ? 1 : 0) * equation.by_frame, equation.by_tag, equation.by_readout,
-      equation.by_focal;
+  by << (moves ? 1 : 0) * equation.by.frame, equation.by.tag, equation.by.readout,
+      equation.by.focal;
   by.array() *= units_(at).array();
   normal_(at, at) += w * by * by.transpose();
   right_(at) += w * equation.offset * by;
-  const double v = w * equation.by_normal;
+  const double v = w * equation.by.normal;
   coupling_.col(equation.point)(at) += v * by;
-  pivot_[equation.point] += v * equation.by_normal;
+  pivot_[equation.point] += v * equation.by.normal;
   pull_[equation.point] += v * equation.offset;
 }
 
 void TargetNormal::add_print(Eigen::Index point, int tag, double offset, double weight) {
   const Eigen::Index spread = moving_ + spread_index(tag);
-  add_prior(spread, -offset, weight);
+  add_prior(spread_index(tag), -offset, weight);
   coupling_(spread, point) -= weight * units_[spread];
   pivot_[point] += weight;
   pull_[point] += weight * offset;
 }
 
-void TargetNormal::add_prior(Eigen::Index at, double offset, double weight) {
+void TargetNormal::add_prior(Eigen::Index shared, double offset, double weight) {
+  const Eigen::Index at = moving_ + shared;
   normal_(at, at) += weight * units_[at] * units_[at];
   right_[at] += weight * offset * units_[at];
 }
 
 bool TargetNormal::reduce() {
-  for (Eigen::Index p = 0; p < pivot_.size(); ++p) {
-    if (!(pivot_[p] > 0)) return false;
-  }
+  if (!(pivot_.array() > 0).all()) return false;
   const Eigen::VectorXd root = pivot_.cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = coupling_ * root.asDiagonal();
   normal_.selfadjointView<Eigen::Lower>().rankUpdate(scaled, -1.0);

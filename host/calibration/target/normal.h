@@ -1,23 +1,39 @@
-// The normal equations of target_adjust.h and their solution in two eliminations.
+// The normal equations of adjust.h, their solution in two eliminations, and the derivatives in
+// them: how what a picture shows of one edge point changes with all that is unknown about it.
 #pragma once
 
 #include <Eigen/Core>
-#include <vector>
+#include <Eigen/Geometry>
 
 #include "host/core/types.h"
+#include "host/tracker/camera_model.h"
+#include "host/tracker/edges.h"
 
 namespace tagwrench {
+
+/// How the offset of one edge point (px, along its normal in the image) changes.
+struct EdgeDerivatives {
+  Vector6 frame = Vector6::Zero();  ///< with a motion of the platform (rotation.h), px/m and px/rad
+  Vector6 tag = Vector6::Zero();    ///< with a motion of the tag at rest, camera axes, alike
+  double normal = 0;                ///< with a shift of the edge in the tag's plane, px/m
+  double focal = 0;                 ///< with the logarithm of the focal length, px
+  double readout = 0;               ///< with the read-out time, px/s; the caller's to fill in
+  double row_px = 0;                ///< where the point is seen
+};
+
+/// `camera_T_platform` in this picture and at rest; `camera_T_tag` at rest; `point` in tag axes, m.
+EdgeDerivatives edge_derivatives(const CameraModel& camera, const EdgeMeasurement& measurement,
+                                 const Eigen::Isometry3d& camera_T_platform,
+                                 const Eigen::Isometry3d& rest_camera_T_platform,
+                                 const Eigen::Isometry3d& camera_T_tag,
+                                 const Eigen::Vector3d& point);
 
 /// One offset of an edge: offset = derivatives . unknowns + noise.
 struct EdgeEquation {
   int frame = -1;  ///< keyframe; -1: the rest image, whose pose is no unknown
   int tag = 0;
   Eigen::Index point = 0;
-  Vector6 by_frame = Vector6::Zero();
-  Vector6 by_tag = Vector6::Zero();
-  double by_normal = 0;
-  double by_readout = 0;
-  double by_focal = 0;
+  EdgeDerivatives by;
   double offset = 0;
   double weight = 0;  ///< 1 / variance
 };
@@ -31,14 +47,8 @@ class TargetNormal {
   void add(const EdgeEquation& equation);
   /// shift - spread of the tag = offset + noise
   void add_print(Eigen::Index point, int tag, double offset, double weight);
-  /// spread of the tag = offset + noise
-  void add_spread(int tag, double offset, double weight) {
-    add_prior(moving_ + spread_index(tag), offset, weight);
-  }
-  /// read-out time = offset + noise
-  void add_readout(double offset, double weight) {
-    add_prior(moving_ + readout_index(), offset, weight);
-  }
+  /// A shared unknown, by its index = offset + noise
+  void add_prior(Eigen::Index shared, double offset, double weight);
 
   /// Eliminates points and keyframes; false if the equations do not determine the keyframes. Once.
   bool reduce();
@@ -60,8 +70,6 @@ class TargetNormal {
   Eigen::Index focal_index() const noexcept { return shared_ - 1; }
 
  private:
-  void add_prior(Eigen::Index at, double offset, double weight);
-
   Eigen::Index tags_;
   Eigen::Index moving_;  // unknowns of the keyframes
   Eigen::Index shared_;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
+#include <cmath>
+#include <utility>
 
 #include "host/tracker/acquire.h"
-#include "host/tracker/reference.h"
+#include "host/tracker/camera_model.h"
 #include "host/tracker/rotation.h"
-#include "host/tracker/tracker.h"
 
 namespace tagwrench {
 namespace {
@@ -23,135 +23,154 @@ TargetDescription without_placement(TargetDescription target) {
   return target;
 }
 
-ReferenceOptions only_frames(const ReferenceOptions& rest) {
-  ReferenceOptions out;
-  out.frames = rest.frames;
-  return out;
+constexpr double kMargin_px = 16.0;      // profiles reach 6 px, and the pose may be a pixel off
+constexpr double kSpacingGrowth = 1.25;  // each time the set is full
+
+/// How different two displacements are, m: a rotation counts by what it moves at the distance of
+/// the lens.
+double distance(const Vector6& a, const Vector6& b) {
+  constexpr double kLever = 20e-3;  // m
+  const Vector6 d = a - b;
+  return std::sqrt(d.head<3>().squaredNorm() + kLever * kLever * d.tail<3>().squaredNorm());
 }
 
 }  // namespace
 
-struct TargetRecorder::State {
-  State(const CameraModel& model, const TargetDescription& description,
-        const ReferenceOptions& rest, std::size_t most_keyframes)
-      : camera(model),
-        target(without_placement(description)),
-        acquirer(model, target),
-        learner(model, target, only_frames(rest), acquirer.patterns()),
-        tracker(model, target, only_frames(rest)),
-        keyframes(most_keyframes) {}
+TargetRecorder::TargetRecorder(const CameraModel& camera, const TargetDescription& target,
+                               const ReferenceOptions& rest, std::size_t max_keyframes)
+    : camera_(camera),
+      target_(without_placement(target)),
+      acquirer_(camera, target_),
+      learner_(camera, target_, {.frames = rest.frames}, acquirer_.patterns()),
+      tracker_(camera, target_, {.frames = rest.frames}),
+      keyframes_(max_keyframes) {}
 
-  void learn(const ImageView& image);
-  void finish();
-  void follow(const Frame& frame, const Track& track);
-
-  CameraModel camera;
-  TargetDescription target;
-  Acquirer acquirer;
-  ReferenceEstimator learner;
-  Tracker tracker;
-  KeyframeSet keyframes;
-  bool rest_known = false;
-  Eigen::Isometry3d rest_pose = Eigen::Isometry3d::Identity();
-  TargetAtRest at_rest;
-  std::vector<Eigen::Vector3d> outline;  // the tags' papers, platform coordinates
-  Counts counts;
-  struct Followed {
-    TimePoint time{};
-    Eigen::Isometry3d pose;
-  };
-  std::optional<Followed> latest;   // the last frames that were followed, in a row
-  std::optional<Followed> earlier;  // before `latest`
-  std::optional<Keyframe> waiting;  // the latest frame's, until its velocity is known
-  Vector6 lowest = Vector6::Zero();
-  Vector6 highest = Vector6::Zero();
-};
-
-void TargetRecorder::State::learn(const ImageView& image) {
-  const Finding finding = learner.wants_finding() ? acquirer.find(image) : Finding{};
-  const ReferenceEstimator::Progress progress = learner.add(image, finding);
-  counts.most_tags_seen = std::max(counts.most_tags_seen, learner.tags_seen());
-  if (progress == ReferenceEstimator::Progress::moved) ++counts.moved;
+void TargetRecorder::learn(const ImageView& image) {
+  const Finding finding = learner_.wants_finding() ? acquirer_.find(image) : Finding{};
+  const ReferenceEstimator::Progress progress = learner_.add(image, finding);
+  counts_.most_tags_seen = std::max(counts_.most_tags_seen, learner_.tags_seen());
+  if (progress == ReferenceEstimator::Progress::moved) ++counts_.moved;
   if (progress == ReferenceEstimator::Progress::done) finish();
 }
 
-void TargetRecorder::State::finish() {
-  at_rest.camera = camera;
-  at_rest.image = learner.learned().image;
-  at_rest.patterns = acquirer.patterns();
-  rest_pose = learner.learned().camera_T_platform;
-  const double half = 0.5 * target.tag_size + target.border;
-  for (const EdgeTag& tag : learner.learned().target.tags) {
-    at_rest.camera_T_tag.push_back(rest_pose * tag.platform_T_tag);
-    for (const double x : {-half, half}) {
-      for (const double y : {-half, half})
-        outline.push_back(tag.platform_T_tag * Eigen::Vector3d(x, y, 0));
-    }
+void TargetRecorder::finish() {
+  at_rest_.camera = camera_;
+  at_rest_.image = learner_.learned().image;
+  at_rest_.patterns = acquirer_.patterns();
+  rest_pose_ = learner_.learned().camera_T_platform;
+  const double half = 0.5 * target_.tag_size + target_.border;
+  for (const EdgeTag& tag : learner_.learned().target.tags) {
+    at_rest_.camera_T_tag.push_back(rest_pose_ * tag.platform_T_tag);
+    for (const Eigen::Vector3d& corner : square_corners(half))
+      outline_.push_back(tag.platform_T_tag * corner);
   }
-  rest_known = true;
+  rest_known_ = true;
 }
 
 /// A picture's velocity is the mean of the steps before it and after it: it counts only where the
 /// frames on both sides were followed.
-void TargetRecorder::State::follow(const Frame& frame, const Track& track) {
-  ++counts.moving;
-  if (track.status != Status::ok || track.tags_held < target.tags.size()) {
-    latest.reset();
-    earlier.reset();
-    waiting.reset();
+void TargetRecorder::follow(const Frame& frame, const Track& track) {
+  ++counts_.moving;
+  if (track.status != Status::ok || track.tags_held < target_.tags.size()) {
+    latest_.reset();
+    earlier_.reset();
+    waiting_.reset();
     return;
   }
-  ++counts.followed;
-  lowest = lowest.cwiseMin(track.displacement);
-  highest = highest.cwiseMax(track.displacement);
-  const Eigen::Isometry3d pose = moved(rest_pose, track.displacement);
-  if (waiting && earlier) {
+  ++counts_.followed;
+  lowest_ = lowest_.cwiseMin(track.displacement);
+  highest_ = highest_.cwiseMax(track.displacement);
+  const Eigen::Isometry3d pose = moved(rest_pose_, track.displacement);
+  if (waiting_ && earlier_) {
     const double seconds =
-        std::chrono::duration<double>(frame.capture_time - earlier->time).count();
-    waiting->velocity = motion_between(earlier->pose, pose) / seconds;
-    if (seconds > 0 && seconds < kMaxStep) keyframes.add(std::move(*waiting));
+        std::chrono::duration<double>(frame.capture_time - earlier_->time).count();
+    waiting_->velocity = motion_between(earlier_->pose, pose) / seconds;
+    if (seconds > 0 && seconds < kMaxStep) keyframes_.add(std::move(*waiting_));
   }
-  waiting.reset();
-  earlier = latest;
-  latest = {frame.capture_time, pose};
-  if (!earlier || !keyframes.wants(track.displacement)) return;
+  waiting_.reset();
+  earlier_ = latest_;
+  latest_ = {frame.capture_time, pose};
+  if (!earlier_ || !keyframes_.wants(track.displacement)) return;
   std::vector<Eigen::Vector3d> seen;
-  for (const Eigen::Vector3d& p : outline) seen.push_back(pose * p);
-  Keyframe keyframe = cropped(frame.image, camera, seen);
+  for (const Eigen::Vector3d& p : outline_) seen.push_back(pose * p);
+  Keyframe keyframe = cropped(frame.image, camera_, seen);
   keyframe.displacement = track.displacement;
-  if (!keyframe.pixels.empty()) waiting = std::move(keyframe);
+  if (!keyframe.pixels.empty()) waiting_ = std::move(keyframe);
 }
 
-TargetRecorder::TargetRecorder(const CameraModel& camera, const TargetDescription& target,
-                               const ReferenceOptions& rest, std::size_t most_keyframes)
-    : state_(std::make_unique<State>(camera, target, rest, most_keyframes)) {}
-
-TargetRecorder::~TargetRecorder() = default;
-
 Track TargetRecorder::add(const Frame& frame) {
-  ++state_->counts.frames;
-  const Track track = state_->tracker.track(frame);
+  ++counts_.frames;
+  const Track track = tracker_.track(frame);
   if (track.diagnostic == Diagnostic::image_looks_mirrored ||
       track.diagnostic == Diagnostic::image_looks_unmirrored)
-    state_->counts.flipped = true;
+    counts_.flipped = true;
   const ImageView& image = frame.image;
-  const CameraModel& camera = state_->camera;
-  if (image.pixels == nullptr || image.width != camera.width_px || image.height != camera.height_px)
+  if (image.pixels == nullptr || image.width != camera_.width_px ||
+      image.height != camera_.height_px)
     return track;
-  if (state_->rest_known) {
-    state_->follow(frame, track);
-  } else {
-    state_->learn(image);
-  }
+  if (rest_known_)
+    follow(frame, track);
+  else
+    learn(image);
   return track;
 }
 
-bool TargetRecorder::rest_known() const noexcept { return state_->rest_known; }
-const TargetAtRest& TargetRecorder::at_rest() const noexcept { return state_->at_rest; }
-const std::vector<Keyframe>& TargetRecorder::keyframes() const noexcept {
-  return state_->keyframes.frames();
+Keyframe cropped(const ImageView& image, const CameraModel& camera,
+                 const std::vector<Eigen::Vector3d>& points_camera) {
+  Eigen::Array2d low(1e9, 1e9);
+  Eigen::Array2d high(-1e9, -1e9);
+  for (const Eigen::Vector3d& p : points_camera) {
+    const ProjectedPoint projected = project(camera, p);
+    if (!projected.valid || !projected.pixel.allFinite()) continue;
+    low = low.min(projected.pixel.array());
+    high = high.max(projected.pixel.array());
+  }
+  const Eigen::Array2d last(image.width - 1, image.height - 1);
+  low = (low - kMargin_px).floor().max(0.0);
+  high = (high + kMargin_px).ceil().min(last);
+  Keyframe frame;
+  frame.camera = camera;
+  if (!(low <= high).all()) return frame;
+  const int x0 = static_cast<int>(low.x());
+  const int y0 = static_cast<int>(low.y());
+  const int width = static_cast<int>(high.x()) - x0 + 1;
+  const int height = static_cast<int>(high.y()) - y0 + 1;
+  frame.camera.width_px = width;
+  frame.camera.height_px = height;
+  frame.camera.cx_px -= x0;
+  frame.camera.cy_px -= y0;
+  frame.camera.mirrored = false;
+  frame.first_row = y0;
+  frame.image_rows = image.height;
+  frame.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  auto to = frame.pixels.begin();
+  for (int row = y0; row < y0 + height; ++row) {
+    const std::uint8_t* from = image.pixels + static_cast<std::ptrdiff_t>(row) * image.stride;
+    if (camera.mirrored) {
+      to = std::reverse_copy(from + image.width - x0 - width, from + image.width - x0, to);
+    } else {
+      to = std::copy(from + x0, from + x0 + width, to);
+    }
+  }
+  return frame;
 }
-const TargetRecorder::Counts& TargetRecorder::counts() const noexcept { return state_->counts; }
-Vector6 TargetRecorder::range() const { return state_->highest - state_->lowest; }
+
+bool KeyframeSet::wants(const Vector6& displacement) const {
+  return std::none_of(frames_.begin(), frames_.end(), [&](const Keyframe& kept) {
+    return distance(kept.displacement, displacement) < spacing_;
+  });
+}
+
+void KeyframeSet::add(Keyframe frame) {
+  frames_.push_back(std::move(frame));
+  while (frames_.size() > capacity_) {
+    spacing_ *= kSpacingGrowth;
+    std::vector<Keyframe> all;
+    all.swap(frames_);
+    for (Keyframe& kept : all) {
+      if (wants(kept.displacement)) frames_.push_back(std::move(kept));
+    }
+  }
+}
 
 }  // namespace tagwrench

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "host/core/algebra/decompositions.h"
 #include "host/core/config_error.h"
@@ -26,8 +27,9 @@ constexpr double kMaxRotationSigma = 2e-3;   // rad
 constexpr double kBetterFraction = 0.9;      // of a sigma, to be called better known
 constexpr double kLearnedFraction = 0.98;    // and for the motion to have told anything
 
-[[noreturn]] void refuse(const std::string& line) {
-  throw ConfigError("calibrate target: " + line);
+template <class... Args>
+[[noreturn]] void refuse(fmt::format_string<Args...> line, Args&&... args) {
+  throw ConfigError("calibrate target: " + fmt::format(line, std::forward<Args>(args)...));
 }
 
 void refuse_without_rest(const TargetRecorder::Counts& counts, std::size_t tags, int rest_frames) {
@@ -38,22 +40,21 @@ void refuse_without_rest(const TargetRecorder::Counts& counts, std::size_t tags,
         "and start again");
   }
   if (counts.most_tags_seen == 0) {
-    refuse(fmt::format(
-        "no tag was seen in {} frames; check light, focus, and sensor.yaml's family and ids",
-        counts.frames));
+    refuse("no tag was seen in {} frames; check light, focus, and sensor.yaml's family and ids",
+           counts.frames);
   }
   if (counts.most_tags_seen < static_cast<int>(tags)) {
-    refuse(fmt::format(
+    refuse(
         "{} of {} tags were seen in {} frames; all must be in view at rest, check what covers them "
         "and sensor.yaml's ids",
-        counts.most_tags_seen, tags, counts.frames));
+        counts.most_tags_seen, tags, counts.frames);
   }
   if (counts.moved > 0) {
-    refuse(fmt::format("the platform never stood still for {} frames; keep your hands off at first",
-                       rest_frames));
+    refuse("the platform never stood still for {} frames; keep your hands off at first",
+           rest_frames);
   }
-  refuse(fmt::format("{} frames do not make a rest of {} frames with all tags held; record more",
-                     counts.frames, rest_frames));
+  refuse("{} frames do not make a rest of {} frames with all tags held; record more", counts.frames,
+         rest_frames);
 }
 
 }  // namespace
@@ -84,14 +85,6 @@ ViewSpan view_span(const std::vector<Keyframe>& frames,
   return span;
 }
 
-Eigen::Isometry3d rest_platform(const std::vector<Eigen::Isometry3d>& camera_T_tag) {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  for (const Eigen::Isometry3d& pose : camera_T_tag) centre += pose.translation();
-  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
-  camera_T_platform.translation() = centre / static_cast<double>(camera_T_tag.size());
-  return camera_T_platform;
-}
-
 void check_record(const TargetRecorder& record, const TargetDescription& target,
                   const ReferenceOptions& rest) {
   const TargetRecorder::Counts& counts = record.counts();
@@ -106,23 +99,24 @@ void check_record(const TargetRecorder& record, const TargetDescription& target,
         "all frames were needed for the rest; record more, and move the platform about after it");
   }
   if (counts.followed < kMinFollowed * counts.moving) {
-    refuse(fmt::format(
+    refuse(
         "all tags were held in only {} of {} frames; keep them in view, lit and in focus, and move "
         "more slowly",
-        counts.followed, counts.moving));
+        counts.followed, counts.moving);
   }
-  const ViewSpan span = view_span(record.keyframes(), rest_platform(record.at_rest().camera_T_tag));
+  const ViewSpan span =
+      view_span(record.keyframes(), midpoint_frame(record.at_rest().camera_T_tag));
   if (span.narrowest < kMinView) {
     const bool still = span.widest < kMinView;
-    refuse(fmt::format(
+    refuse(
         "the platform {}: the view of the tags turned by {:.1f} degrees one way and {:.1f} the "
         "other, {:.1f} are needed both ways; tilt it, or push it sideways, along x and along y",
         still ? "hardly moved" : "moved in one plane only", span.widest / kDegree,
-        span.narrowest / kDegree, kMinView / kDegree));
+        span.narrowest / kDegree, kMinView / kDegree);
   }
   if (record.keyframes().size() < kMinKeyframes) {
-    refuse(fmt::format("{} different pictures are too few, {} are needed; move for longer",
-                       record.keyframes().size(), kMinKeyframes));
+    refuse("{} different pictures are too few, {} are needed; move for longer",
+           record.keyframes().size(), kMinKeyframes);
   }
 }
 
@@ -134,16 +128,16 @@ void check_estimate(const TargetEstimate& estimate, const CameraModel& camera) {
   }
   const double off = std::abs(estimate.focal_ratio - 1);
   if (off > kMaxFocalError && off > kFocalSigmas * estimate.focal_sigma) {
-    refuse(fmt::format(
+    refuse(
         "the focal length that fits best is {:.1f} +- {:.1f} px, sensor.yaml says {:.1f}; run "
         "`tagwrench calibrate camera`, or check tag_size_mm",
-        camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px));
+        camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px);
   }
   if (!(estimate.noise_px < kMaxNoise_px)) {
-    refuse(fmt::format(
+    refuse(
         "edges lie {:.2f} px off where a rigid target would show them, {:.1f} is the limit; check "
         "that the tags sit firmly on the platform, then run `tagwrench calibrate camera`",
-        estimate.noise_px, kMaxNoise_px));
+        estimate.noise_px, kMaxNoise_px);
   }
   if (better_known(estimate, kLearnedFraction) == 0) {
     refuse(
@@ -157,10 +151,10 @@ void check_estimate(const TargetEstimate& estimate, const CameraModel& camera) {
     rotation = std::max(rotation, sigma.tail<3>().maxCoeff());
   }
   if (position > kMaxPositionSigma || rotation > kMaxRotationSigma) {
-    refuse(fmt::format(
+    refuse(
         "the tags' places stay uncertain by {:.1f} um and {:.2f} mrad, {:.0f} and {:.0f} are the "
         "limit; move further and longer, and check focus, light and print",
-        position * 1e6, rotation * 1e3, kMaxPositionSigma * 1e6, kMaxRotationSigma * 1e3));
+        position * 1e6, rotation * 1e3, kMaxPositionSigma * 1e6, kMaxRotationSigma * 1e3);
   }
 }
 
@@ -193,7 +187,8 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
                                   const TargetDescription& target, const CameraModel& camera) {
   const TargetRecorder::Counts& counts = record.counts();
   const Vector6 range = record.range();
-  const ViewSpan span = view_span(record.keyframes(), rest_platform(record.at_rest().camera_T_tag));
+  const ViewSpan span =
+      view_span(record.keyframes(), midpoint_frame(record.at_rest().camera_T_tag));
   std::vector<std::string> lines;
   lines.push_back(
       fmt::format("{} frames at rest; then {} of {} with all tags held; {} different pictures, {} "
@@ -205,7 +200,7 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
       "view turned by {:.1f} and {:.1f} degrees ({:.1f} needed both ways)",
       range[0] * 1e3, range[1] * 1e3, range[2] * 1e3, range[3] / kDegree, range[4] / kDegree,
       range[5] / kDegree, span.widest / kDegree, span.narrowest / kDegree, kMinView / kDegree));
-  const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+  const Eigen::Isometry3d platform = midpoint_frame(estimate.camera_T_tag);
   const std::vector<Vector6> after = platform_sigmas(estimate.covariance);
   const std::vector<Vector6> before = platform_sigmas(estimate.covariance_at_rest);
   for (std::size_t t = 0; t < target.tags.size(); ++t) {

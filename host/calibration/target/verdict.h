@@ -20,9 +20,6 @@ struct ViewSpan {
 ViewSpan view_span(const std::vector<Keyframe>& frames,
                    const Eigen::Isometry3d& rest_camera_T_platform);
 
-/// The platform frame at rest: origin at the midpoint of the tag centres, axes along the camera's.
-Eigen::Isometry3d rest_platform(const std::vector<Eigen::Isometry3d>& camera_T_tag);
-
 /// So many different pictures at least a recording must have.
 inline constexpr std::size_t kMinKeyframes = 20;
 

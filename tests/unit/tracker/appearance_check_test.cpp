@@ -1,11 +1,10 @@
 // A loaded picture must show the target where its poses say.
-#include "host/tracker/appearance_check.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <utility>
 
+#include "host/tracker/reference.h"
 #include "tests/unit/tracker/template_scene.h"
 
 namespace tagwrench {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "host/tracker/edge_measure.h"
-#include "host/tracker/projection.h"
+#include "host/tracker/camera_model.h"
+#include "host/tracker/edges.h"
 #include "host/tracker/rotation.h"
 #include "tests/support/differences.h"
 

@@ -1,9 +1,8 @@
 // The width of a tag's edges beside the blur that another renderer put there.
-#include "host/tracker/edge_width.h"
-
 #include <gtest/gtest.h>
 
 #include "host/tracker/acquire.h"
+#include "host/tracker/picture_quality.h"
 #include "tests/unit/tracker/render.h"
 
 namespace tagwrench {
@@ -32,7 +31,7 @@ Shot shot(render::Scene scene) {
 std::vector<EdgeWidth> widths(const Shot& shot, double corner_error_px = 0) {
   std::vector<EdgeWidth> out;
   for (const FoundTag& tag : shot.finding.tags) {
-    SquareCorners corners = tag.corners_px;
+    Square corners = tag.corners_px;
     corners[0].x() += corner_error_px;
     corners[2].y() += corner_error_px;
     const auto width = edge_width(shot.picture.view(), shot.patterns[tag.index], corners);
@@ -98,10 +97,10 @@ TEST(EdgeWidth, IsNoneWhereThereIsNoSuchTag) {
   render::Scene scene = render::roof();
   const Shot taken = shot(scene);
   ASSERT_EQ(taken.finding.tags.size(), 2u);
-  const SquareCorners& here = taken.finding.tags[0].corners_px;
+  const Square& here = taken.finding.tags[0].corners_px;
   const ImageView image = taken.picture.view();
   EXPECT_FALSE(edge_width(image, taken.patterns[1], here)) << "another tag's cells";
-  SquareCorners aside = here;
+  Square aside = here;
   for (Eigen::Vector2d& corner : aside) corner.x() -= 60;
   EXPECT_FALSE(edge_width(image, taken.patterns[0], aside));
   for (Eigen::Vector2d& corner : aside) corner.x() -= 1e5;

@@ -1,12 +1,11 @@
 // A tag that sits elsewhere than believed: the error that this makes of displacements, found by
 // aligning pictures, against what is said about it.
-#include "host/tracker/geometry_uncertainty.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "host/tracker/photometric.h"
 #include "host/tracker/rotation.h"
 #include "tests/unit/tracker/template_scene.h"
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "host/tracker/acquire.h"
-#include "host/tracker/tag_patterns.h"
+#include "host/tracker/target.h"
 
 namespace tagwrench {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "host/tracker/projection.h"
+#include "host/tracker/camera_model.h"
 #include "host/tracker/rotation.h"
 #include "tests/unit/tracker/template_scene.h"
 

@@ -1,10 +1,9 @@
 // Constant velocity, by the clock of the frames.
-#include "host/tracker/predictor.h"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
 
+#include "host/tracker/rotation.h"
 #include "tests/support/six.h"
 
 namespace tagwrench {

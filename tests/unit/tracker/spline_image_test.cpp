@@ -1,9 +1,9 @@
-#include "host/tracker/spline_image.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
+
+#include "host/tracker/pixel_template.h"
 
 namespace tagwrench {
 namespace {

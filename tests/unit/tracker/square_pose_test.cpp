@@ -1,11 +1,10 @@
-#include "host/tracker/square_pose.h"
-
 #include <gtest/gtest.h>
 
 #include <opencv2/calib3d.hpp>
 
-#include "host/tracker/projection.h"
+#include "host/tracker/camera_model.h"
 #include "host/tracker/rotation.h"
+#include "host/tracker/squares.h"
 
 namespace tagwrench {
 namespace {

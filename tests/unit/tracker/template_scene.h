@@ -8,7 +8,7 @@
 #include "host/tracker/photometric.h"
 #include "host/tracker/pixel_sums.h"
 #include "host/tracker/pixel_template.h"
-#include "host/tracker/tag_patterns.h"
+#include "host/tracker/target.h"
 #include "tests/unit/tracker/render.h"
 
 namespace tagwrench::render {

@@ -17,7 +17,7 @@ constexpr double kMrad = 1e-3;
 constexpr int kFrames = 225;
 
 TargetEstimate adjusted(const Recording& recording) {
-  return TargetAdjuster(recording.record->at_rest()).adjust(recording.record->keyframes());
+  return adjust_target(recording.record->at_rest(), recording.record->keyframes());
 }
 
 TEST(TargetFromMotion, PlacementIsRecoveredAndItsSigmaIsHonest) {
@@ -29,7 +29,7 @@ TEST(TargetFromMotion, PlacementIsRecoveredAndItsSigmaIsHonest) {
     check_record(*recording.record, recording.sensor.target, recording.sensor.rest);
     const TargetEstimate estimate = adjusted(recording);
     check_estimate(estimate, recording.sensor.camera);
-    const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+    const Eigen::Isometry3d platform = midpoint_frame(estimate.camera_T_tag);
     Eigen::Isometry3d true_platform = Eigen::Isometry3d::Identity();
     true_platform.translation() = recording.truth.rest_position;
     const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
@@ -111,9 +111,9 @@ TEST(TargetFromMotion, DisplacementIsAbsoluteAfterwards) {
   const Recording recording(scenario, kFrames);
   const TargetEstimate estimate = adjusted(recording);
   ASSERT_TRUE(estimate.solved);
-  Follower calibrated(recording, rest_platform(estimate.camera_T_tag), estimate.camera_T_tag);
+  Follower calibrated(recording, midpoint_frame(estimate.camera_T_tag), estimate.camera_T_tag);
   const std::vector<Eigen::Isometry3d> truth = {recording.true_tag(0), recording.true_tag(1)};
-  Follower told(recording, rest_platform(truth), truth);
+  Follower told(recording, midpoint_frame(truth), truth);
   SimulatorSource source(scenario, /*live=*/false);
   for (int i = 0; i < kFrames; ++i) {
     Frame frame;

@@ -1,6 +1,4 @@
 // Derivatives against differences, and eliminations against the full equations.
-#include "host/calibration/target/derivatives.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -8,7 +6,7 @@
 
 #include "host/calibration/target/normal.h"
 #include "host/tracker/acquire.h"
-#include "host/tracker/projection.h"
+#include "host/tracker/camera_model.h"
 #include "tests/support/differences.h"
 #include "tests/unit/calibration/target/target_record.h"
 
@@ -146,20 +144,20 @@ TEST(TargetEquations, EliminationSolvesWhatTheFullEquationsSay) {
       e.frame = frame;
       e.tag = tag;
       e.point = p;
-      if (frame >= 0) e.by_frame = vector6();
-      e.by_tag = vector6();
-      e.by_normal = gauss(random);
-      e.by_readout = gauss(random);
-      e.by_focal = gauss(random);
+      if (frame >= 0) e.by.frame = vector6();
+      e.by.tag = vector6();
+      e.by.normal = gauss(random);
+      e.by.readout = gauss(random);
+      e.by.focal = gauss(random);
       e.offset = gauss(random);
       e.weight = 1.0 + static_cast<double>(p % 3);
       normal.add(e);
       Eigen::VectorXd row = Eigen::VectorXd::Zero(kAll);
-      if (frame >= 0) row.segment<6>(6 * frame) = e.by_frame;
-      row.segment<6>(shared + 6 * tag) = e.by_tag;
-      row[shared + kShared - 2] = e.by_readout;
-      row[shared + kShared - 1] = e.by_focal;
-      row[points + p] = e.by_normal;
+      if (frame >= 0) row.segment<6>(6 * frame) = e.by.frame;
+      row.segment<6>(shared + 6 * tag) = e.by.tag;
+      row[shared + kShared - 2] = e.by.readout;
+      row[shared + kShared - 1] = e.by.focal;
+      row[points + p] = e.by.normal;
       add(row, e.offset, e.weight);
     }
     const double offset = gauss(random);
@@ -170,10 +168,10 @@ TEST(TargetEquations, EliminationSolvesWhatTheFullEquationsSay) {
     add(row, offset, 2.0);
   }
   for (int tag = 0; tag < kTags; ++tag) {
-    normal.add_spread(tag, 0.3, 0.5);
+    normal.add_prior(normal.spread_index(tag), 0.3, 0.5);
     add(Eigen::VectorXd::Unit(kAll, shared + normal.spread_index(tag)), 0.3, 0.5);
   }
-  normal.add_readout(-0.2, 1.5);
+  normal.add_prior(normal.readout_index(), -0.2, 1.5);
   add(Eigen::VectorXd::Unit(kAll, shared + normal.readout_index()), -0.2, 1.5);
   const Eigen::VectorXd solution = full.ldlt().solve(right);
   ASSERT_TRUE(normal.reduce());

@@ -1,8 +1,7 @@
-#include "host/calibration/target/keyframes.h"
-
 #include <gtest/gtest.h>
 
-#include "host/tracker/projection.h"
+#include "host/calibration/target/recorder.h"
+#include "host/tracker/camera_model.h"
 
 namespace tagwrench {
 namespace {
