@@ -1,6 +1,10 @@
 #include "host/calibration/camera/board.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
+#include <map>
 #include <opencv2/aruco.hpp>
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
@@ -8,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "host/core/robust_statistics.h"
 #include "host/tracker/tag_dictionary.h"
 
 namespace tagwrench {
@@ -33,6 +38,12 @@ cv::Mat as_mat(const ImageView& image) {
                  static_cast<std::size_t>(image.stride));
 }
 
+cv::Mat flipped_of(const cv::Mat& image) {
+  cv::Mat flipped;
+  cv::flip(image, flipped, 1);
+  return flipped;
+}
+
 ImageView as_view(const cv::Mat& image) {
   return {image.data, image.cols, image.rows, static_cast<int>(image.step)};
 }
@@ -44,19 +55,26 @@ double percentile(const cv::Mat& values, double part) {
   return *at;
 }
 
+/// Of a grid of corners, row by row, the first of them at `from`, in squares.
+std::vector<BoardCorner> on_grid(const std::vector<cv::Point2f>& found, int columns, double from) {
+  std::vector<BoardCorner> rough;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const int at = static_cast<int>(i);
+    rough.push_back({{from + at % columns, from + at / columns}, {found[i].x, found[i].y}});
+  }
+  return rough;
+}
+
 /// Why there may be no board to be found.
 BoardView judge(const cv::Mat& image) {
   if (cv::mean(image)[0] < kDarkMean) return BoardView::dark;
   if (cv::countNonZero(image >= kTopLevel) > kClippedImage * static_cast<double>(image.total()))
     return BoardView::saturated;
-  cv::Mat smooth;
+  cv::Mat smooth, dx, dy, slope;
   cv::GaussianBlur(image, smooth, {}, 1.0);
   smooth.convertTo(smooth, CV_32F);
-  cv::Mat dx;
-  cv::Mat dy;
   cv::Sobel(smooth, dx, CV_32F, 1, 0, 3, 1.0 / 8);
   cv::Sobel(smooth, dy, CV_32F, 0, 1, 3, 1.0 / 8);
-  cv::Mat slope;
   cv::magnitude(dx, dy, slope);
   const double contrast = percentile(smooth, 0.98) - percentile(smooth, 0.02);
   if (contrast > kLowContrast && percentile(slope, 0.999) < kLowSlope * contrast)
@@ -74,41 +92,139 @@ BoardView judge(const RefinedCorners& refined, std::size_t fewest) {
   return BoardView::board;
 }
 
-cv::Ptr<cv::aruco::DetectorParameters> marker_parameters() {
-  auto parameters = cv::aruco::DetectorParameters::create();
-  parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
-  return parameters;
+// Of a board that was not asked for.
+constexpr std::size_t kMinGuessMarkers = 6;
+constexpr int kMaxColumns = 40;
+constexpr double kInPlace = 0.9;     // part of the markers
+constexpr double kTolerance = 0.25;  // of a marker's side
+
+struct Markers {
+  TagFamily family{};
+  std::vector<int> ids;
+  std::vector<std::vector<cv::Point2f>> corners;
+};
+
+/// With the dictionary that reads most of them; the first of several, so the smallest that holds
+/// them.
+Markers read_markers(const cv::Mat& image) {
+  Markers best;
+  for (int family = 0; family < kTagFamilies; ++family) {
+    Markers now;
+    now.family = static_cast<TagFamily>(family);
+    cv::aruco::detectMarkers(image, tag_dictionary(now.family), now.corners, now.ids);
+    if (now.ids.size() > best.ids.size()) best = now;
+  }
+  return best;
+}
+
+/// Centre of a marker on a board of so many columns, in squares: the white squares in reading
+/// order.
+cv::Point2f place(int id, int columns) {
+  const int pair = 2 * columns;  // squares of two rows hold `columns` markers
+  const int rows = id / columns * 2;
+  int square = 0;
+  int left = id % columns;
+  for (; square < pair; ++square) {
+    const bool white = (square / columns + square % columns) % 2 == 1;
+    if (white && left-- == 0) break;
+  }
+  return {static_cast<float>(square % columns) + 0.5F,
+          static_cast<float>(rows + square / columns) + 0.5F};
+}
+
+/// Columns of the board on which these markers lie as they do; 0 if none.
+int columns_of(const Markers& markers) {
+  std::vector<cv::Point2f> centres;
+  double side_px = 0;
+  for (const auto& corners : markers.corners) {
+    centres.push_back(0.25F * (corners[0] + corners[1] + corners[2] + corners[3]));
+    side_px += cv::arcLength(corners, true) / 4 / static_cast<double>(markers.corners.size());
+  }
+  int best = 0;
+  int most = static_cast<int>(kInPlace * static_cast<double>(centres.size()));
+  for (int columns = 3; columns <= kMaxColumns; ++columns) {
+    std::vector<cv::Point2f> places;
+    for (const int id : markers.ids) places.push_back(place(id, columns));
+    std::vector<std::uint8_t> fits;
+    const cv::Mat h = cv::findHomography(places, centres, cv::RANSAC, kTolerance * side_px, fits);
+    if (h.empty() || cv::determinant(h) <= 0) continue;
+    const int count = cv::countNonZero(fits);
+    if (count > most) {
+      most = count;
+      best = columns;
+    }
+  }
+  return best;
+}
+
+std::string charuco_words(int columns, int rows, std::string_view dictionary) {
+  return fmt::format("charuco:{}x{} with {} markers", columns, rows, dictionary);
+}
+
+std::string guess_charuco(const cv::Mat& image) {
+  const Markers markers = read_markers(image);
+  if (markers.ids.size() < kMinGuessMarkers) return {};
+  const int columns = columns_of(markers);
+  const std::string_view dictionary = name(markers.family);
+  if (columns == 0) return fmt::format("a charuco board with {} markers", dictionary);
+  const int highest = *std::max_element(markers.ids.begin(), markers.ids.end());
+  int rows = 1;
+  while (columns * rows / 2 <= highest) ++rows;
+  return charuco_words(columns, rows, dictionary);
+}
+
+/// Without the outer lines of a grid of corners that the edge of the paper made, not squares.
+cv::Size without_false_edges(const cv::Mat& image, const std::vector<cv::Point2f>& found,
+                             const cv::Size& grid) {
+  std::vector<int> in_column(static_cast<std::size_t>(grid.width));
+  std::vector<int> in_row(static_cast<std::size_t>(grid.height));
+  for (const BoardCorner& corner :
+       refine_corners(as_view(image), on_grid(found, grid.width, 0), {}).corners) {
+    ++in_column[static_cast<std::size_t>(corner.board.x())];
+    ++in_row[static_cast<std::size_t>(corner.board.y())];
+  }
+  cv::Size left = grid;
+  for (const std::size_t end : {std::size_t{0}, in_column.size() - 1})
+    left.width -= 2 * in_column[end] < grid.height ? 1 : 0;
+  for (const std::size_t end : {std::size_t{0}, in_row.size() - 1})
+    left.height -= 2 * in_row[end] < grid.width ? 1 : 0;
+  return left;
+}
+
+/// Squares of the checkerboard, the longer side first; 0 x 0 where there is none.
+cv::Size checkerboard_of(const cv::Mat& image) {
+  std::vector<cv::Point2f> corners;
+  cv::Mat meta;
+  if (!cv::findChessboardCornersSB(image, {3, 3}, corners,
+                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER, meta))
+    return {};
+  const cv::Size inner = without_false_edges(image, corners, {meta.cols, meta.rows});
+  const auto [shorter, longer] = std::minmax({inner.width + 1, inner.height + 1});
+  return {longer, shorter};
 }
 
 }  // namespace
 
 const char* words(BoardView look) {
-  switch (look) {
-    case BoardView::board:
-      return "good";
-    case BoardView::no_board:
-      return "without the board";
-    case BoardView::other_board:
-      return "with markers that are not where this board has them";
-    case BoardView::part:
-      return "with too little of the board";
-    case BoardView::dark:
-      return "too dark";
-    case BoardView::saturated:
-      return "overexposed";
-    case BoardView::blurred:
-      return "blurred";
-  }
-  return "?";
+  constexpr std::array<const char*, 7> kWords = {
+      "good",
+      "without the board",
+      "with markers that are not where this board has them",
+      "with too little of the board",
+      "too dark",
+      "overexposed",
+      "blurred"};
+  return kWords[static_cast<std::size_t>(look)];
 }
 
 struct BoardFinder::Detector {
   BoardSpec spec;
   SquareFill fill;
   cv::Ptr<cv::aruco::CharucoBoard> charuco;
-  cv::Ptr<cv::aruco::DetectorParameters> parameters = marker_parameters();
+  cv::Ptr<cv::aruco::DetectorParameters> parameters = cv::aruco::DetectorParameters::create();
 
   explicit Detector(const BoardSpec& board) : spec(board) {
+    parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
     if (board.kind != BoardKind::charuco) return;
     const double part = board.marker / board.square;
     fill = {true, 0.5 * (1 - part), part / (bits_per_side(board.dictionary) + 2)};
@@ -117,18 +233,10 @@ struct BoardFinder::Detector {
                                         tag_dictionary(board.dictionary));
   }
 
-  std::size_t corners_on_board() const {
-    return static_cast<std::size_t>(spec.columns - 1) * static_cast<std::size_t>(spec.rows - 1);
-  }
-  std::size_t fewest() const { return std::min(kMinCorners, corners_on_board()); }
-
   BoardSighting sighting(const cv::Mat& image, const std::vector<BoardCorner>& rough) const {
     const RefinedCorners refined = refine_corners(as_view(image), rough, fill);
-    BoardSighting out;
-    out.look = judge(refined, fewest());
-    out.corners = refined.corners;
-    out.corner_view = refined.look;
-    return out;
+    const auto all = static_cast<std::size_t>((spec.columns - 1) * (spec.rows - 1));
+    return {judge(refined, std::min(kMinCorners, all)), refined.corners, refined.look};
   }
 
   std::optional<BoardSighting> checkerboard(const cv::Mat& image) const {
@@ -137,22 +245,16 @@ struct BoardFinder::Detector {
     if (!cv::findChessboardCornersSB(image, inner, found,
                                      cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY))
       return std::nullopt;
-    std::vector<BoardCorner> rough;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const int at = static_cast<int>(i);
-      rough.push_back({{1.0 + at % inner.width, 1.0 + at / inner.width}, {found[i].x, found[i].y}});
-    }
-    return sighting(image, rough);
+    return sighting(image, on_grid(found, inner.width, 1));
   }
 
   /// Whether the markers lie as on this board, seen from its front.
   bool in_place(const std::vector<std::vector<cv::Point2f>>& markers,
                 const std::vector<int>& ids) const {
-    std::vector<cv::Point2f> on_board;
-    std::vector<cv::Point2f> in_image;
-    std::vector<float> sides_px;
+    std::vector<cv::Point2f> on_board, in_image;
+    std::vector<double> sides_px;
     for (std::size_t i = 0; i < ids.size(); ++i) {
-      sides_px.push_back(static_cast<float>(cv::arcLength(markers[i], true) / 4));
+      sides_px.push_back(cv::arcLength(markers[i], true) / 4);
       if (ids[i] < 0 || ids[i] >= static_cast<int>(charuco->objPoints.size())) continue;
       for (std::size_t c = 0; c < 4; ++c) {
         const cv::Point3f& p = charuco->objPoints[static_cast<std::size_t>(ids[i])][c];
@@ -164,10 +266,7 @@ struct BoardFinder::Detector {
     if (on_board.size() < 4 * kMinMarkers ||
         static_cast<double>(strangers) > kStrangers * static_cast<double>(ids.size()))
       return false;
-    std::nth_element(sides_px.begin(),
-                     sides_px.begin() + static_cast<std::ptrdiff_t>(sides_px.size() / 2),
-                     sides_px.end());
-    const double tolerance_px = kPlaceTolerance * sides_px[sides_px.size() / 2];
+    const double tolerance_px = kPlaceTolerance * median(std::move(sides_px));
     std::vector<std::uint8_t> fits;
     const cv::Mat h = cv::findHomography(on_board, in_image, cv::RANSAC, tolerance_px, fits);
     if (h.empty()) return false;
@@ -197,16 +296,14 @@ struct BoardFinder::Detector {
 };
 
 BoardFinder::BoardFinder(const BoardSpec& board, bool mirrored)
-    : board_(board), mirrored_(mirrored), detector_(std::make_unique<Detector>(board)) {
-  settled_ = board.kind == BoardKind::checkerboard;
-}
+    : mirrored_(mirrored),
+      settled_(board.kind == BoardKind::checkerboard),
+      detector_(std::make_unique<Detector>(board)) {}
 
 BoardFinder::~BoardFinder() = default;
 
 BoardSighting BoardFinder::find(const ImageView& image) {
-  const cv::Mat delivered = as_mat(image);
-  cv::Mat flipped;
-  cv::flip(delivered, flipped, 1);
+  const cv::Mat delivered = as_mat(image), flipped = flipped_of(delivered);
   const auto good = [](const std::optional<BoardSighting>& s) {
     return s && s->look != BoardView::other_board;
   };
@@ -221,6 +318,35 @@ BoardSighting BoardFinder::find(const ImageView& image) {
   if (!seen) return {judge(delivered), {}, {}};
   settled_ = settled_ || good(seen);
   return *seen;
+}
+
+// Which board an image shows, when it is not the one that was asked for.
+
+std::string guess_board(const std::vector<ImageView>& images, const BoardSpec& asked) {
+  std::map<std::string, int> votes;
+  cv::Size plain;
+  for (const ImageView& view : images) {
+    const cv::Mat delivered = as_mat(view), flipped = flipped_of(delivered);
+    std::string guess = guess_charuco(delivered);
+    if (guess.empty()) guess = guess_charuco(flipped);
+    if (!guess.empty()) ++votes[guess];
+    if (!votes.empty()) continue;
+    // A board that is seen in part looks smaller, never larger.
+    if (const cv::Size squares = checkerboard_of(delivered); squares.area() > plain.area())
+      plain = squares;
+  }
+  const auto winner = std::max_element(
+      votes.begin(), votes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (winner != votes.end()) {
+    const bool same =
+        asked.kind == BoardKind::charuco &&
+        winner->first == charuco_words(asked.columns, asked.rows, name(asked.dictionary));
+    return same ? std::string() : winner->first;
+  }
+  const auto [shorter, longer] = std::minmax({asked.columns, asked.rows});
+  const bool same = asked.kind == BoardKind::checkerboard && plain == cv::Size(longer, shorter);
+  if (plain.empty() || same) return {};
+  return fmt::format("checkerboard:{}x{}", plain.width, plain.height);
 }
 
 }  // namespace tagwrench

@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
-#include "host/calibration/camera/limits.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 
 namespace tagwrench {
 namespace {

@@ -1,5 +1,3 @@
-#include "host/calibration/camera/corners.h"
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <numbers>
 #include <optional>
 
+#include "host/calibration/camera/board.h"
 #include "host/core/algebra/decompositions.h"
 #include "host/core/algebra/levenberg_marquardt.h"
 #include "host/core/robust_statistics.h"

@@ -32,15 +32,22 @@ struct Points {
   std::vector<cv::Point2f> image;
 };
 
-Points points(const CameraView& view) {
-  Points out;
-  for (const BoardCorner& corner : view.corners) {
-    out.board.emplace_back(static_cast<float>(corner.board.x()),
-                           static_cast<float>(corner.board.y()), 0.0F);
-    out.image.emplace_back(static_cast<float>(corner.pixel.x()),
-                           static_cast<float>(corner.pixel.y()));
+std::vector<Points> points(const std::vector<CameraView>& views) {
+  std::vector<Points> out(views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    for (const BoardCorner& corner : views[i].corners) {
+      const Eigen::Vector2f board = corner.board.cast<float>(), pixel = corner.pixel.cast<float>();
+      out[i].board.emplace_back(board.x(), board.y(), 0.0F);
+      out[i].image.emplace_back(pixel.x(), pixel.y());
+    }
   }
   return out;
+}
+
+std::vector<std::size_t> every(const std::vector<Points>& views) {
+  std::vector<std::size_t> all(views.size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
 }
 
 struct Solution {
@@ -62,8 +69,7 @@ Solution solve(const std::vector<Points>& all, const std::vector<std::size_t>& w
     image.push_back(all[i].image);
   }
   Solution out;
-  cv::Mat matrix;
-  cv::Mat extrinsic_sigma;
+  cv::Mat matrix, extrinsic_sigma;
   out.rms_px = cv::calibrateCamera(
       board, image, size, matrix, out.distortion, out.rotations, out.translations, out.sigma,
       extrinsic_sigma, out.view_rms, flags | kFixed,
@@ -71,11 +77,6 @@ Solution solve(const std::vector<Points>& all, const std::vector<std::size_t>& w
   out.matrix = cv::Matx33d(matrix);
   return out;
 }
-
-struct Placed {
-  double rms_px = 0;
-  BoardPose pose;
-};
 
 BoardPose pose_of(const Points& view, const cv::Mat& rotation, const cv::Mat& translation) {
   cv::Matx33d r;
@@ -93,16 +94,15 @@ BoardPose pose_of(const Points& view, const cv::Mat& rotation, const cv::Mat& tr
 }
 
 /// The view alone, through a camera that is given.
-Placed place(const Points& view, const cv::Matx33d& matrix, const cv::Mat& distortion) {
-  cv::Mat rotation;
-  cv::Mat translation;
+FittedView place(const Points& view, const cv::Matx33d& matrix, const cv::Mat& distortion) {
+  cv::Mat rotation, translation;
   cv::solvePnP(view.board, view.image, matrix, distortion, rotation, translation, false,
                cv::SOLVEPNP_IPPE);
   cv::solvePnPRefineLM(view.board, view.image, matrix, distortion, rotation, translation);
   std::vector<cv::Point2f> projected;
   cv::projectPoints(view.board, rotation, translation, matrix, distortion, projected);
   const double error = cv::norm(projected, view.image, cv::NORM_L2);
-  return {error / std::sqrt(static_cast<double>(view.image.size())),
+  return {error / std::sqrt(static_cast<double>(view.image.size())), false,
           pose_of(view, rotation, translation)};
 }
 
@@ -123,8 +123,7 @@ double held_out(const std::vector<Points>& all, const std::vector<std::size_t>& 
                 cv::Size size, int flags) {
   double sum = 0;
   for (int fold = 0; fold < kFolds; ++fold) {
-    std::vector<std::size_t> train;
-    std::vector<std::size_t> test;
+    std::vector<std::size_t> train, test;
     for (std::size_t i = 0; i < which.size(); ++i)
       (static_cast<int>(i % kFolds) == fold ? test : train).push_back(which[i]);
     const Solution s = solve(all, train, size, flags);
@@ -204,17 +203,10 @@ CameraFit result(const Solution& s, const std::vector<Points>& all,
   std::copy_n(s.sigma.begin<double>(), fit.sigma.size(), fit.sigma.begin());
   fit.rms_px = s.rms_px;
   fit.used = static_cast<int>(used.size());
-  fit.views.resize(all.size());
-  for (FittedView& view : fit.views) view.used = false;
+  for (const Points& view : all) fit.views.push_back(place(view, s.matrix, s.distortion));
   for (std::size_t i = 0; i < used.size(); ++i) {
     fit.views[used[i]] = {s.view_rms.at<double>(static_cast<int>(i)), true,
                           pose_of(all[used[i]], s.rotations[i], s.translations[i])};
-  }
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (fit.views[i].used) continue;
-    const Placed placed = place(all[i], s.matrix, s.distortion);
-    fit.views[i].rms_px = placed.rms_px;
-    fit.views[i].pose = placed.pose;
   }
   return fit;
 }
@@ -223,10 +215,8 @@ CameraFit result(const Solution& s, const std::vector<Points>& all,
 
 CameraFit fit_camera(const std::vector<CameraView>& views, int width_px, int height_px) {
   const cv::Size size(width_px, height_px);
-  std::vector<Points> all;
-  for (const CameraView& view : views) all.push_back(points(view));
-  std::vector<std::size_t> used(all.size());
-  std::iota(used.begin(), used.end(), 0);
+  std::vector<Points> all = points(views);
+  std::vector<std::size_t> used = every(all);
   try {
     Solution solution = solve_robustly(all, used, size, cv::CALIB_FIX_K3);
     if (used.size() >= kMinForK3 &&
@@ -243,16 +233,13 @@ CameraFit fit_camera(const std::vector<CameraView>& views, int width_px, int hei
 
 std::vector<BoardPose> rough_poses(const std::vector<CameraView>& views, int width_px,
                                    int height_px, double f_px) {
-  std::vector<Points> all;
-  for (const CameraView& view : views) all.push_back(points(view));
+  const std::vector<Points> all = points(views);
   cv::Matx33d matrix(f_px, 0, 0.5 * (width_px - 1), 0, f_px, 0.5 * (height_px - 1), 0, 0, 1);
   cv::Mat distortion = cv::Mat::zeros(1, 5, CV_64F);
   std::vector<BoardPose> out;
   try {
     if (static_cast<int>(all.size()) >= kMinForOwnFocal) {
-      std::vector<std::size_t> which(all.size());
-      std::iota(which.begin(), which.end(), 0);
-      const Solution s = solve(all, which, {width_px, height_px},
+      const Solution s = solve(all, every(all), {width_px, height_px},
                                cv::CALIB_FIX_PRINCIPAL_POINT | cv::CALIB_ZERO_TANGENT_DIST |
                                    cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3);
       const double ratio = s.matrix(0, 0) / f_px;

@@ -1,24 +1,37 @@
 // Room calibration/camera: pictures of a printed board -> the lens.
 // In:  corners of the board, px of the camera's picture; the board's squares, m.
 // Out: CameraModel: focal lengths and centre in px, OpenCV's distortion, with standard deviations.
-// Then: collector.h (takes views by itself), corners.h, coverage.h (what is still missing).
+// Then: collector.h (takes views by itself), board.h (finds the board), verdict.cpp (what is
+// missing).
 //
 // Views of a board -> camera. Uses OpenCV inside.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <string>
 #include <vector>
 
-#include "host/calibration/camera/coverage.h"
+#include "host/calibration/camera/board.h"
 #include "host/tracker/camera_model.h"
 
 namespace tagwrench {
+
+/// What a calibration demands of its views.
+constexpr int kMinCameraViews = 8;
+constexpr int kMaxCameraViews = 80;
 
 struct CameraView {
   std::string name;  ///< of the image, for people
   std::vector<BoardCorner> corners;
   double blur_px = 0;
+};
+
+/// Where the board was in one view, as far as the camera is known.
+struct BoardPose {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< of the board, away from the lens, camera
+                                                      ///< axes
+  double distance = 1;                                ///< of its middle, in squares
 };
 
 /// A view in the light of the fit.
@@ -34,6 +47,38 @@ struct CameraFit {
   double rms_px = 0;              ///< of all corners of the views used
   int used = 0;
   std::vector<FittedView> views;  ///< in the order of the input
+};
+
+/// Which parts of a camera calibration's evidence are there, and which are missing: regions of the
+/// image, tilts of the board, distances.
+class Coverage {
+ public:
+  Coverage(int width_px, int height_px) : width_(width_px), height_(height_px) {}
+
+  /// One view's corners, and its pose.
+  void add(const std::vector<BoardCorner>& corners, const BoardPose& pose);
+
+  /// Of the 3 x 3 regions of the image those that hold corners.
+  int regions() const;
+  /// What to show next, for people; empty when nothing is missing.
+  std::vector<std::string> missing() const;
+  /// The regions alone: "top left", "bottom".
+  std::vector<std::string> missing_regions() const;
+  /// Largest angle between the board's normal and the optical axis, rad.
+  double largest_tilt() const { return largest_tilt_; }
+  /// Part of the image's width and height that corners span, the smaller of both.
+  double span() const;
+
+ private:
+  int width_;
+  int height_;
+  std::array<int, 9> corners_{};  ///< per region, reading order
+  std::array<bool, 4> tilted_{};  ///< left, right, top, bottom edge nearer to the lens
+  double largest_tilt_ = 0;
+  double nearest_ = 0;
+  double farthest_ = 0;
+  Eigen::Vector2d low_ = Eigen::Vector2d::Constant(1e9);
+  Eigen::Vector2d high_ = Eigen::Vector2d::Constant(-1e9);
 };
 
 /// Least squares on the reprojection error (OpenCV's calibrateCamera, after Zhang, "A flexible new

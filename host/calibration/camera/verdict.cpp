@@ -1,4 +1,3 @@
-// Whether views and fit are good enough, and what to do if not.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,11 +5,19 @@
 #include <numbers>
 
 #include "host/calibration/camera/fit.h"
-#include "host/calibration/camera/limits.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 
 namespace tagwrench {
 namespace {
+
+constexpr int kMinCorners = 6;                         // in a region
+constexpr double kTilt = 20 * std::numbers::pi / 180;  // asked for, each way
+constexpr double kDistanceRatio = 1.2;                 // farthest to nearest
+constexpr std::array<const char*, 9> kRegions = {"top left",    "top",    "top right",
+                                                 "left",        "middle", "right",
+                                                 "bottom left", "bottom", "bottom right"};
+constexpr std::array<const char*, 4> kEdges = {"left", "right", "top", "bottom"};
 
 constexpr int kMinRegions = 6;         // of nine
 constexpr double kMinSpan = 0.6;       // of width and height
@@ -42,19 +49,71 @@ bool monotonic(const CameraModel& camera) {
 
 }  // namespace
 
+void Coverage::add(const std::vector<BoardCorner>& corners, const BoardPose& pose) {
+  for (const BoardCorner& corner : corners) {
+    const int column = std::clamp(static_cast<int>(3 * (corner.pixel.x() + 0.5) / width_), 0, 2);
+    const int row = std::clamp(static_cast<int>(3 * (corner.pixel.y() + 0.5) / height_), 0, 2);
+    ++corners_[static_cast<std::size_t>(3 * row + column)];
+    low_ = low_.cwiseMin(corner.pixel);
+    high_ = high_.cwiseMax(corner.pixel);
+  }
+  // Where the normal leans to x, the plane comes nearer there.
+  const Eigen::Vector3d& n = pose.normal;
+  const double x = std::atan2(n.x(), n.z());
+  const double y = std::atan2(n.y(), n.z());
+  tilted_[0] |= x <= -kTilt;
+  tilted_[1] |= x >= kTilt;
+  tilted_[2] |= y <= -kTilt;
+  tilted_[3] |= y >= kTilt;
+  largest_tilt_ = std::max(largest_tilt_, std::acos(std::clamp(n.z(), -1.0, 1.0)));
+  nearest_ = nearest_ == 0 ? pose.distance : std::min(nearest_, pose.distance);
+  farthest_ = std::max(farthest_, pose.distance);
+}
+
+int Coverage::regions() const {
+  return static_cast<int>(
+      std::count_if(corners_.begin(), corners_.end(), [](int n) { return n >= kMinCorners; }));
+}
+
+std::vector<std::string> Coverage::missing_regions() const {
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    if (corners_[i] < kMinCorners) out.emplace_back(kRegions[i]);
+  }
+  return out;
+}
+
+std::vector<std::string> Coverage::missing() const {
+  std::vector<std::string> out;
+  if (const std::vector<std::string> regions = missing_regions(); !regions.empty())
+    out.push_back("the board at the " + listed(regions) + " of the picture");
+  std::vector<std::string> edges;
+  for (std::size_t i = 0; i < tilted_.size(); ++i) {
+    if (!tilted_[i]) edges.emplace_back(kEdges[i]);
+  }
+  if (!edges.empty())
+    out.push_back("its " + listed(edges) + " edge tilted 20 degrees or more toward the lens");
+  if (farthest_ < kDistanceRatio * nearest_)
+    out.emplace_back("the board a fifth nearer or farther, as far as it stays sharp");
+  return out;
+}
+
+double Coverage::span() const {
+  const Eigen::Vector2d part = (high_ - low_).cwiseQuotient(Eigen::Vector2d(width_, height_));
+  return std::max(0.0, part.minCoeff());
+}
+
 void check_views(const std::vector<CameraView>& views, const Coverage& coverage) {
   if (static_cast<int>(views.size()) < kMinCameraViews) {
     throw ConfigError(
         fmt::format("only {} different usable views, {} are needed and 20 are good: show the board "
-                    "at more places, "
-                    "distances and tilts",
+                    "at more places, distances and tilts",
                     views.size(), kMinCameraViews));
   }
   if (coverage.regions() < kMinRegions || coverage.span() < kMinSpan) {
     throw ConfigError(
         fmt::format("the views leave too much of the image empty (corners span {:.0f} % of it, and "
-                    "miss {}): show "
-                    "the board there too",
+                    "miss {}): show the board there too",
                     100 * coverage.span(), listed(coverage.missing_regions())));
   }
 }

@@ -9,6 +9,7 @@
 
 #include "host/calibration/camera/collector.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 #include "tests/unit/calibration/camera/camera_render.h"
 
 namespace tagwrench::test {
