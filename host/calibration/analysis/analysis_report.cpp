@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "host/calibration/analysis/analysis.h"
-#include "host/core/axis_names.h"
 #include "host/core/json/json_text.h"
 
 namespace tagwrench::study {
@@ -15,8 +14,8 @@ namespace {
 using nlohmann::json;
 using Out = std::back_insert_iterator<std::string>;
 
-std::string figure(const std::optional<double>& value, const char* unit = "") {
-  return value ? fmt::format("{:.3g}{}", *value, unit) : "-";
+std::string figure(double value, const char* unit = "") {
+  return std::isfinite(value) ? fmt::format("{:.3g}{}", value, unit) : "-";
 }
 
 std::string percent(double value) {
@@ -60,11 +59,9 @@ void add_head(Out out, const Analysis& a) {
   fmt::format_to(out, ", {:.1f} s; {} features, condition {:.0f}\n", a.seconds,
                  a.feature_names.size(), a.condition);
   if (a.reference_rate > 0) {
-    if (a.lag.known) {
-      fmt::format_to(out, "lag: {}, the same on all axes\n", lag_text(a.lag));
-    } else {
-      fmt::format_to(out, "lag not known; taken as 0\n");
-    }
+    fmt::format_to(
+        out, "lag{}\n",
+        a.lag.known ? ": " + lag_text(a.lag) + ", the same on all axes" : " not known; taken as 0");
   }
   fmt::format_to(out, "held out: {}\n\n", a.validation);
 }
@@ -99,7 +96,8 @@ void add_rest(Out out, const Analysis& a) {
                  "resolution", "drift per h", "creep", "within 95 %");
   for (std::size_t k = 0; k < 6; ++k) {
     const AxisReport& x = a.axis[k];
-    const std::string coverage = x.coverage ? fmt::format("{:.1f} %", 100 * *x.coverage) : "-";
+    const std::string coverage =
+        std::isfinite(x.coverage) ? fmt::format("{:.1f} %", 100 * x.coverage) : "-";
     fmt::format_to(out, "{:<5}{:>12}{:>14}{:>13}{:>13}{:>11}{:>12}\n", kWrenchAxes[k],
                    figure(x.noise), figure(x.noise_density), figure(x.resolution),
                    figure(x.drift_per_hour), figure(x.creep_percent, " %"), coverage);
@@ -114,7 +112,7 @@ void add_cross_talk(Out out, const Analysis& a) {
   for (std::size_t k = 0; k < 6; ++k) {
     fmt::format_to(out, "{:<5}", kWrenchAxes[k]);
     for (std::size_t j = 0; j < 6; ++j) {
-      const double value = a.cross_talk(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j));
+      const double value = a.cross_talk(k, j);
       fmt::format_to(out, "{:>9}", std::isfinite(value) ? fmt::format("{:.2f}", value) : "-");
     }
     fmt::format_to(out, "\n");
@@ -143,14 +141,9 @@ void add_folds(Out out, const Analysis& a) {
   fmt::format_to(out, "- where no lag was looked for, or the reference did no more than waver\n");
 }
 
-json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
-json number(const std::optional<double>& value) { return value ? number(*value) : json(nullptr); }
+// What is not finite is written as null.
 
-json vector(const Eigen::VectorXd& v) {
-  json list = json::array();
-  for (const double x : v) list.push_back(number(x));
-  return list;
-}
+json vector(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
 
 json matrix(const Eigen::MatrixXd& m) {
   json rows = json::array();
@@ -160,10 +153,10 @@ json matrix(const Eigen::MatrixXd& m) {
 
 json lag_json(const Lag& lag) {
   return {{"known", lag.known},
-          {"s", number(lag.value)},
-          {"sigma_s", number(lag.sigma)},
+          {"s", lag.value},
+          {"sigma_s", lag.sigma},
           {"at_limit", lag.at_limit},
-          {"explained", number(lag.explained)}};
+          {"explained", lag.explained}};
 }
 
 json axis_json(const AxisReport& x, std::size_t k) {
@@ -171,24 +164,24 @@ json axis_json(const AxisReport& x, std::size_t k) {
           {"unit", kAxisUnits[k]},
           {"calibrated", x.calibrated},
           {"reason", x.reason},
-          {"range", {number(x.range_low), number(x.range_high)}},
-          {"full_scale", number(x.full_scale)},
-          {"r2_in_sample", number(x.r2_in_sample)},
-          {"r2", number(x.r2)},
-          {"rmse", number(x.rmse)},
-          {"rmse_percent", number(x.rmse_percent)},
-          {"nonlinearity_percent", number(x.nonlinearity_percent)},
-          {"hysteresis_percent", number(x.hysteresis_percent)},
-          {"noise", number(x.noise)},
-          {"noise_density", number(x.noise_density)},
-          {"resolution", number(x.resolution)},
-          {"drift_per_hour", number(x.drift_per_hour)},
-          {"creep_percent", number(x.creep_percent)},
-          {"coverage", number(x.coverage)},
-          {"reference_noise", number(x.reference_noise)},
-          {"reference_step", number(x.reference_step)},
-          {"excitation", number(x.excitation)},
-          {"independent", number(x.independent)}};
+          {"range", {x.range_low, x.range_high}},
+          {"full_scale", x.full_scale},
+          {"r2_in_sample", x.r2_in_sample},
+          {"r2", x.r2},
+          {"rmse", x.rmse},
+          {"rmse_percent", x.rmse_percent},
+          {"nonlinearity_percent", x.nonlinearity_percent},
+          {"hysteresis_percent", x.hysteresis_percent},
+          {"noise", x.noise},
+          {"noise_density", x.noise_density},
+          {"resolution", x.resolution},
+          {"drift_per_hour", x.drift_per_hour},
+          {"creep_percent", x.creep_percent},
+          {"coverage", x.coverage},
+          {"reference_noise", x.reference_noise},
+          {"reference_step", x.reference_step},
+          {"excitation", x.excitation},
+          {"independent", x.independent}};
 }
 
 }  // namespace
@@ -213,30 +206,26 @@ std::string analysis_json(const Analysis& a, bool with_series) {
                {"features", a.feature_names},
                {"readings", a.readings},
                {"references", a.references},
-               {"seconds", number(a.seconds)},
-               {"reading_rate_hz", number(a.reading_rate)},
-               {"reference_rate_hz", number(a.reference_rate)},
+               {"seconds", a.seconds},
+               {"reading_rate_hz", a.reading_rate},
+               {"reference_rate_hz", a.reference_rate},
                {"validation", a.validation},
                {"lag", lag_json(a.lag)},
                {"matrix", matrix(a.matrix)},
                {"offset", vector(a.offset)},
                {"cross_talk_percent", matrix(a.cross_talk)},
-               {"condition", number(a.condition)},
+               {"condition", a.condition},
                {"weakest", a.weakest},
-               {"weakest_share", number(a.weakest_share)},
+               {"weakest_share", a.weakest_share},
                {"warnings", a.warnings}};
   for (std::size_t k = 0; k < 6; ++k) root["axes"].push_back(axis_json(a.axis[k], k));
   for (const Fold& fold : a.folds) {
-    json r2 = json::array();
-    json rmse = json::array();
-    for (const double v : fold.r2) r2.push_back(number(v));
-    for (const double v : fold.rmse) rmse.push_back(number(v));
     root["folds"].push_back({{"trial", fold.trial},
                              {"from_s", fold.from},
                              {"to_s", fold.to},
                              {"lag", lag_json(fold.lag)},
-                             {"r2", r2},
-                             {"rmse", rmse}});
+                             {"r2", fold.r2},
+                             {"rmse", fold.rmse}});
   }
   if (with_series) {
     root["held_out"] = {{"t_s", vector(a.time)},

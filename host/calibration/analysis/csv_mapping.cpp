@@ -1,5 +1,4 @@
-#include "host/calibration/analysis/csv_mapping.h"
-
+// Other people's CSV files -> a Trial.
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -7,11 +6,12 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
-#include "host/calibration/analysis/analysis.h"
-#include "host/calibration/analysis/delimited.h"
+#include "host/calibration/analysis/trial_csv.h"
 #include "host/core/axis_names.h"
 #include "host/core/config_error.h"
+#include "host/core/parse.h"
 
 namespace tagwrench::study {
 namespace {
@@ -46,28 +46,18 @@ std::string names(const std::array<Unit, N>& units) {
   return text;
 }
 
-std::vector<std::string> split(std::string_view text, char separator) {
-  std::vector<std::string> parts;
-  for (;;) {
-    const std::size_t end = text.find(separator);
-    parts.emplace_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
 /// Rows to use, in order, with their times.
-struct Rows {
+struct UsedRows {
   std::vector<std::size_t> row;
   Eigen::VectorXd time;
 };
 
-Rows rows_in_order(const DelimitedText& text, const std::string& column, double unit,
-                   std::size_t skip, std::vector<std::string>& notes) {
+UsedRows rows_in_order(const DelimitedText& text, const std::string& column, double unit,
+                       std::size_t skip, std::vector<std::string>& notes) {
   const std::vector<std::size_t> found = text.find(column);
   if (found.size() != 1)
     throw ConfigError(fmt::format("{}: name one column of times, not '{}'", text.name(), column));
-  Rows rows;
+  UsedRows rows;
   std::vector<double> times;
   std::size_t repeated = 0;
   double before = 0;
@@ -97,27 +87,21 @@ Rows rows_in_order(const DelimitedText& text, const std::string& column, double 
     throw ConfigError(
         fmt::format("{}: fewer than two rows of different times are left", text.name()));
   }
-  rows.time =
-      Eigen::Map<const Eigen::VectorXd>(times.data(), static_cast<Eigen::Index>(times.size()));
+  rows.time = Eigen::Map<const Eigen::VectorXd>(times.data(), times.size());
   return rows;
 }
 
-Eigen::MatrixXd all_rows(const DelimitedText& text, const std::vector<std::size_t>& columns) {
-  Eigen::MatrixXd values(static_cast<Eigen::Index>(text.rows()),
-                         static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t row = 0; row < text.rows(); ++row) {
-    for (std::size_t j = 0; j < columns.size(); ++j)
-      values(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(j)) =
-          text.number(row, columns[j]);
-  }
-  return values;
+/// Of all rows, used or not.
+Eigen::MatrixXd all_numbers(const DelimitedText& text, const std::vector<std::size_t>& columns) {
+  std::vector<std::size_t> rows(text.rows());
+  std::iota(rows.begin(), rows.end(), 0);
+  return text.numbers(rows, columns);
 }
 
 Eigen::Matrix3d rotation(const std::string& order, const Eigen::Vector3d& angles) {
   Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(order[static_cast<std::size_t>(i)] - 'x');
-    r = r * Eigen::AngleAxisd(angles[i], axis).toRotationMatrix();
+  for (int i = 0; i < 3; ++i) {
+    r = r * Eigen::AngleAxisd(angles[i], Eigen::Vector3d::Unit(order[i] - 'x')).toRotationMatrix();
   }
   return r;
 }
@@ -125,8 +109,7 @@ Eigen::Matrix3d rotation(const std::string& order, const Eigen::Vector3d& angles
 /// Rotation vectors from the mean of the first `rest` rows, along the axes of that.
 Eigen::MatrixXd rotation_vectors(const std::string& order, const Eigen::MatrixXd& angles,
                                  std::size_t rest) {
-  const Eigen::Index count =
-      std::clamp<Eigen::Index>(static_cast<Eigen::Index>(rest), 1, angles.rows());
+  const Eigen::Index count = std::clamp<Eigen::Index>(rest, 1, angles.rows());
   Eigen::Vector4d sum = Eigen::Vector4d::Zero();
   const auto quaternion = [&](Eigen::Index row) {
     return Eigen::Quaterniond(rotation(order, angles.row(row).transpose()));
@@ -147,10 +130,10 @@ Eigen::MatrixXd rotation_vectors(const std::string& order, const Eigen::MatrixXd
 }
 
 void add_features(const CsvMapping& mapping, const FeatureColumns& group, const DelimitedText& text,
-                  const Rows& rows, MappedTrial& mapped) {
+                  const UsedRows& rows, MappedTrial& mapped) {
   Trial& trial = mapped.trial;
   const std::vector<std::size_t> columns = text.find(group.columns);
-  Eigen::MatrixXd values = all_rows(text, columns);
+  Eigen::MatrixXd values = all_numbers(text, columns);
   if (group.unsmooth > 0) {
     const double w = group.unsmooth;
     for (Eigen::Index i = values.rows() - 1; i > 0; --i)
@@ -172,7 +155,7 @@ void add_features(const CsvMapping& mapping, const FeatureColumns& group, const 
                                                    : text.header()[columns[i]];
     trial.feature_names.push_back(
         group.euler.empty() ? name : fmt::format("{}_r{}", name, "xyz"[static_cast<int>(i)]));
-    const auto column = values.col(static_cast<Eigen::Index>(i));
+    const auto column = values.col(i);
     const double way = column.maxCoeff() - column.minCoeff();
     const bool turns = group.quantity == 'r';
     if (group.quantity == 0 || way <= (turns ? kMaxTurn : kMaxWay)) continue;
@@ -184,9 +167,9 @@ void add_features(const CsvMapping& mapping, const FeatureColumns& group, const 
   }
 }
 
-void add_loads(const CsvMapping& mapping, const DelimitedText& text, const Rows& rows,
+void add_loads(const CsvMapping& mapping, const DelimitedText& text, const UsedRows& rows,
                Trial& trial) {
-  trial.reference = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows.row.size()), 6);
+  trial.reference = Eigen::MatrixXd::Zero(rows.row.size(), 6);
   std::array<bool, 6> given{};
   std::size_t next = 0;
   for (const LoadColumns& group : mapping.loads) {
@@ -199,19 +182,13 @@ void add_loads(const CsvMapping& mapping, const DelimitedText& text, const Rows&
       throw wrong(group.counts_per_unit.size(), "counts");
     if (!group.axes.empty() && group.axes.size() != columns.size())
       throw wrong(group.axes.size(), "axes");
-    Eigen::MatrixXd values = all_rows(text, columns);
+    Eigen::MatrixXd values = all_numbers(text, columns);
     if (mapping.zero_rows > 0) {
-      const Eigen::Index count =
-          std::min<Eigen::Index>(static_cast<Eigen::Index>(mapping.zero_rows), values.rows());
-      const Eigen::RowVectorXd zero = values.topRows(count).colwise().mean();
-      values.rowwise() -= zero;
+      const auto first = values.topRows(std::min<Eigen::Index>(mapping.zero_rows, values.rows()));
+      values.rowwise() -= first.colwise().mean().eval();
     }
     for (std::size_t i = 0; i < columns.size(); ++i) {
-      std::size_t axis = next;
-      if (!group.axes.empty()) {
-        axis = static_cast<std::size_t>(
-            std::find(kWrenchAxes.begin(), kWrenchAxes.end(), group.axes[i]) - kWrenchAxes.begin());
-      }
+      const std::size_t axis = group.axes.empty() ? next : group.axes[i];
       if (axis >= kWrenchAxes.size() || given[axis]) {
         throw ConfigError(fmt::format(
             "{}: '{}' gives {}; name each axis once with axes=Fx,...", text.name(), group.columns,
@@ -220,78 +197,84 @@ void add_loads(const CsvMapping& mapping, const DelimitedText& text, const Rows&
       given[axis] = true;
       next = axis + 1;
       const double counts = group.counts_per_unit.empty() ? 1 : group.counts_per_unit[i];
-      trial.reference.col(static_cast<Eigen::Index>(axis)) =
-          group.sign * group.unit / counts * values(rows.row, static_cast<Eigen::Index>(i));
+      trial.reference.col(axis) = group.sign * group.unit / counts * values(rows.row, i);
     }
   }
 }
 
-ConfigError unknown(const std::string& option, const std::string& text, const std::string& part,
+ConfigError unknown(const std::string& option, const std::string& text, std::string_view part,
                     const std::string& known) {
   return ConfigError(fmt::format("{} {}: what is '{}'? Known: {}", option, text, part, known));
+}
+
+/// Of "KEY=VALUE" the value.
+std::optional<std::string_view> value_of(std::string_view key, std::string_view part) {
+  if (!part.starts_with(key)) return std::nullopt;
+  return part.substr(key.size());
+}
+
+/// The columns that come first in `text`; calls `take` with each part behind them.
+template <class Columns, class Take>
+Columns parse_columns(const std::string& text, Take take) {
+  const std::vector<std::string_view> parts = split(text, ':');
+  Columns columns;
+  columns.columns = parts[0];
+  for (std::size_t i = 1; i < parts.size(); ++i) take(parts[i], columns);
+  return columns;
 }
 
 }  // namespace
 
 FeatureColumns parse_feature_columns(const std::string& text, const std::string& option) {
-  const std::vector<std::string> parts = split(text, ':');
-  FeatureColumns columns;
-  columns.columns = parts[0];
-  for (std::size_t i = 1; i < parts.size(); ++i) {
-    const std::string& part = parts[i];
+  return parse_columns<FeatureColumns>(text, [&](std::string_view part, FeatureColumns& columns) {
     if (const Unit* unit = find_unit(kFeatureUnits, part)) {
       columns.unit = unit->si;
       columns.quantity = part.ends_with('m') ? 'm' : 'r';
     } else if (part == "euler") {
       columns.euler = "xyz";
-    } else if (part.starts_with("euler=") && part.size() == 9 &&
-               part.find_first_not_of("xyz", 6) == std::string::npos) {
-      columns.euler = part.substr(6);
-    } else if (part.starts_with("unsmooth=")) {
-      if (!parse_number(part.substr(9), columns.unsmooth) || columns.unsmooth < kMinWeight ||
-          columns.unsmooth > 1)
+    } else if (const auto order = value_of("euler=", part);
+               order && order->size() == 3 &&
+               order->find_first_not_of("xyz") == std::string_view::npos) {
+      columns.euler = *order;
+    } else if (const auto weight = value_of("unsmooth=", part)) {
+      columns.unsmooth = parse_number(*weight).value_or(0);
+      if (columns.unsmooth < kMinWeight || columns.unsmooth > 1)
         throw ConfigError(fmt::format("{} {}: the weight of a smoothing is from {:g} to 1", option,
                                       text, kMinWeight));
     } else {
       throw unknown(option, text, part,
                     names(kFeatureUnits) + " euler euler=ORDER unsmooth=WEIGHT");
     }
-  }
-  return columns;
+  });
 }
 
 LoadColumns parse_load_columns(const std::string& text, const std::string& option) {
-  const std::vector<std::string> parts = split(text, ':');
-  LoadColumns columns;
-  columns.columns = parts[0];
-  for (std::size_t i = 1; i < parts.size(); ++i) {
-    const std::string& part = parts[i];
+  return parse_columns<LoadColumns>(text, [&](std::string_view part, LoadColumns& columns) {
     if (const Unit* unit = find_unit(kLoadUnits, part)) {
       columns.unit = unit->si;
     } else if (part == "negative") {
       columns.sign = -1;
-    } else if (part.starts_with("counts=")) {
-      for (const std::string& one : split(std::string_view(part).substr(7), ',')) {
-        double value = 0;
-        if (!parse_number(one, value) || std::abs(value) < 1 / DelimitedText::kMax ||
-            std::abs(value) > DelimitedText::kMax) {
+    } else if (const auto counts = value_of("counts=", part)) {
+      for (const std::string_view one : split(*counts, ',')) {
+        const double value = parse_number(one).value_or(0);
+        if (std::abs(value) < 1 / DelimitedText::kMax || std::abs(value) > DelimitedText::kMax) {
           throw ConfigError(fmt::format("{} {}: counts per unit are numbers from {:g} to {:g}",
                                         option, text, 1 / DelimitedText::kMax,
                                         DelimitedText::kMax));
         }
         columns.counts_per_unit.push_back(value);
       }
-    } else if (part.starts_with("axes=")) {
-      for (const std::string& one : split(std::string_view(part).substr(5), ',')) {
-        if (std::find(kWrenchAxes.begin(), kWrenchAxes.end(), one) == kWrenchAxes.end())
+    } else if (const auto axes = value_of("axes=", part)) {
+      for (const std::string_view one : split(*axes, ',')) {
+        const auto axis = std::find(kWrenchAxes.begin(), kWrenchAxes.end(), one);
+        if (axis == kWrenchAxes.end())
           throw unknown(option, text, one, fmt::format("{}", fmt::join(kWrenchAxes, " ")));
-        columns.axes.push_back(one);
+        columns.axes.push_back(axis - kWrenchAxes.begin());
       }
     } else {
       throw unknown(option, text, part, names(kLoadUnits) + " counts=A,B,... axes=Fx,... negative");
     }
-  }
-  return columns;
+  });
 }
 
 double parse_time_unit(const std::string& text, const std::string& option) {
@@ -307,8 +290,8 @@ MappedTrial read_mapped(const CsvMapping& mapping) {
   trial.name = mapping.readings.stem().string();
   trial.file = mapping.readings.string();
   const DelimitedText readings(mapping.readings, mapping.separator, mapping.skip_lines);
-  const Rows rows = rows_in_order(readings, mapping.reading_time, mapping.time_unit,
-                                  mapping.skip_readings, mapped.notes);
+  const UsedRows rows = rows_in_order(readings, mapping.reading_time, mapping.time_unit,
+                                      mapping.skip_readings, mapped.notes);
   trial.time = rows.time;
   for (const FeatureColumns& group : mapping.features)
     add_features(mapping, group, readings, rows, mapped);
@@ -316,13 +299,14 @@ MappedTrial read_mapped(const CsvMapping& mapping) {
   if (mapping.reference.empty()) {
     trial.reference_time = rows.time;
     add_loads(mapping, readings, rows, trial);
-    return mapped;
+  } else {
+    const DelimitedText reference(mapping.reference, mapping.separator, mapping.skip_lines);
+    const UsedRows felt =
+        rows_in_order(reference, mapping.reference_time, mapping.reference_time_unit,
+                      mapping.skip_references, mapped.notes);
+    trial.reference_time = felt.time;
+    add_loads(mapping, reference, felt, trial);
   }
-  const DelimitedText reference(mapping.reference, mapping.separator, mapping.skip_lines);
-  const Rows felt = rows_in_order(reference, mapping.reference_time, mapping.reference_time_unit,
-                                  mapping.skip_references, mapped.notes);
-  trial.reference_time = felt.time;
-  add_loads(mapping, reference, felt, trial);
   return mapped;
 }
 

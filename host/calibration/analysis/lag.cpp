@@ -23,7 +23,9 @@ constexpr Eigen::Index kMaxReadings = 10000;  // of more, every so many: it cost
                                               // are not as good as that
 constexpr double kFloor = 1e-12;              // of the share that no model explains
 constexpr double kMinExplained = 0.3;         // R^2 of the best axis, or nothing is known
-constexpr double kGapsOfMedian = 5;
+constexpr double kMaxGap = 5;                 // median intervals of the reference
+constexpr int kPointsAside = 10;              // of the triangle that smooths
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A segment with the readings that lie within the reference at every lag that is asked for.
 struct Prepared {
@@ -36,7 +38,7 @@ struct Prepared {
 Prepared prepare(const Segment& segment, double from, double to, Eigen::Index every) {
   Prepared prepared;
   prepared.source = &segment;
-  prepared.longest_gap = kGapsOfMedian * median_interval(segment.reference_time);
+  prepared.longest_gap = kMaxGap * median_interval(segment.reference_time);
   std::vector<Eigen::Index> kept;
   const Eigen::Index last = segment.reference_time.size() - 1;
   for (Eigen::Index i = 0; i < segment.time.size() && last > 0; i += every) {
@@ -53,24 +55,20 @@ Prepared prepare(const Segment& segment, double from, double to, Eigen::Index ev
   return prepared;
 }
 
-/// Sums of one block of readings, of which any number add up to a regression.
+/// Sums of one block of readings, of which any number of one model add up to a regression.
 struct Sums {
+  int model = 0;
   Eigen::MatrixXd xx;  ///< p x p
   Eigen::MatrixXd xy;  ///< p x q
   Eigen::VectorXd yy;  ///< q
   double n = 0;
 
-  void add(const Sums& other, double sign) {
-    xx += sign * other.xx;
-    xy += sign * other.xy;
-    yy += sign * other.yy;
-    n += sign * other.n;
+  void operator+=(const Sums& other) {
+    xx += other.xx;
+    xy += other.xy;
+    yy += other.yy;
+    n += other.n;
   }
-};
-
-struct Block {
-  int model = 0;
-  Sums sums;
 };
 
 class LagScan {
@@ -80,20 +78,18 @@ class LagScan {
     Eigen::Index all = 0;
     for (const Segment& segment : segments) all += segment.time.size();
     const Eigen::Index every = std::max<Eigen::Index>(1, all / kMaxReadings);
-    Eigen::Index rows = 0;
     for (const Segment& segment : segments) {
       prepared_.push_back(prepare(segment, from, to, every));
-      rows += prepared_.back().time.size();
+      rows_ += prepared_.back().time.size();
     }
-    rows_ = rows;
-    block_rows_ = std::max<Eigen::Index>(1, (rows + kBlocks - 1) / kBlocks);
+    block_rows_ = std::max<Eigen::Index>(1, (rows_ + kBlocks - 1) / kBlocks);
   }
 
   Eigen::Index rows() const { return rows_; }
 
   /// The sums at one lag, block by block; always the same blocks.
-  std::vector<Block> blocks_at(double lag) const {
-    std::vector<Block> blocks;
+  std::vector<Sums> blocks_at(double lag) const {
+    std::vector<Sums> blocks;
     for (const Prepared& p : prepared_) {
       const Eigen::Index n = p.time.size();
       if (n == 0) continue;
@@ -116,10 +112,9 @@ class LagScan {
         const Eigen::Index size = n * (b + 1) / parts - first;
         const auto xb = x.middleRows(first, size);
         const auto yb = y.middleRows(first, size);
-        blocks.push_back(
-            {p.source->model,
-             {xb.transpose() * xb, xb.transpose() * yb, yb.colwise().squaredNorm().transpose(),
-              there.segment(first, size).sum()}});
+        blocks.push_back({p.source->model, xb.transpose() * xb, xb.transpose() * yb,
+                          yb.colwise().squaredNorm().transpose(),
+                          there.segment(first, size).sum()});
       }
     }
     return blocks;
@@ -127,13 +122,13 @@ class LagScan {
 
   /// Sum of log(unexplained share), weighted by the readings, of all blocks but `without`; infinite
   /// where there is nothing to regress. `explained` becomes the mean and the largest R^2.
-  double criterion(const std::vector<Block>& blocks, std::size_t without,
+  double criterion(const std::vector<Sums>& blocks, std::size_t without,
                    Eigen::Vector2d* explained = nullptr) const {
     std::map<int, Sums> models;
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       if (b == without) continue;
-      const auto [at, is_new] = models.try_emplace(blocks[b].model, blocks[b].sums);
-      if (!is_new) at->second.add(blocks[b].sums, 1);
+      const auto [at, is_new] = models.try_emplace(blocks[b].model, blocks[b]);
+      if (!is_new) at->second += blocks[b];
     }
     double sum = 0;
     double shares = 0;
@@ -157,7 +152,7 @@ class LagScan {
         least = std::min(least, share);
       }
     }
-    if (!(weight > 0)) return std::numeric_limits<double>::infinity();
+    if (!(weight > 0)) return kInfinity;
     if (explained != nullptr) *explained = {1 - shares / weight, 1 - least};
     return sum / weight;
   }
@@ -187,16 +182,15 @@ constexpr std::size_t kAllBlocks = std::numeric_limits<std::size_t>::max();
 
 /// Where the parabola through the points about the least one of an even grid is least.
 double lowest(const std::vector<double>& values, double first, double step) {
-  const auto n = static_cast<int>(values.size());
-  const auto least =
-      static_cast<int>(std::min_element(values.begin(), values.end()) - values.begin());
+  const int n = values.size();
+  const int least = std::min_element(values.begin(), values.end()) - values.begin();
   const int middle =
       std::clamp(least, std::min(kParabola, n / 2), std::max(n - 1 - kParabola, (n - 1) / 2));
   double s2 = 0, s4 = 0, y0 = 0, y1 = 0, y2 = 0;
   int count = 0;
   for (int j = -kParabola; j <= kParabola; ++j) {
     if (middle + j < 0 || middle + j >= n) continue;
-    const double v = values[static_cast<std::size_t>(middle + j)];
+    const double v = values[middle + j];
     s2 += j * j;
     s4 += j * j * j * j;
     y0 += v;
@@ -214,8 +208,8 @@ double lowest(const std::vector<double>& values, double first, double step) {
 
 std::vector<double> grid(double from, double to, double step) {
   const int n = std::max(1, static_cast<int>(std::lround((to - from) / step)));
-  std::vector<double> lags(static_cast<std::size_t>(n) + 1);
-  for (int i = 0; i <= n; ++i) lags[static_cast<std::size_t>(i)] = from + (to - from) * i / n;
+  std::vector<double> lags;
+  for (int i = 0; i <= n; ++i) lags.push_back(from + (to - from) * i / n);
   return lags;
 }
 
@@ -256,7 +250,7 @@ Lag estimate_lag(std::span<const Segment> given, const LagSearch& search) {
   const std::span<const Segment> segments = search.smooth ? smoothed : given;
   const LagScan coarse(segments, search, search.from, search.to);
   if (coarse.rows() < 3 * segments.front().features.cols()) return lag;
-  double best = std::numeric_limits<double>::infinity();
+  double best = kInfinity;
   for (const double candidate : grid(search.from, search.to, kCoarse)) {
     const double value = coarse.criterion(coarse.blocks_at(candidate), kAllBlocks);
     if (value < best) {
@@ -270,7 +264,7 @@ Lag estimate_lag(std::span<const Segment> given, const LagSearch& search) {
   const double reach = kFineReach * kFine;
   const LagScan fine(segments, search, lag.value - reach, lag.value + reach);
   const std::vector<double> lags = grid(lag.value - reach, lag.value + reach, kFine);
-  std::vector<std::vector<Block>> at;
+  std::vector<std::vector<Sums>> at;
   std::size_t count = std::numeric_limits<std::size_t>::max();
   for (const double candidate : lags) {
     at.push_back(fine.blocks_at(candidate));
@@ -278,20 +272,15 @@ Lag estimate_lag(std::span<const Segment> given, const LagSearch& search) {
   }
   const auto find = [&](std::size_t without) {
     std::vector<double> values;
-    for (const std::vector<Block>& blocks : at) values.push_back(fine.criterion(blocks, without));
+    for (const std::vector<Sums>& blocks : at) values.push_back(fine.criterion(blocks, without));
     return lowest(values, lags.front(), kFine);
   };
   lag.value = std::clamp(find(kAllBlocks), search.from, search.to);
-  std::vector<double> without(count);
-  double mean = 0;
-  for (std::size_t b = 0; b < count; ++b) {
-    without[b] = find(b);
-    mean += without[b] / static_cast<double>(count);
-  }
-  double squares = 0;
-  for (const double value : without) squares += (value - mean) * (value - mean);
+  Eigen::ArrayXd without(count);
+  for (std::size_t b = 0; b < count; ++b) without[b] = find(b);
+  const double blocks = static_cast<double>(count);
   lag.sigma = count > 1
-                  ? std::sqrt(squares * static_cast<double>(count - 1) / static_cast<double>(count))
+                  ? std::sqrt((without - without.mean()).square().sum() * (blocks - 1) / blocks)
                   : reach;
   Eigen::Vector2d explained = Eigen::Vector2d::Zero();
   fine.criterion(fine.blocks_at(lag.value), kAllBlocks, &explained);
@@ -327,10 +316,6 @@ std::string lag_warning(const Lag& lag, double from, double to) {
                              1e3 * std::abs(early ? from : to));
 }
 
-namespace {
-constexpr int kPointsAside = 10;  // of the triangle
-}
-
 Eigen::MatrixXd smooth_rows(const Eigen::MatrixXd& rows) {
   Eigen::MatrixXd smooth = rows;
   const Eigen::Index n = rows.rows() - 2;
@@ -348,8 +333,7 @@ Eigen::MatrixXd smooth_reference(const Eigen::VectorXd& time, const Eigen::Matri
   for (int j = -kPointsAside; j <= kPointsAside; ++j) {
     const double offset = period * j / (kPointsAside + 1);
     const double w = 1 - std::abs(offset) / period;
-    const Eigen::MatrixXd at =
-        reference_at(time, -offset, time, values, std::numeric_limits<double>::infinity());
+    const Eigen::MatrixXd at = reference_at(time, -offset, time, values, kInfinity);
     for (Eigen::Index i = 0; i < at.rows(); ++i) {
       if (!at.row(i).allFinite()) continue;
       sum.row(i) += w * at.row(i);
@@ -361,10 +345,8 @@ Eigen::MatrixXd smooth_reference(const Eigen::VectorXd& time, const Eigen::Matri
 
 double median_interval(const Eigen::VectorXd& time) {
   if (time.size() < 2) return 0;
-  std::vector<double> intervals(static_cast<std::size_t>(time.size() - 1));
-  for (Eigen::Index i = 1; i < time.size(); ++i)
-    intervals[static_cast<std::size_t>(i - 1)] = time[i] - time[i - 1];
-  return median(std::move(intervals));
+  const Eigen::VectorXd intervals = time.tail(time.size() - 1) - time.head(time.size() - 1);
+  return median({intervals.begin(), intervals.end()});
 }
 
 }  // namespace tagwrench::study

@@ -4,43 +4,71 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iterator>
 #include <limits>
 #include <stdexcept>
 
-#include "host/calibration/analysis/delimited.h"
 #include "host/core/config_error.h"
+#include "host/core/parse.h"
 
 namespace tagwrench::study {
 namespace {
+
+constexpr std::string_view kSeparators = ";\t,";
+constexpr std::size_t kRowsToTell = 20;  // the separator by
+constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
+
+std::string load(const std::filesystem::path& file) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error))
+    throw ConfigError(fmt::format("{}: a folder; name a CSV file", file.string()));
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw ConfigError(fmt::format("{}: cannot be read; check the name", file.string()));
+  const auto size = std::filesystem::file_size(file, error);
+  if (!error && size > kMaxBytes)
+    throw ConfigError(fmt::format("{}: larger than 1 GB; cut it into pieces", file.string()));
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+struct Line {
+  std::string_view text;
+  std::size_t number;
+};
+
+std::size_t fields_of(std::string_view line, char separator) {
+  return std::count(line.begin(), line.end(), separator) + 1;
+}
+
+char separator_of(const std::vector<Line>& lines) {
+  const std::size_t rows = std::min(lines.size(), kRowsToTell);
+  for (const char separator : kSeparators) {
+    const std::size_t fields = fields_of(lines[0].text, separator);
+    const bool even = std::all_of(lines.begin(), lines.begin() + rows, [&](const Line& line) {
+      return fields_of(line.text, separator) == fields;
+    });
+    if (fields > 1 && even) return separator;
+  }
+  // Uneven rows: the most frequent one, so that the row which is wrong can be named.
+  return *std::max_element(kSeparators.begin(), kSeparators.end(), [&](char a, char b) {
+    return fields_of(lines[0].text, a) < fields_of(lines[0].text, b);
+  });
+}
+
+std::string shown(std::string_view field) {
+  constexpr std::size_t kMax = 40;
+  std::string text(field.substr(0, kMax));
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ') c = '?';
+  }
+  return field.size() > kMax ? text + "..." : text;
+}
 
 constexpr std::string_view kFormat = "tagwrench-data-1";
 constexpr std::array<const char*, 6> kLoads{"Fx_N", "Fy_N", "Fz_N", "Mx_Nm", "My_Nm", "Mz_Nm"};
 constexpr std::string_view kSigma = "sigma_";
 constexpr std::string_view kPredicted = "predicted_";
-
-void check_shapes(const Trial& trial) {
-  const auto n = trial.time.size();
-  const auto m = trial.reference_time.size();
-  const auto p = static_cast<Eigen::Index>(trial.feature_names.size());
-  const auto fits = [](const Eigen::MatrixXd& matrix, Eigen::Index rows, Eigen::Index columns) {
-    return matrix.rows() == rows && matrix.cols() == columns;
-  };
-  if (!fits(trial.features, n, p) || !fits(trial.reference, m, 6) ||
-      (trial.feature_sigma.size() > 0 && !fits(trial.feature_sigma, n, p)) ||
-      (trial.reference_sigma.size() > 0 && !fits(trial.reference_sigma, m, 6)) ||
-      (trial.step.size() > 0 && trial.step.size() != n) ||
-      (trial.predicted.size() > 0 &&
-       (!fits(trial.predicted, n, 6) || !fits(trial.predicted_sigma, n, 6))))
-    throw std::invalid_argument("a trial whose columns are not of one length");
-  for (const std::string& name : trial.feature_names) {
-    if (name.empty() || name.find_first_of(",;\t\r\n#") != std::string::npos)
-      throw std::invalid_argument("a feature's name that cannot be a CSV column: " + name);
-  }
-}
 
 std::string one_line(std::string text) {
   for (char& c : text) {
@@ -51,14 +79,11 @@ std::string one_line(std::string text) {
 
 using Out = std::back_insert_iterator<std::string>;
 
-/// Numbers that are not finite are left empty.
+/// Nothing of a matrix without rows; numbers that are not finite are left empty.
 void add_row(Out out, const Eigen::MatrixXd& matrix, Eigen::Index row) {
-  for (Eigen::Index i = 0; i < matrix.cols(); ++i) {
-    if (std::isfinite(matrix(row, i))) {
-      fmt::format_to(out, ",{}", matrix(row, i));
-    } else {
-      fmt::format_to(out, ",");
-    }
+  for (Eigen::Index i = 0; i < matrix.cols() && matrix.rows() > 0; ++i) {
+    *out++ = ',';
+    if (std::isfinite(matrix(row, i))) fmt::format_to(out, "{}", matrix(row, i));
   }
 }
 
@@ -94,18 +119,17 @@ class TrialReader {
     }
     trial_.time = times(readings);
     trial_.reference_time = times(references);
-    trial_.features = numbers(readings, features_.values);
+    trial_.features = text_.numbers(readings, features_.values);
     trial_.feature_sigma = sigmas(readings, features_.sigmas);
     if (!predictions_.values.empty()) {
-      trial_.predicted = optional_numbers(readings, predictions_.values);
-      trial_.predicted_sigma = optional_numbers(readings, predictions_.sigmas);
+      trial_.predicted = text_.numbers(readings, predictions_.values, /*gaps=*/true);
+      trial_.predicted_sigma = text_.numbers(readings, predictions_.sigmas, /*gaps=*/true);
     }
-    trial_.reference = numbers(references, loads_.values);
+    trial_.reference = text_.numbers(references, loads_.values);
     trial_.reference_sigma = sigmas(references, loads_.sigmas);
     if (step_ > 0) {
-      trial_.step.resize(static_cast<Eigen::Index>(readings.size()));
-      for (std::size_t i = 0; i < readings.size(); ++i)
-        trial_.step[static_cast<Eigen::Index>(i)] = step(readings[i]);
+      trial_.step.resize(readings.size());
+      for (std::size_t i = 0; i < readings.size(); ++i) trial_.step[i] = step(readings[i]);
     }
     return std::move(trial_);
   }
@@ -148,89 +172,51 @@ class TrialReader {
     const auto whole = [](const Columns& c) {
       return c.sigmas.empty() || c.sigmas.size() == c.values.size();
     };
-    const bool predictions_whole =
-        predictions_.values.empty()
-            ? predictions_.sigmas.empty()
-            : predictions_.values.size() == 6 && predictions_.sigmas.size() == 6;
-    if (!predictions_whole || loads_.values.size() != kLoads.size() || features_.values.empty() ||
-        !whole(loads_) || !whole(features_)) {
+    const std::size_t predictions = predictions_.values.size();
+    if ((predictions != 0 && predictions != 6) || predictions_.sigmas.size() != predictions ||
+        loads_.values.size() != kLoads.size() || features_.values.empty() || !whole(loads_) ||
+        !whole(features_)) {
       throw ConfigError(
           fmt::format("{}: the header must name features, the six of {}, and all of "
                       "their sigmas or none",
                       text_.name(), fmt::join(kLoads, ",")));
     }
-    for (std::size_t k = 0; k < kLoads.size(); ++k) {
-      if (header[loads_.values[k]] != kLoads[k]) {
-        throw ConfigError(fmt::format("{}: the loads must be in the order {}", text_.name(),
-                                      fmt::join(kLoads, ",")));
-      }
+    if (!std::ranges::equal(loads_.values, kLoads, {}, [&](std::size_t i) { return header[i]; })) {
+      throw ConfigError(fmt::format("{}: the loads must be in the order {}", text_.name(),
+                                    fmt::join(kLoads, ",")));
     }
   }
 
   Eigen::VectorXd times(const std::vector<std::size_t>& rows) const {
-    Eigen::VectorXd time(static_cast<Eigen::Index>(rows.size()));
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
-      time[at] = text_.number(rows[i], 1);
-      if (i > 0 && time[at] <= time[at - 1]) {
+    const Eigen::VectorXd time = text_.numbers(rows, {1});
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      if (time[i] <= time[i - 1]) {
         throw ConfigError(
             fmt::format("{}: time {} s after {} s in the row of the same kind before; "
                         "times must grow",
-                        text_.place(rows[i]), time[at], time[at - 1]));
+                        text_.place(rows[i]), time[i], time[i - 1]));
       }
     }
     return time;
   }
 
-  Eigen::MatrixXd numbers(const std::vector<std::size_t>& rows,
-                          const std::vector<std::size_t>& columns) const {
-    Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()),
-                           static_cast<Eigen::Index>(columns.size()));
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      for (std::size_t j = 0; j < columns.size(); ++j)
-        matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-            text_.number(rows[i], columns[j]);
-    }
-    return matrix;
-  }
-
   Eigen::MatrixXd sigmas(const std::vector<std::size_t>& rows,
                          const std::vector<std::size_t>& columns) const {
     if (columns.empty()) return {};
-    Eigen::MatrixXd matrix = numbers(rows, columns);
+    Eigen::MatrixXd matrix = text_.numbers(rows, columns);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (matrix.row(static_cast<Eigen::Index>(i)).minCoeff() < 0) {
+      if (matrix.row(i).minCoeff() < 0)
         throw ConfigError(fmt::format("{}: a sigma that is negative", text_.place(rows[i])));
-      }
-    }
-    return matrix;
-  }
-
-  /// NaN where a field is empty.
-  Eigen::MatrixXd optional_numbers(const std::vector<std::size_t>& rows,
-                                   const std::vector<std::size_t>& columns) const {
-    Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()),
-                           static_cast<Eigen::Index>(columns.size()));
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      for (std::size_t j = 0; j < columns.size(); ++j) {
-        const bool empty = text_.field(rows[i], columns[j]).empty();
-        matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-            empty ? std::numeric_limits<double>::quiet_NaN() : text_.number(rows[i], columns[j]);
-      }
     }
     return matrix;
   }
 
   int step(std::size_t row) const {
     const std::string_view field = text_.field(row, step_);
-    int value = -1;
-    if (field.empty()) return value;
-    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    if (error != std::errc() || end != field.data() + field.size() || value < -1) {
-      throw ConfigError(
-          fmt::format("{}: step must be a number from 0, or -1 between steps", text_.place(row)));
-    }
-    return value;
+    const int value = field.empty() ? -1 : parse_whole<int>(field).value_or(-2);
+    if (value >= -1) return value;
+    throw ConfigError(
+        fmt::format("{}: step must be a number from 0, or -1 between steps", text_.place(row)));
   }
 
   DelimitedText text_;
@@ -243,38 +229,185 @@ class TrialReader {
 
 }  // namespace
 
+std::optional<double> parse_number(std::string_view text) noexcept {
+  text = trimmed(text);
+  if (!text.empty() && text[0] == '+') text.remove_prefix(1);
+  const auto value = parse_whole<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
+DelimitedText::DelimitedText(const std::filesystem::path& file, char separator, std::size_t skip)
+    : name_(file.string()), text_(load(file)) {
+  std::string_view rest = text_;
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (rest.starts_with(kByteOrderMark)) rest.remove_prefix(kByteOrderMark.size());
+  std::vector<Line> lines;
+  for (std::size_t number = 1; !rest.empty(); ++number) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const std::string_view line = rest.substr(0, end);
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    if (number <= skip || trimmed(line).empty()) continue;
+    if (line[0] == '#') {
+      comments_.emplace_back(trimmed(line.substr(1)));
+    } else {
+      lines.push_back({line, number});
+    }
+  }
+  if (lines.empty()) throw ConfigError(fmt::format("{}: no rows in it", name_));
+  if (separator == 0) separator = separator_of(lines);
+
+  columns_ = fields_of(lines[0].text, separator);
+  if (columns_ < 2) {
+    throw ConfigError(fmt::format(
+        "{}:{}: only one column when split at '{}'; give the right --separator", name_,
+        lines[0].number, separator == '\t' ? std::string("tab") : std::string(1, separator)));
+  }
+  fields_.reserve(lines.size() * columns_);
+  for (const Line& line : lines) {
+    const std::size_t count = fields_of(line.text, separator);
+    if (count != columns_) {
+      throw ConfigError(
+          fmt::format("{}:{}: {} fields where the first row has {}; mend the row, or "
+                      "give the right --separator",
+                      name_, line.number, count, columns_));
+    }
+    for (const std::string_view field : split(line.text, separator))
+      fields_.push_back(trimmed(field));
+    lines_.push_back(line.number);
+  }
+  const auto first_end = fields_.begin() + columns_;
+  if (std::none_of(fields_.begin(), first_end,
+                   [](std::string_view f) { return parse_number(f).has_value(); })) {
+    header_.assign(fields_.begin(), first_end);
+    fields_.erase(fields_.begin(), first_end);
+    lines_.erase(lines_.begin());
+  }
+  if (lines_.empty()) throw ConfigError(fmt::format("{}: a header, but no rows in it", name_));
+}
+
+std::string DelimitedText::place(std::size_t row) const {
+  return fmt::format("{}:{}", name_, lines_[row]);
+}
+
+double DelimitedText::number(std::size_t row, std::size_t column, double largest) const {
+  const std::string_view text = field(row, column);
+  const std::optional<double> value = parse_number(text);
+  if (value && std::abs(*value) <= largest) return *value;
+  const std::string which = header_.empty()
+                                ? fmt::format("column {}", column + 1)
+                                : fmt::format("column {} ({})", column + 1, shown(header_[column]));
+  if (text.empty()) {
+    throw ConfigError(
+        fmt::format("{}: {} is empty; leave the row out or fill it in", place(row), which));
+  }
+  if (value) {
+    throw ConfigError(fmt::format(
+        "{}: {} is '{}', which no instrument reads (at most {:g}); mend it or leave the row out",
+        place(row), which, shown(text), largest));
+  }
+  const bool comma = text.find(',') != std::string_view::npos;
+  throw ConfigError(fmt::format(
+      "{}: {} is '{}', which is no finite number; {}", place(row), which, shown(text),
+      comma ? "write decimal points, not commas" : "leave the row out, or name other columns"));
+}
+
+Eigen::MatrixXd DelimitedText::numbers(const std::vector<std::size_t>& rows,
+                                       const std::vector<std::size_t>& columns, bool gaps) const {
+  Eigen::MatrixXd values(rows.size(), columns.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t j = 0; j < columns.size(); ++j) {
+      values(i, j) = gaps && field(rows[i], columns[j]).empty()
+                         ? std::numeric_limits<double>::quiet_NaN()
+                         : number(rows[i], columns[j]);
+    }
+  }
+  return values;
+}
+
+std::vector<std::size_t> DelimitedText::find(std::string_view columns) const {
+  std::vector<std::size_t> found;
+  const auto numbered = [&](std::string_view text) -> std::size_t {
+    const auto number = parse_whole<std::size_t>(text);
+    if (number && (*number < 1 || *number > columns_)) {
+      throw ConfigError(
+          fmt::format("{}: no column {}; it has 1 to {}", name_, shown(text), columns_));
+    }
+    return number.value_or(0);
+  };
+  for (const std::string_view part : split(columns, ',')) {
+    const std::string_view one = trimmed(part);
+    if (one.empty()) continue;
+    const auto named = std::find(header_.begin(), header_.end(), one);
+    if (named != header_.end()) {
+      found.push_back(named - header_.begin());
+      continue;
+    }
+    const std::size_t dash = one.find('-');
+    const std::size_t first = numbered(one.substr(0, dash));
+    const std::size_t last =
+        dash == std::string_view::npos ? first : numbered(one.substr(dash + 1));
+    if (first == 0 || last < first) {
+      throw ConfigError(fmt::format("{}: no column '{}'; name columns by number from 1 ('3-8'){}",
+                                    name_, shown(one),
+                                    header_.empty() ? "" : " or as its header does"));
+    }
+    for (std::size_t i = first; i <= last; ++i) found.push_back(i - 1);
+  }
+  if (found.empty()) throw ConfigError(fmt::format("{}: no columns named", name_));
+  return found;
+}
+
 std::vector<std::string> displacement_names() {
   return {"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
 }
 
+bool shapes_fit(const Trial& trial) {
+  const Eigen::Index n = trial.time.size();
+  const Eigen::Index m = trial.reference_time.size();
+  const auto p = static_cast<Eigen::Index>(trial.feature_names.size());
+  const auto fits = [](const Eigen::MatrixXd& matrix, Eigen::Index rows, Eigen::Index columns) {
+    return matrix.rows() == rows && matrix.cols() == columns;
+  };
+  const auto fits_if_any = [&](const Eigen::MatrixXd& matrix, Eigen::Index rows,
+                               Eigen::Index columns) {
+    return matrix.size() == 0 || fits(matrix, rows, columns);
+  };
+  return fits(trial.features, n, p) && fits(trial.reference, m, 6) &&
+         fits_if_any(trial.feature_sigma, n, p) && fits_if_any(trial.reference_sigma, m, 6) &&
+         (trial.step.size() == 0 || trial.step.size() == n) && fits_if_any(trial.predicted, n, 6) &&
+         trial.predicted.size() == trial.predicted_sigma.size();
+}
+
 std::string trial_to_csv(const Trial& trial) {
-  check_shapes(trial);
-  const bool steps = trial.step.size() > 0;
-  const bool feature_sigmas = trial.feature_sigma.size() > 0;
-  const bool load_sigmas = trial.reference_sigma.size() > 0;
+  if (!shapes_fit(trial))
+    throw std::invalid_argument("a trial whose columns are not of one length");
+  for (const std::string& name : trial.feature_names) {
+    if (name.empty() || name.find_first_of(",;\t\r\n#") != std::string::npos)
+      throw std::invalid_argument("a feature's name that cannot be a CSV column: " + name);
+  }
   std::string text = fmt::format("# {}\n# name: {}\n", kFormat, one_line(trial.name));
   if (!trial.sensor.empty()) text += fmt::format("# sensor: {}\n", one_line(trial.sensor));
   if (trial.held) text += "# held: true\n";
-  text += "kind,t_s";
-  if (steps) text += ",step";
-  for (const std::string& name : trial.feature_names) text += "," + name;
-  if (feature_sigmas)
-    for (const std::string& name : trial.feature_names) text += fmt::format(",{}{}", kSigma, name);
+  const bool steps = trial.step.size() > 0;
+  std::string features = steps ? ",step" : "";
+  std::string loads;
+  const auto add_names = [](std::string& to, bool there, std::string_view prefix,
+                            const auto& names) {
+    for (std::size_t i = 0; there && i < names.size(); ++i)
+      to += fmt::format(",{}{}", prefix, names[i]);
+  };
   const bool predictions = trial.predicted.size() > 0;
-  if (predictions) {
-    for (const char* name : kLoads) text += fmt::format(",{}{}", kPredicted, name);
-    for (const char* name : kLoads) text += fmt::format(",{}{}{}", kPredicted, kSigma, name);
-  }
-  for (const char* name : kLoads) text += fmt::format(",{}", name);
-  if (load_sigmas)
-    for (const char* name : kLoads) text += fmt::format(",{}{}", kSigma, name);
-  text += '\n';
+  add_names(features, true, "", trial.feature_names);
+  add_names(features, trial.feature_sigma.size() > 0, kSigma, trial.feature_names);
+  add_names(features, predictions, kPredicted, kLoads);
+  add_names(features, predictions, fmt::format("{}{}", kPredicted, kSigma), kLoads);
+  add_names(loads, true, "", kLoads);
+  add_names(loads, trial.reference_sigma.size() > 0, kSigma, kLoads);
+  text += "kind,t_s" + features + loads + '\n';
 
   const auto out = std::back_inserter(text);
-  const auto p = trial.feature_names.size();
-  const std::string no_features(
-      (steps ? 1 : 0) + p * (feature_sigmas ? 2 : 1) + (predictions ? 12 : 0), ',');
-  const std::string no_loads(load_sigmas ? 12 : 6, ',');
+  const std::string no_features(std::count(features.begin(), features.end(), ','), ',');
+  const std::string no_loads(std::count(loads.begin(), loads.end(), ','), ',');
   Eigen::Index reading = 0;
   Eigen::Index reference = 0;
   while (reading < trial.time.size() || reference < trial.reference_time.size()) {
@@ -285,18 +418,16 @@ std::string trial_to_csv(const Trial& trial) {
       fmt::format_to(out, "reading,{}", trial.time[reading]);
       if (steps) fmt::format_to(out, ",{}", trial.step[reading]);
       add_row(out, trial.features, reading);
-      if (feature_sigmas) add_row(out, trial.feature_sigma, reading);
-      if (predictions) {
-        add_row(out, trial.predicted, reading);
-        add_row(out, trial.predicted_sigma, reading);
-      }
+      add_row(out, trial.feature_sigma, reading);
+      add_row(out, trial.predicted, reading);
+      add_row(out, trial.predicted_sigma, reading);
       text += no_loads;
       ++reading;
     } else {
       fmt::format_to(out, "reference,{}", trial.reference_time[reference]);
       text += no_features;
       add_row(out, trial.reference, reference);
-      if (load_sigmas) add_row(out, trial.reference_sigma, reference);
+      add_row(out, trial.reference_sigma, reference);
       ++reference;
     }
     text += '\n';

@@ -1,13 +1,16 @@
 // Room calibration/certificate: an analysis -> one page, as HTML, PDF and JSON.
 // In:  the figures of calibration/analysis, N and N m; facts about sensor, plan and program.
 // Out: three files that bear the same number, a hash of the contents.
-// Then: render.h, html.h, plots.h, files.h.
+// Then: html.cpp, render.cpp.
 //
 // What a certificate says: the figures of an analysis, and what they rest on.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host/calibration/analysis/analysis.h"
@@ -53,5 +56,69 @@ std::string number_text(double value);
 
 /// Two significant digits and a percent sign; "<0.01 %" for less, either way.
 std::string percent_text(double value);
+
+// The page: HTML that needs nothing else, for screens and for A4.
+
+/// How much room the figures and the remarks get, where a page would overflow.
+struct PageRoom {
+  double scatter_mm = 68, traces_mm = 98;  ///< height of the figures
+  std::size_t warnings = 8;                ///< shown; the page says how many more the JSON has
+  std::size_t warning_length = 300;        ///< characters
+  std::size_t fact_length = 160;           ///< characters
+};
+
+/// `scatter` and `traces` are SVG of ours; everything else is escaped.
+std::string certificate_html(const Certificate& certificate, const std::string& scatter,
+                             const std::string& traces, const PageRoom& room);
+
+/// `text` with what HTML would take for markup written as entities, and without control characters;
+/// what is no UTF-8 becomes U+FFFD.
+std::string escaped(std::string_view text);
+
+// The two figures, drawn by gnuplot.
+
+/// Another program as a function: text in, text out. No shell.
+struct Program {
+  std::string name;     ///< looked up in PATH
+  std::string package;  ///< of Debian, for the message where it is missing
+};
+
+/// Its standard output, with `input` as its standard input. Throws ConfigError if it is not
+/// installed; std::runtime_error, with the last line of its standard error, if it fails or does not
+/// end in time (it is ended then).
+std::string run_program(const Program& program, const std::vector<std::string>& arguments,
+                        std::string_view input, std::chrono::seconds patience);
+
+struct PlotSize {
+  int width = 0, height = 0;  ///< px of CSS, 96 an inch
+};
+
+/// SVG, without an XML declaration. Reads: predicted against reference, one panel an axis. Throw
+/// ConfigError if gnuplot is not installed, std::runtime_error if it fails.
+std::string scatter_svg(const study::Analysis& analysis, PlotSize size);
+
+/// The same over time: reference black, ours red.
+std::string traces_svg(const study::Analysis& analysis, PlotSize size);
+
+// The three files.
+
+struct RenderedCertificate {
+  std::string html, pdf, json;
+  int pages = 0;  ///< of the PDF; more than one only where even the smallest figures do not fit
+};
+
+/// Figures shrink and remarks are cut until the PDF is one page of A4. Throws ConfigError if
+/// gnuplot or weasyprint is not installed, std::runtime_error if one fails.
+RenderedCertificate render_certificate(const Certificate& certificate);
+
+struct NamedText {
+  std::filesystem::path path;
+  std::string_view text;
+};
+
+/// Writes temporaries beside all of them, then gives them their names. What had a name before is
+/// replaced if `replace`, and stays as it was if any of the files cannot be written. Throws
+/// std::runtime_error, also where a file is in the way and not to be replaced.
+void write_together(const std::vector<NamedText>& files, bool replace);
 
 }  // namespace tagwrench

@@ -1,16 +1,62 @@
-#include "host/calibration/certificate/html.h"
-
+// What a certificate says, as the page and as JSON, and how people read its numbers.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
-#include "host/calibration/analysis/analysis_warnings.h"
 #include "host/calibration/certificate/certificate.h"
-#include "host/core/axis_names.h"
+#include "host/core/json/json_text.h"
+#include "host/core/parse.h"
 
 namespace tagwrench {
 namespace {
+
+constexpr double kAlike = 0.05;
+constexpr double kMinPercent = 0.01;
+constexpr const char* kSpace = "\u00a0";  // does not break
+
+struct Prefix {
+  double factor;
+  const char* text;
+};
+
+Prefix prefix_for(double value) {
+  const double size = std::abs(value);
+  if (size >= 0.9995 || size == 0) return {1, ""};
+  if (size >= 0.9995e-3) return {1e3, "m"};
+  if (size >= 0.9995e-6) return {1e6, "µ"};
+  return {1e9, "n"};
+}
+
+const char* unit(int axis) { return axis < 3 ? "N" : "N\u00a0m"; }
+
+/// A typographic minus.
+std::string with_minus(std::string text) {
+  if (!text.empty() && text[0] == '-') text.replace(0, 1, "−");
+  return text;
+}
+
+/// The power of ten of the first of so many significant digits, after rounding.
+int decade_of(double value, int digits) {
+  const std::string text = fmt::format("{:.{}e}", value, digits - 1);
+  return std::stoi(text.substr(text.find('e') + 1));
+}
+
+/// No minus before a zero.
+std::string fixed(double value, int decimals) {
+  const std::string text = fmt::format("{:.{}f}", value, decimals);
+  return text.find_first_of("123456789") == std::string::npos && text[0] == '-' ? text.substr(1)
+                                                                                : with_minus(text);
+}
+
+/// In decimal notation where that is short.
+std::string rounded(double value, int digits) {
+  if (value == 0) return "0";
+  const int decade = decade_of(value, digits);
+  if (decade < -3 || decade > 4) return fmt::format("{:.{}e}", value, digits - 1);
+  return fmt::format("{:.{}f}", value, std::max(0, digits - 1 - decade));
+}
 
 using study::Analysis;
 using study::AxisReport;
@@ -74,43 +120,18 @@ constexpr std::size_t kMaxData = 4;
 constexpr double kMaxExcitation = 1000;
 constexpr std::size_t kMaxName = 28;
 
-/// Bytes of the UTF-8 sequence that begins at `i`, 0 if there is none (RFC 3629).
-std::size_t sequence_length(std::string_view text, std::size_t i) {
-  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
-  const unsigned char first = byte(i);
-  if (first < 0x80) return 1;
-  const std::size_t length = first >= 0xc2 && first < 0xe0   ? 2
-                             : first >= 0xe0 && first < 0xf0 ? 3
-                             : first >= 0xf0 && first < 0xf5 ? 4
-                                                             : 0;
-  if (length == 0 || i + length > text.size()) return 0;
-  for (std::size_t k = 1; k < length; ++k) {
-    if ((byte(i + k) & 0xc0) != 0x80) return 0;
-  }
-  const unsigned char second = byte(i + 1);
-  if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second >= 0xa0) ||
-      (first == 0xf0 && second < 0x90) || (first == 0xf4 && second >= 0x90)) {
-    return 0;
-  }
-  return length;
-}
-
 /// At most `most` characters, the end replaced by an ellipsis.
 std::string shortened(std::string_view text, std::size_t most) {
   std::size_t characters = 0;
   for (std::size_t i = 0; i < text.size(); ++characters) {
     if (characters + 1 == most) return std::string(text.substr(0, i)) + "…";
-    i += std::max<std::size_t>(1, sequence_length(text, i));
+    i += std::max<std::size_t>(1, utf8_length(text.substr(i)));
   }
   return std::string(text);
 }
 
 std::string cell(const std::string& text, const char* attributes = "") {
   return fmt::format("<td{}>{}</td>", attributes, text);
-}
-
-std::string optional_load(const std::optional<double>& value, int axis) {
-  return value ? load_text(*value, axis) : "–";
 }
 
 std::string header(const Certificate& c) {
@@ -130,33 +151,36 @@ std::string fact_list(const char* title, const std::vector<Fact>& facts, const P
   return text + "</table></section>";
 }
 
-/// Masses have next to no noise.
-std::string excitation_text(double value) {
-  if (!(value > 0)) return "–";
-  return value < kMaxExcitation ? number_text(value) : ">1000";
-}
-
 std::string axis_row(const AxisReport& r, int axis, const PageRoom& room) {
-  const char* name = kWrenchAxes[static_cast<std::size_t>(axis)];
-  std::string row = fmt::format("<tr><th>{}</th>", name);
+  std::string row = fmt::format("<tr><th>{}</th>", kWrenchAxes[axis]);
   if (!r.calibrated) {
     return row +
            fmt::format("<td colspan=\"13\" class=\"no\"><b>Not calibrated.</b> {}</td></tr>\n",
                        escaped(shortened(r.reason, room.warning_length)));
   }
   row += cell(range_text(r.range_low, r.range_high, axis));
-  row += cell(std::isfinite(r.r2) ? fmt::format("{:.5f}", r.r2) : "–", " class=\"first\"");
-  row += cell(load_text(r.rmse, axis)) + cell(percent_text(r.rmse_percent));
-  row += cell(r.coverage ? fmt::format("{:.0f}\u00a0%", 100 * *r.coverage) : "–");
-  row += cell(percent_text(r.nonlinearity_percent), " class=\"first\"");
-  row += cell(percent_text(r.hysteresis_percent));
-  row += cell(r.creep_percent ? percent_text(*r.creep_percent) : "–");
-  row += cell(optional_load(r.noise, axis), " class=\"first\"");
-  row += cell(optional_load(r.noise_density, axis));
-  row += cell(optional_load(r.resolution, axis));
-  row += cell(optional_load(r.drift_per_hour, axis));
-  row += cell(excitation_text(r.excitation), " class=\"first\"");
+  const auto add_group = [&row](std::initializer_list<std::string> texts) {
+    for (const std::string& text : texts)
+      row += cell(text, &text == texts.begin() ? " class=\"first\"" : "");
+  };
+  add_group({std::isfinite(r.r2) ? fmt::format("{:.5f}", r.r2) : "–", load_text(r.rmse, axis),
+             percent_text(r.rmse_percent),
+             std::isfinite(r.coverage) ? fmt::format("{:.0f}\u00a0%", 100 * r.coverage) : "–"});
+  add_group({percent_text(r.nonlinearity_percent), percent_text(r.hysteresis_percent),
+             percent_text(r.creep_percent)});
+  add_group({load_text(r.noise, axis), load_text(r.noise_density, axis),
+             load_text(r.resolution, axis), load_text(r.drift_per_hour, axis)});
+  // Masses have next to no noise.
+  add_group({!(r.excitation > 0)             ? "–"
+             : r.excitation < kMaxExcitation ? number_text(r.excitation)
+                                             : ">1000"});
   return row + "</tr>\n";
+}
+
+nlohmann::ordered_json facts_json(const std::vector<Fact>& facts) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::object();
+  for (const Fact& fact : facts) out[fact.name] = fact.value;
+  return out;
 }
 
 /// Widths in percent.
@@ -189,15 +213,8 @@ std::string axes(const Analysis& a, const PageRoom& room) {
       "</th><th>creep</th><th class=\"first\">noise</th><th>density<br>per "
       "√Hz</th><th>resolu-<br>tion</th>"
       "<th>drift/h</th><th class=\"first\">excita-<br>tion</th></tr></thead><tbody>\n";
-  for (int axis = 0; axis < 6; ++axis)
-    text += axis_row(a.axis[static_cast<std::size_t>(axis)], axis, room);
+  for (int axis = 0; axis < 6; ++axis) text += axis_row(a.axis[axis], axis, room);
   return text + "</tbody></table>\n" + axes_note(a);
-}
-
-/// % with two decimals, and no minus before a zero.
-std::string cross_text(double value) {
-  const std::string text = fmt::format("{:.2f}", value);
-  return text == "-0.00" ? "0.00" : text[0] == '-' ? "−" + text.substr(1) : text;
 }
 
 std::string cross_talk(const Analysis& a) {
@@ -205,17 +222,15 @@ std::string cross_talk(const Analysis& a) {
   for (const char* name : kWrenchAxes) text += fmt::format("<th>{}</th>", name);
   text += "</tr>";
   for (int row = 0; row < 6; ++row) {
-    const auto index = static_cast<std::size_t>(row);
-    text += fmt::format("<tr><th>{}</th>", kWrenchAxes[index]);
+    text += fmt::format("<tr><th>{}</th>", kWrenchAxes[row]);
     for (int column = 0; column < 6; ++column) {
       const double value = a.cross_talk(row, column);
-      const bool known = a.axis[index].calibrated &&
-                         a.axis[static_cast<std::size_t>(column)].calibrated &&
-                         std::isfinite(value);
+      const bool known =
+          a.axis[row].calibrated && a.axis[column].calibrated && std::isfinite(value);
       const bool large = known && std::abs(value) >= kCrossTalkOfNote;
-      text += cell(known ? cross_text(value) : "–", row == column ? " class=\"self\""
-                                                    : large       ? " class=\"large\""
-                                                                  : "");
+      text += cell(known ? fixed(value, 2) : "–", row == column ? " class=\"self\""
+                                                  : large       ? " class=\"large\""
+                                                                : "");
     }
     text += "</tr>";
   }
@@ -234,15 +249,12 @@ std::string lag_of(const study::Lag& lag) {
 
 std::vector<Fact> conditions(const Analysis& a) {
   const bool moving = a.reference_rate > 0;
-  std::vector<Fact> facts;
-  facts.push_back({"Readings", fmt::format("{} in {} s, {} Hz", a.readings, number_text(a.seconds),
-                                           number_text(a.reading_rate))});
-  if (moving) {
-    facts.push_back({"Reference", fmt::format("{} readings, {} Hz", a.references,
-                                              number_text(a.reference_rate))});
-  } else {
-    facts.push_back({"Reference", "loads that hung still, without lag"});
-  }
+  std::vector<Fact> facts{
+      {"Readings", fmt::format("{} in {} s, {} Hz", a.readings, number_text(a.seconds),
+                               number_text(a.reading_rate))},
+      {"Reference",
+       moving ? fmt::format("{} readings, {} Hz", a.references, number_text(a.reference_rate))
+              : "loads that hung still, without lag"}};
   if (moving) facts.push_back({"Lag", lag_of(a.lag)});
   if (!a.validation.empty()) facts.push_back({"Held out", a.validation});
   facts.push_back({"Conditioning", number_text(a.condition)});
@@ -264,26 +276,17 @@ std::string data(const Certificate& c) {
   return text + "</table></section>";
 }
 
-/// Whether the table of axes says it already.
-bool in_the_table(const Analysis& a, const std::string& warning) {
-  const std::vector<std::string> said = study::excitation_warnings(a);
-  return std::find(said.begin(), said.end(), warning) != said.end();
-}
-
 std::string remarks(const Analysis& a, const PageRoom& room) {
+  const std::vector<std::string> in_the_table = study::excitation_warnings(a);
   std::string items;
-  std::size_t more = 0;
-  std::size_t shown = 0;
+  std::size_t count = 0;
   for (const std::string& warning : a.warnings) {
-    if (in_the_table(a, warning)) continue;
-    if (shown == room.warnings) {
-      ++more;
-    } else {
-      ++shown;
+    if (std::ranges::find(in_the_table, warning) != in_the_table.end()) continue;
+    if (++count <= room.warnings)
       items += fmt::format("<li>{}</li>", escaped(shortened(warning, room.warning_length)));
-    }
   }
-  if (more > 0) items += fmt::format("<li><b>{} more, in the JSON.</b></li>", more);
+  if (count > room.warnings)
+    items += fmt::format("<li><b>{} more, in the JSON.</b></li>", count - room.warnings);
   if (items.empty()) return "<section><h2>Remarks: None.</h2></section>";
   return "<section><h2>Remarks</h2><ul>" + items + "</ul></section>";
 }
@@ -298,10 +301,38 @@ constexpr const char* kDefinitions =
 
 }  // namespace
 
+std::string number_text(double value) {
+  return std::isfinite(value) ? with_minus(rounded(value, 3)) : "–";
+}
+
+std::string percent_text(double value) {
+  if (std::abs(value) < kMinPercent) return "<0.01\u00a0%";
+  return std::isfinite(value) ? with_minus(rounded(value, 2)) + kSpace + "%" : "–";
+}
+
+std::string load_text(double value, int axis) {
+  if (!std::isfinite(value)) return "–";
+  const Prefix prefix = prefix_for(value);
+  return fmt::format("{}{}{}{}", number_text(value * prefix.factor), kSpace, prefix.text,
+                     unit(axis));
+}
+
+std::string range_text(double low, double high, int axis) {
+  const double largest = std::max(std::abs(low), std::abs(high));
+  if (!std::isfinite(largest)) return "–";
+  const Prefix prefix = prefix_for(largest);
+  if (low < 0 && high > 0 && std::abs(low + high) < kAlike * largest)
+    return fmt::format("±{}{}{}{}", number_text(std::min(-low, high) * prefix.factor), kSpace,
+                       prefix.text, unit(axis));
+  const int decimals = std::max(0, 2 - decade_of(largest * prefix.factor, 3));
+  return fmt::format("{}{}to{}{}{}{}{}", fixed(low * prefix.factor, decimals), kSpace, kSpace,
+                     fixed(high * prefix.factor, decimals), kSpace, prefix.text, unit(axis));
+}
+
 std::string escaped(std::string_view text) {
   std::string out;
   for (std::size_t i = 0; i < text.size();) {
-    const std::size_t length = sequence_length(text, i);
+    const std::size_t length = utf8_length(text.substr(i));
     const char c = text[i];
     if (length == 0) {
       out += "\uFFFD";
@@ -353,6 +384,21 @@ std::string certificate_html(const Certificate& c, const std::string& scatter,
       "</body></html>\n",
       kDefinitions);
   return page;
+}
+
+std::string certificate_json(const Certificate& c) {
+  nlohmann::ordered_json out{{"format", "tagwrench-certificate-1"},
+                             {"number", c.number},
+                             {"issued", c.issued},
+                             {"software", c.software}};
+  out["sensor"] = facts_json(c.sensor);
+  out["calibration"] = facts_json(c.procedure);
+  out["data"] = nlohmann::ordered_json::array();
+  for (const CertificateData& d : c.data)
+    out["data"].push_back({{"file", d.name}, {"sha256", d.sha256}, {"bytes", d.bytes}});
+  out["analysis"] = parse_ordered_json(study::analysis_json(c.analysis, false));
+  // Texts of files may hold anything; what is no UTF-8 is replaced.
+  return dump_json(out, 1) + "\n";
 }
 
 }  // namespace tagwrench

@@ -1,7 +1,6 @@
 // Room calibration/check: whether a sensor in use still measures what it did.
 // In:  means over seconds: tags (m, rad), light (grey levels), blur (px^2), loads (N).
 // Out: findings: fine or off, by how much, and what to do again.
-// Then: reference_monitor.h (a load cell that is there for good), focus_guide.h (turning the lens).
 //
 // Whether a calibrated sensor is still the one that was calibrated: numbers from a few seconds with
 // hands off, and from a known load, in; what is wrong, out.
@@ -11,7 +10,6 @@
 #include <optional>
 #include <vector>
 
-#include "host/calibration/check/reference_monitor.h"
 #include "host/core/types.h"
 
 namespace tagwrench {
@@ -87,28 +85,95 @@ struct InSituFinding {
   bool fine() const { return fault == Fault::none; }
 };
 
-struct InSituLimits {
-  double sigmas = 3;
-  double slip = 5e-6;        ///< m; what light and print do to a tag that has not moved
-  double slip_angle = 2e-3;  ///< rad
-  double blur_px2 = 0.15;    ///< either way
-  double residual_fraction = 0.05;
-  double darkest = 50;      ///< white, counts
-  double dimmed = 0.5;      ///< white over that at rest
-  double clipped = 0.05;    ///< more of the tags than at rest
-  double zero = 0.02;       ///< of the range
-  double elsewhere = 0.10;  ///< of the range
-  double scale = 0.02;
-  double off_line = 0.05;  ///< of the range
-};
-
 /// One for each subject but scale, in their order.
-std::vector<InSituFinding> judge(const AtRest& rest, const InSituLimits& limits = {});
+std::vector<InSituFinding> judge(const AtRest& rest);
 
 /// Measured over known, by least squares over the six axes, each as well as it is known.
-InSituFinding judge(const ProofLoad& load, const InSituLimits& limits = {});
+InSituFinding judge(const ProofLoad& load);
 
-/// The same by a load cell through which somebody has pushed.
-InSituFinding judge(const ReferenceMonitor& monitor, const InSituLimits& limits = {});
+// A sensor beside a load cell that stays on it for good: scale and zero, compared all the time.
+
+enum class ReferenceFault : std::uint8_t { none, scale, zero };
+
+/// A straight line through what the sensor measured along the cell's line of action, over what the
+/// cell felt: its slope is the scale, its value at no force the zero. Weighted least squares that
+/// forgets exponentially, with Huber's weights against what does not belong. Pure; no heap.
+class ReferenceMonitor {
+ public:
+  /// `wrench`: as measured; `line`: the wrench of 1 N along the line, in the same frame; `range`:
+  /// of the axes, 0 where it is not known; `force`: what the cell felt at that time, N. A fault is
+  /// returned once for each cause.
+  ReferenceFault add(TimePoint time, const Vector6& wrench, const Vector6& line,
+                     const Vector6& range, double force) noexcept;
+
+  double scale() const noexcept { return slope_; }              ///< measured over known
+  double scale_sigma() const noexcept { return slope_sigma_; }  ///< infinite: not known yet
+  double zero() const noexcept { return zero_; }                ///< N, along the line
+  double zero_sigma() const noexcept { return zero_sigma_; }
+  /// Force that the range allows along the line, N.
+  double range() const noexcept { return range_; }
+
+ private:
+  struct Suspicion {
+    double lasted = 0;  ///< s
+    bool told = false;
+  };
+  void take(double weight, double force, double measured) noexcept;
+  void fit() noexcept;
+  bool confirmed(Suspicion& suspicion, bool now, double dt) const noexcept;
+
+  bool started_ = false;
+  TimePoint last_{};
+  double range_ = 0;
+  double weight_ = 0, independent_ = 0;
+  // Of force and measured.
+  Eigen::Vector2d mean_ = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d scatter_ = Eigen::Matrix2d::Zero();  ///< about the means
+  double slope_ = 0, slope_sigma_ = 1e300;
+  double zero_ = 0, zero_sigma_ = 1e300;
+  double residual_ = 0;  ///< standard deviation, N
+  Suspicion scale_fault_, zero_fault_;
+};
+
+/// The scale by a load cell through which somebody has pushed.
+InSituFinding judge(const ReferenceMonitor& monitor);
+
+// From the width of edges, frame by frame while somebody turns a lens, to what to do next.
+
+enum class FocusTurn : std::uint8_t {
+  begin,     ///< nothing to compare with yet
+  sharper,   ///< go on
+  blurrier,  ///< turn back
+  away,      ///< nobody turns, and it was sharper before
+  try_on,    ///< nobody turns, the best so far, but it may get better still
+  best,      ///< nobody turns, and either way it is worse
+};
+
+/// All widths are standard deviations, px.
+class FocusGuide {
+ public:
+  /// `tags` says which tags the width is of, one bit each: when others come into view, what was
+  /// before does not compare.
+  void add(TimePoint time, double width_px, unsigned tags);
+
+  FocusTurn turn() const { return turn_; }
+  double now_px() const { return now_px_; }
+  double best_px() const { return best_px_; }  ///< held for two frames at least
+  /// Growth of the noise over that at the best, 0: none. It goes with the root of the blur, the
+  /// pixel's own width included (study/design.h).
+  double more_noise() const;
+
+ private:
+  struct Seen {
+    TimePoint time;
+    double width_px;
+  };
+  std::vector<Seen> seen_;  ///< of the last second
+  unsigned tags_ = 0;
+  double now_px_ = 0, best_px_ = 0;
+  double dip_px_ = 0;                                ///< the best when it last got clearly better
+  double worst_before_px_ = 0, worst_since_px_ = 0;  ///< that
+  FocusTurn turn_ = FocusTurn::begin;
+};
 
 }  // namespace tagwrench

@@ -1,16 +1,18 @@
 // Room calibration/light: exposure, LED and gain, once, before a run.
 // In:  what a picture shows of the tags' white, grey levels 0..255; what can be set.
 // Out: exposure (us), LED (permille), gain to set next, until white is at 190 and nothing clips.
-// Then: reading.h (white of a picture), settle.h (the loop).
 //
 // How bright: exposure, LED and gain such that the white of the tags has a set level. Pure: it is
 // told what a picture showed, and says what to set next.
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include "host/core/os/unique_fd.h"
 #include "host/core/types.h"
+#include "host/source/frame_source.h"
 #include "host/tracker/acquire.h"
 
 namespace tagwrench {
@@ -82,5 +84,38 @@ class LightControl {
 /// picture exceeds, and nothing counts as clipped that is darker. `mirrored`: corners are of the
 /// picture flipped left to right, as Acquirer::find() gives them for such a camera.
 LightReading read_light(const ImageView& image, bool mirrored, const std::vector<FoundTag>& tags);
+
+// Exposure, LED and gain set once, before anything is learned from the pictures; they stay fixed
+// from then on.
+
+/// The LED, as far as settling needs it.
+class Lamp {
+ public:
+  virtual ~Lamp() = default;
+
+  /// Mean level, 0 to 1000, from now on.
+  virtual void set_level(double permille) noexcept = 0;
+  /// What the LED may have for ever.
+  virtual LightRange range_permille() const noexcept = 0;
+  /// Readable when service() has something to do.
+  virtual int poll_fd() const noexcept = 0;
+  virtual void service() noexcept = 0;
+};
+
+struct LightReport {
+  LightControl::State state = LightControl::State::settling;  ///< settling: it never became steady
+  LightSetting setting;
+  double white_counts = 0;      ///< of the tags, with this setting
+  double ambient_fraction = 0;  ///< of that light, that is there when the LED is off, 0..1
+  int tags_found = 0;
+  bool stopped = false;  ///< by a signal, or the source ended
+};
+
+/// Sets the light, then looks once without the LED. Takes some dozens of frames.
+LightReport settle_light(FrameSource& source, Acquirer& finder, bool mirrored, Lamp& lamp,
+                         const UniqueFd& stop);
+
+/// For people: what was set, and what to do if that is not good.
+std::string light_text(const LightReport& report);
 
 }  // namespace tagwrench

@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <optional>
-#include <vector>
 
 #include "host/core/config_error.h"
+#include "host/core/parse.h"
 
 namespace tagwrench {
 namespace {
@@ -24,34 +23,13 @@ constexpr const char* kForm =
   throw ConfigError(fmt::format("board '{}': {}", text, why));
 }
 
-std::vector<std::string_view> split(std::string_view text, char at) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const std::size_t end = text.find(at);
-    parts.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
-std::optional<int> whole_number(std::string_view text) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 /// "1.2mm" in metres.
 std::optional<double> length(std::string_view text) {
   if (!text.ends_with("mm")) return std::nullopt;
   text.remove_suffix(2);
-  double value_mm = 0;
-  const auto [end, error] =
-      std::from_chars(text.data(), text.data() + text.size(), value_mm, std::chars_format::fixed);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value_mm)) {
-    return std::nullopt;
-  }
-  return 1e-3 * value_mm;
+  const auto value_mm = parse_whole<double>(text, std::chars_format::fixed);
+  if (!value_mm || !std::isfinite(*value_mm)) return std::nullopt;
+  return 1e-3 * *value_mm;
 }
 
 }  // namespace
@@ -95,8 +73,8 @@ BoardSpec parse_board(std::string_view text) {
     refuse(text, kForm);
   }
   const std::vector<std::string_view> squares = split(parts[1], 'x');
-  const std::optional<int> columns = whole_number(squares[0]);
-  const std::optional<int> rows = squares.size() == 2 ? whole_number(squares[1]) : std::nullopt;
+  const std::optional<int> columns = parse_whole<int>(squares[0]);
+  const std::optional<int> rows = squares.size() == 2 ? parse_whole<int>(squares[1]) : std::nullopt;
   if (!columns || !rows) refuse(text, fmt::format("'{}' is no COLUMNSxROWS; {}", parts[1], kForm));
   board.columns = *columns;
   board.rows = *rows;

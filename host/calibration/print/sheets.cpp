@@ -1,15 +1,22 @@
 #include "host/calibration/print/sheets.h"
 
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <memory>
+#include <numbers>
+#include <stdexcept>
 
 #include "host/core/config_error.h"
-#include "host/tracker/tag_patterns.h"
+#include "host/core/os/atomic_file.h"
+#include "host/tracker/target.h"
 
 namespace tagwrench {
 namespace {
@@ -31,6 +38,25 @@ constexpr double kMark_mm = 1.2;
 constexpr double kMarkLine_mm = 0.1;
 constexpr double kGap_mm = 0.8;  // between rooms of neighbours
 constexpr double kTriangle_mm = 1.0;
+constexpr double kScaleBar_mm = 50.0;
+constexpr double kLetterWidth = 0.61;  // of a typewriter face, of its height
+
+/// Where items may lie.
+struct Rectangle {
+  double left_mm = 0;
+  double top_mm = 0;
+  double right_mm = 0;
+  double bottom_mm = 0;
+};
+
+/// Something to cut out, and what is written under it.
+struct Item {
+  double size_x_mm = 0;  ///< of the printed black, without its white margin
+  double size_y_mm = 0;
+  double margin_mm = 0;  ///< white, to be cut out with it
+  bool mark_up = false;  ///< a small triangle above says which way is up
+  std::vector<std::string> labels;
+};
 
 Area rectangle(double x0, double y0, double x1, double y1) {
   return {{{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}};
@@ -55,68 +81,52 @@ void scale_bar(Drawing& drawing, PagePoint start, bool standing) {
   }
 }
 
-}  // namespace
-
+/// Room for items on this paper.
 Rectangle content(const Paper& paper) {
   return {kPaperMargin_mm + kSide_mm, kPaperMargin_mm + kHeader_mm,
           paper.width_mm - kPaperMargin_mm, paper.height_mm - kPaperMargin_mm - kFooter_mm};
 }
 
+/// The same sheet, lying.
 Paper turned(const Paper& paper) { return {paper.name, paper.height_mm, paper.width_mm}; }
 
+/// A page with title, notes and both scale bars.
 Drawing start_page(const Paper& paper, const std::string& title,
                    const std::vector<std::string>& notes) {
-  Drawing drawing;
-  drawing.width_mm = paper.width_mm;
-  drawing.height_mm = paper.height_mm;
+  Drawing drawing{paper.width_mm, paper.height_mm, {}, {}, {}};
+  const auto write = [&](double x, double y, double height, const std::string& text,
+                         bool upward = false) {
+    drawing.texts.push_back({{x, y}, height, TextAnchor::left, upward, text});
+  };
   const double left = content(paper).left_mm;
-  double y = kPaperMargin_mm + kTitle_mm;
-  drawing.texts.push_back({{left, y}, kTitle_mm, TextAnchor::left, false, title});
-  y += 0.3 * kTitle_mm;
-  for (const std::string& note : notes) {
-    y += 1.25 * kNote_mm;
-    drawing.texts.push_back({{left, y}, kNote_mm, TextAnchor::left, false, note});
-  }
-  const double bottom = paper.height_mm - kPaperMargin_mm - 0.5 * kTick_mm;
-  // Of named strings: GCC 12 takes moved temporaries of this length for an overrun
-  // (-Warray-bounds).
-  const std::string lying = "must measure 50.0 mm, like the standing bar";
-  const std::string standing = "must measure 50.0 mm";
-  scale_bar(drawing, {left, bottom}, false);
-  drawing.texts.push_back({{left + kScaleBar_mm + 3, bottom + 0.35 * kNote_mm},
-                           kNote_mm,
-                           TextAnchor::left,
-                           false,
-                           lying});
-  const double side = kPaperMargin_mm + 0.5 * kTick_mm;
   const double top = content(paper).top_mm;
+  double y = kPaperMargin_mm + kTitle_mm;
+  write(left, y, kTitle_mm, title);
+  y += 0.3 * kTitle_mm;
+  for (const std::string& note : notes) write(left, y += 1.25 * kNote_mm, kNote_mm, note);
+  const double bottom = paper.height_mm - kPaperMargin_mm - 0.5 * kTick_mm;
+  scale_bar(drawing, {left, bottom}, false);
+  write(left + kScaleBar_mm + 3, bottom + 0.35 * kNote_mm, kNote_mm,
+        "must measure 50.0 mm, like the standing bar");
+  const double side = kPaperMargin_mm + 0.5 * kTick_mm;
   scale_bar(drawing, {side, top}, true);
-  drawing.texts.push_back({{side + 0.5 * kTick_mm + kNote_mm, top + kScaleBar_mm},
-                           kNote_mm,
-                           TextAnchor::left,
-                           true,
-                           standing});
+  write(side + 0.5 * kTick_mm + kNote_mm, top + kScaleBar_mm, kNote_mm, "must measure 50.0 mm",
+        true);
   return drawing;
 }
 
-namespace {
-
-double text_width_mm(const std::string& text) {
-  return kLetterWidth * kLabel_mm * static_cast<double>(text.size());
-}
-
-}  // namespace
-
+/// The room that an item takes with cut marks and labels.
 PagePoint extent(const Item& item) {
   const double marks = 2 * (item.margin_mm + kMarkGap_mm + kMark_mm);
   double width = item.size_x_mm + marks;
   for (const std::string& label : item.labels)
-    width = std::max(width, text_width_mm(label) + kGap_mm);
-  const double height =
-      item.size_y_mm + marks + 1.2 * kLabel_mm * static_cast<double>(item.labels.size());
+    width = std::max(width, kLetterWidth * kLabel_mm * label.size() + kGap_mm);
+  const double height = item.size_y_mm + marks + 1.2 * kLabel_mm * item.labels.size();
   return {width + kGap_mm, height + kGap_mm};
 }
 
+/// Draws cut marks, labels and the triangle of an item whose room starts at `corner`. Returns the
+/// top left corner of its black.
 PagePoint frame_item(Drawing& drawing, const Item& item, PagePoint corner) {
   const double half_x = 0.5 * item.size_x_mm + item.margin_mm;
   const double half_y = 0.5 * item.size_y_mm + item.margin_mm;
@@ -147,77 +157,9 @@ PagePoint frame_item(Drawing& drawing, const Item& item, PagePoint corner) {
   return {centre.x_mm - 0.5 * item.size_x_mm, centre.y_mm - 0.5 * item.size_y_mm};
 }
 
-namespace {
-
 /// Directions clockwise from the right, y down.
 constexpr std::array<int, 4> kStepX = {1, 0, -1, 0};
 constexpr std::array<int, 4> kStepY = {0, 1, 0, -1};
-
-// Sides of black cells that face white, as steps between grid points with the black on their right
-// hand.
-class Sides {
- public:
-  explicit Sides(const CellGrid& grid)
-      : columns_(grid.columns + 1),
-        rows_(grid.rows + 1),
-        leaves_(static_cast<std::size_t>(columns_ * rows_)) {
-    for (int row = 0; row < grid.rows; ++row) {
-      for (int column = 0; column < grid.columns; ++column) {
-        if (!grid.is_black(column, row)) continue;
-        if (!grid.is_black(column, row - 1)) at(column, row)[0] = true;
-        if (!grid.is_black(column + 1, row)) at(column + 1, row)[1] = true;
-        if (!grid.is_black(column, row + 1)) at(column + 1, row + 1)[2] = true;
-        if (!grid.is_black(column - 1, row)) at(column, row + 1)[3] = true;
-      }
-    }
-  }
-
-  std::array<bool, 4>& at(int x, int y) {
-    return leaves_[static_cast<std::size_t>(y * columns_ + x)];
-  }
-  int columns() const { return columns_; }
-  int rows() const { return rows_; }
-
- private:
-  int columns_, rows_;
-  std::vector<std::array<bool, 4>> leaves_;  // per grid point and direction
-};
-
-}  // namespace
-
-Area outline(const CellGrid& grid, PagePoint corner, double cell_mm) {
-  Sides sides(grid);
-  Area area;
-  // Every contour has steps to the right; the first in reading order leaves one of its corners.
-  for (int start_y = 0; start_y < sides.rows(); ++start_y) {
-    for (int start_x = 0; start_x < sides.columns(); ++start_x) {
-      while (sides.at(start_x, start_y)[0]) {
-        std::vector<PagePoint> contour;
-        int x = start_x, y = start_y;
-        std::size_t way = 0;
-        bool turned = true;
-        do {
-          if (turned) contour.push_back({corner.x_mm + x * cell_mm, corner.y_mm + y * cell_mm});
-          sides.at(x, y)[way] = false;
-          x += kStepX[way];
-          y += kStepY[way];
-          // Where two black cells touch by their corners the right turn keeps them apart.
-          const std::size_t before = way;
-          for (const std::size_t turn : {1, 0, 3}) {
-            if (!sides.at(x, y)[(before + turn) % 4]) continue;
-            way = (before + turn) % 4;
-            break;
-          }
-          turned = way != before;
-        } while (x != start_x || y != start_y);
-        area.push_back(std::move(contour));
-      }
-    }
-  }
-  return area;
-}
-
-namespace {
 
 const char* const kTrueSize = "Print at 100 %, never fitted to the page, never mirrored.";
 constexpr double kMin_mm = 0.1;
@@ -230,20 +172,14 @@ CellGrid tag_cells(TagFamily family, int id) {
   return grid;
 }
 
-void add(Area& area, const Area& more) { area.insert(area.end(), more.begin(), more.end()); }
-
 void place_tag(Drawing& drawing, const Item& item, PagePoint room, TagFamily family, int id) {
   const CellGrid cells = tag_cells(family, id);
   const PagePoint corner = frame_item(drawing, item, room);
   drawing.areas.push_back(outline(cells, corner, item.size_x_mm / cells.columns));
 }
 
-struct Capacity {
-  int columns = 0;
-  int rows = 0;
-};
-
-Capacity capacity(const Paper& paper, PagePoint room) {
+/// How many items of this room fit, across and down.
+std::array<int, 2> capacity(const Paper& paper, PagePoint room) {
   const Rectangle free = content(paper);
   const auto count = [](double length, double each) {
     return static_cast<int>(std::floor(length / each + 1e-9));
@@ -256,7 +192,7 @@ Capacity capacity(const Paper& paper, PagePoint room) {
 void fill(const Paper& paper, PagePoint room, int count,
           const std::function<void(int, PagePoint)>& place) {
   const Rectangle free = content(paper);
-  const int columns = capacity(paper, room).columns;
+  const int columns = capacity(paper, room)[0];
   for (int i = 0; i < count; ++i) {
     place(i, {free.left_mm + (i % columns) * room.x_mm, free.top_mm + (i / columns) * room.y_mm});
   }
@@ -268,13 +204,13 @@ void check_copies(int copies) {
 
 // Throws unless `count` items of this room fit.
 void check_fit(const Paper& paper, PagePoint room, long count, const std::string& what) {
-  const Capacity most = capacity(paper, room);
-  if (most.columns < 1 || most.rows < 1) {
+  const auto [columns, rows] = capacity(paper, room);
+  if (columns < 1 || rows < 1) {
     throw ConfigError(
         fmt::format("{} does not fit on {}: {:.1f} x {:.1f} mm with its marks; make it smaller",
                     what, paper.name, room.x_mm, room.y_mm));
   }
-  const long places = static_cast<long>(most.columns) * most.rows;
+  const long places = static_cast<long>(columns) * rows;
   if (count > places) {
     throw ConfigError(fmt::format("--copies: {} times {} do not fit on {}, {} do; print fewer",
                                   count, what, paper.name, places));
@@ -296,17 +232,135 @@ Area board_area(const BoardSpec& board, PagePoint corner) {
       squares.black.push_back(black);
       if (black || !charuco) continue;
       const CellGrid cells = tag_cells(board.dictionary, id++);
-      add(area, outline(cells,
-                        {corner.x_mm + column * square_mm + inset_mm,
-                         corner.y_mm + row * square_mm + inset_mm},
-                        1e3 * board.marker / cells.columns));
+      std::ranges::move(outline(cells,
+                                {corner.x_mm + column * square_mm + inset_mm,
+                                 corner.y_mm + row * square_mm + inset_mm},
+                                1e3 * board.marker / cells.columns),
+                        std::back_inserter(area));
     }
   }
-  add(area, outline(squares, corner, square_mm));
+  std::ranges::move(outline(squares, corner, square_mm), std::back_inserter(area));
   return area;
 }
 
+constexpr double kPoint_mm = 25.4 / 72;  // PostScript's, which PDF and cairo count in
+
+using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
+using Context = std::unique_ptr<cairo_t, decltype(&cairo_destroy)>;
+
+cairo_status_t append(void* bytes, const unsigned char* data, unsigned int length) noexcept {
+  try {
+    static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), length);
+    return CAIRO_STATUS_SUCCESS;
+  } catch (...) {
+    return CAIRO_STATUS_NO_MEMORY;
+  }
+}
+
+void fill(cairo_t* context, const Area& area) {
+  for (const std::vector<PagePoint>& contour : area) {
+    cairo_new_sub_path(context);
+    for (const PagePoint& point : contour) cairo_line_to(context, point.x_mm, point.y_mm);
+    cairo_close_path(context);
+  }
+  cairo_fill(context);
+}
+
+void stroke(cairo_t* context, const Line& line) {
+  cairo_set_line_width(context, line.width_mm);
+  cairo_move_to(context, line.from.x_mm, line.from.y_mm);
+  cairo_line_to(context, line.to.x_mm, line.to.y_mm);
+  cairo_stroke(context);
+}
+
+void write(cairo_t* context, const Text& text) {
+  cairo_save(context);
+  cairo_set_font_size(context, text.height_mm);
+  cairo_translate(context, text.at.x_mm, text.at.y_mm);
+  if (text.upward) cairo_rotate(context, -0.5 * std::numbers::pi);
+  cairo_text_extents_t extents;
+  cairo_text_extents(context, text.text.c_str(), &extents);
+  cairo_move_to(context, text.anchor == TextAnchor::centre ? -0.5 * extents.x_advance : 0, 0);
+  cairo_show_text(context, text.text.c_str());
+  cairo_restore(context);
+}
+
+std::string render(const Drawing& drawing, bool pdf) {
+  std::string bytes;
+  const auto create =
+      pdf ? &cairo_pdf_surface_create_for_stream : &cairo_svg_surface_create_for_stream;
+  const Surface surface(
+      create(&append, &bytes, drawing.width_mm / kPoint_mm, drawing.height_mm / kPoint_mm),
+      &cairo_surface_destroy);
+  // Without this a browser takes the numbers for pixels of 1/96 inch.
+  if (!pdf) cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PT);
+  const Context context(cairo_create(surface.get()), &cairo_destroy);
+  cairo_scale(context.get(), 1 / kPoint_mm, 1 / kPoint_mm);
+  cairo_set_source_rgb(context.get(), 0, 0, 0);
+  cairo_set_fill_rule(context.get(), CAIRO_FILL_RULE_EVEN_ODD);
+  cairo_select_font_face(context.get(), "monospace", CAIRO_FONT_SLANT_NORMAL,
+                         CAIRO_FONT_WEIGHT_NORMAL);
+  for (const Area& area : drawing.areas) fill(context.get(), area);
+  for (const Line& line : drawing.lines) stroke(context.get(), line);
+  for (const Text& text : drawing.texts) write(context.get(), text);
+  cairo_show_page(context.get());
+  cairo_surface_finish(surface.get());
+  cairo_status_t status = cairo_status(context.get());
+  if (status == CAIRO_STATUS_SUCCESS) status = cairo_surface_status(surface.get());
+  if (status != CAIRO_STATUS_SUCCESS) {
+    throw std::runtime_error(
+        fmt::format("cairo cannot draw the sheet ({})", cairo_status_to_string(status)));
+  }
+  return bytes;
+}
+
 }  // namespace
+
+Area outline(const CellGrid& grid, PagePoint corner, double cell_mm) {
+  // Sides of black cells that face white, as steps between grid points with the black on their
+  // right hand: per point and direction.
+  std::vector<std::array<bool, 4>> leaves((grid.columns + 1) * (grid.rows + 1));
+  const auto at = [&](int x, int y) -> std::array<bool, 4>& {
+    return leaves[y * (grid.columns + 1) + x];
+  };
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      if (!grid.is_black(column, row)) continue;
+      if (!grid.is_black(column, row - 1)) at(column, row)[0] = true;
+      if (!grid.is_black(column + 1, row)) at(column + 1, row)[1] = true;
+      if (!grid.is_black(column, row + 1)) at(column + 1, row + 1)[2] = true;
+      if (!grid.is_black(column - 1, row)) at(column, row + 1)[3] = true;
+    }
+  }
+  Area area;
+  // Every contour has steps to the right; the first in reading order leaves one of its corners.
+  for (int start_y = 0; start_y <= grid.rows; ++start_y) {
+    for (int start_x = 0; start_x <= grid.columns; ++start_x) {
+      while (at(start_x, start_y)[0]) {
+        std::vector<PagePoint> contour;
+        int x = start_x, y = start_y;
+        std::size_t way = 0;
+        bool turned = true;
+        do {
+          if (turned) contour.push_back({corner.x_mm + x * cell_mm, corner.y_mm + y * cell_mm});
+          at(x, y)[way] = false;
+          x += kStepX[way];
+          y += kStepY[way];
+          // Where two black cells touch by their corners the right turn keeps them apart.
+          const std::size_t before = way;
+          for (const std::size_t turn : {1, 0, 3}) {
+            if (!at(x, y)[(before + turn) % 4]) continue;
+            way = (before + turn) % 4;
+            break;
+          }
+          turned = way != before;
+        } while (x != start_x || y != start_y);
+        area.push_back(std::move(contour));
+      }
+    }
+  }
+  return area;
+}
 
 double cell_mm(const TagSheet& sheet) { return sheet.size_mm / (bits_per_side(sheet.family) + 2); }
 
@@ -353,9 +407,8 @@ Drawing tag_sheet(const Paper& paper, const TagSheet& sheet) {
        fmt::format("The black square must measure {} mm. Cut along the marks; the triangle is up.",
                    sheet.size_mm)});
   fill(paper, room, each * sheet.copies, [&](int i, PagePoint corner) {
-    const int id = sheet.ids[static_cast<std::size_t>(i % each)];
-    Item one = item(id);
-    place_tag(drawing, one, corner, sheet.family, id);
+    const int id = sheet.ids[i % each];
+    place_tag(drawing, item(id), corner, sheet.family, id);
   });
   return drawing;
 }
@@ -373,8 +426,8 @@ Drawing board_sheet(const Paper& paper, const BoardSpec& board, int copies) {
                      {spec}};
   const PagePoint room = extent(item);
   const auto fits = [&room](const Paper& sheet) {
-    const Capacity most = capacity(sheet, room);
-    return most.columns > 0 && most.rows > 0;
+    const auto [columns, rows] = capacity(sheet, room);
+    return columns > 0 && rows > 0;
   };
   const Paper sheet = !fits(paper) && fits(turned(paper)) ? turned(paper) : paper;
   check_fit(sheet, room, copies, "board " + spec);
@@ -418,6 +471,17 @@ Drawing published_sheet(const Paper& paper) {
     y += room.y_mm;
   }
   return drawing;
+}
+
+void write_vector_file(const Drawing& drawing, const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (ending != ".pdf" && ending != ".svg") {
+    throw ConfigError(
+        fmt::format("--out {}: is neither a .pdf nor an .svg; name it so", path.string()));
+  }
+  check_replaceable(path);
+  write_atomically(path, render(drawing, ending == ".pdf"));
 }
 
 }  // namespace tagwrench

@@ -1,24 +1,62 @@
 // Room calibration/print: tags and boards, true to scale.
 // In:  families, ids and sizes, mm.
 // Out: drawings in mm on A4 or letter, as PDF or SVG, with bars of 50.0 mm to measure.
-// Then: board_spec.h (a board in one word), drawing.h, vector_file.h.
+// Then: board_spec.h (a board in one word).
 //
 // What `tagwrench tags` prints: sheets of tags, calibration boards and the published sheet, as
 // drawings.
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "host/calibration/print/board_spec.h"
-#include "host/calibration/print/drawing.h"
 #include "host/tracker/target.h"
 
 namespace tagwrench {
 
-// The paper, what every sheet carries besides its items (title, notes, two scale bars), and the
-// items' places on it.
+// A printed page as plain data. Millimetres from the top left corner of the paper, x right, y down.
+
+struct PagePoint {
+  double x_mm = 0;
+  double y_mm = 0;
+};
+
+/// Closed polygons filled black as one shape, even-odd: what lies inside two of them is white.
+using Area = std::vector<std::vector<PagePoint>>;
+
+struct Line {
+  PagePoint from;
+  PagePoint to;
+  double width_mm = 0.1;
+};
+
+enum class TextAnchor : std::uint8_t { left, centre };
+
+/// One line in a typewriter face.
+struct Text {
+  PagePoint at;          ///< on the baseline
+  double height_mm = 2;  ///< of the type, from line to line
+  TextAnchor anchor = TextAnchor::left;
+  bool upward = false;  ///< runs from bottom to top
+  std::string text;
+};
+
+struct Drawing {
+  double width_mm = 0;
+  double height_mm = 0;
+  std::vector<Area> areas;
+  std::vector<Line> lines;
+  std::vector<Text> texts;
+};
+
+/// Replaces the file as a whole, true to scale. The name's ending, .pdf or .svg, says which. Throws
+/// ConfigError for another ending or a folder that takes no file, std::runtime_error if writing
+/// fails later.
+void write_vector_file(const Drawing& drawing, const std::filesystem::path& path);
 
 struct Paper {
   std::string_view name;
@@ -28,42 +66,6 @@ struct Paper {
 
 constexpr Paper kA4 = {"a4", 210.0, 297.0};
 constexpr Paper kLetter = {"letter", 215.9, 279.4};
-
-constexpr double kScaleBar_mm = 50.0;
-
-/// Where items may lie.
-struct Rectangle {
-  double left_mm = 0;
-  double top_mm = 0;
-  double right_mm = 0;
-  double bottom_mm = 0;
-};
-
-/// Room for items on this paper.
-Rectangle content(const Paper& paper);
-
-/// The same sheet, lying.
-Paper turned(const Paper& paper);
-
-/// A page with title, notes and both scale bars.
-Drawing start_page(const Paper& paper, const std::string& title,
-                   const std::vector<std::string>& notes);
-
-/// Something to cut out, and what is written under it.
-struct Item {
-  double size_x_mm = 0;  ///< of the printed black, without its white margin
-  double size_y_mm = 0;
-  double margin_mm = 0;  ///< white, to be cut out with it
-  bool mark_up = false;  ///< a small triangle above says which way is up
-  std::vector<std::string> labels;
-};
-
-/// The room that an item takes with cut marks and labels.
-PagePoint extent(const Item& item);
-
-/// Draws cut marks, labels and the triangle of an item whose room starts at `corner`. Returns the
-/// top left corner of its black.
-PagePoint frame_item(Drawing& drawing, const Item& item, PagePoint corner);
 
 // Black cells of a grid -> the outline of their union, so that no viewer and no printer can leave
 // a seam between neighbours.

@@ -22,10 +22,10 @@ TEST(AnalysisMetrics, NoiseDensityAndResolutionAreThoseOfTheReadings) {
   for (Eigen::Index i = 0; i < 6; ++i) {
     const study::AxisReport& axis = a.axis[static_cast<std::size_t>(i)];
     const double expected = k.row(i).transpose().cwiseProduct(sigma).norm();
-    ASSERT_TRUE(axis.noise && axis.noise_density && axis.resolution);
-    EXPECT_NEAR(*axis.noise, expected, 0.08 * expected);
-    EXPECT_NEAR(*axis.noise_density, expected * std::sqrt(2 / 50.0), 0.1 * expected);
-    EXPECT_NEAR(*axis.resolution, 2.77 * *axis.noise, 0.01 * *axis.noise);
+    ASSERT_TRUE(std::isfinite(axis.noise));
+    EXPECT_NEAR(axis.noise, expected, 0.08 * expected);
+    EXPECT_NEAR(axis.noise_density, expected * std::sqrt(2 / 50.0), 0.1 * expected);
+    EXPECT_NEAR(axis.resolution, 2.77 * axis.noise, 0.01 * axis.noise);
   }
 }
 
@@ -38,8 +38,8 @@ TEST(AnalysisMetrics, AWeightThatSwingsIsNoNoiseOfTheSensor) {
       swinging.features(i, 0) +=
           3e-6 * std::sin(2 * std::numbers::pi * 1.5 * swinging.time[i]);  // m
   }
-  const double alone = *analyze({still}, {}).axis[0].noise;
-  EXPECT_NEAR(*analyze({swinging}, {}).axis[0].noise, alone, 0.15 * alone);
+  const double alone = analyze({still}, {}).axis[0].noise;
+  EXPECT_NEAR(analyze({swinging}, {}).axis[0].noise, alone, 0.15 * alone);
 }
 
 TEST(AnalysisMetrics, CreepAndDriftAreMeasured) {
@@ -53,11 +53,11 @@ TEST(AnalysisMetrics, CreepAndDriftAreMeasured) {
   }
   const Analysis a = analyze({trial}, {});
   for (std::size_t k = 0; k < 6; ++k) {
-    ASSERT_TRUE(a.axis[k].creep_percent.has_value());
-    EXPECT_NEAR(*a.axis[k].creep_percent, 2, 0.5) << kWrenchAxes[k];
+    ASSERT_TRUE(std::isfinite(a.axis[k].creep_percent));
+    EXPECT_NEAR(a.axis[k].creep_percent, 2, 0.5) << kWrenchAxes[k];
   }
-  ASSERT_TRUE(a.axis[0].drift_per_hour.has_value());
-  EXPECT_NEAR(*a.axis[0].drift_per_hour, 10e-6 * 1120, 3e-3) << "N/h";
+  ASSERT_TRUE(std::isfinite(a.axis[0].drift_per_hour));
+  EXPECT_NEAR(a.axis[0].drift_per_hour, 10e-6 * 1120, 3e-3) << "N/h";
 }
 
 TEST(AnalysisMetrics, HysteresisAndNonLinearityAreMeasured) {

@@ -1,6 +1,4 @@
 // What is wrong with data is said, and what cannot be analyzed is refused by name.
-#include "host/calibration/analysis/analysis_warnings.h"
-
 #include <cmath>
 
 #include "host/calibration/analysis/analysis.h"

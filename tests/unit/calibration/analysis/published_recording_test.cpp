@@ -10,7 +10,7 @@
 #include <string>
 
 #include "host/calibration/analysis/analysis.h"
-#include "host/calibration/analysis/csv_mapping.h"
+#include "host/calibration/analysis/trial_csv.h"
 #include "host/core/axis_names.h"
 
 namespace tagwrench::test {

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <numbers>
 
-#include "host/calibration/analysis/csv_mapping.h"
 #include "host/core/config_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/calibration/analysis/loaded_platform.h"

@@ -13,9 +13,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "host/calibration/certificate/html.h"
-#include "host/calibration/certificate/plots.h"
-#include "host/calibration/certificate/render.h"
 #include "host/core/config_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/calibration/certificate/example.h"
@@ -167,7 +164,7 @@ TEST(CertificateJson, SurvivesNumbersAndTextsThatJsonHasNot) {
   Certificate c = example_certificate();
   c.analysis.axis[0].r2 = std::numeric_limits<double>::quiet_NaN();
   c.analysis.axis[1].noise = std::numeric_limits<double>::infinity();
-  c.analysis.axis[2].noise.reset();
+  c.analysis.axis[2].noise = study::kNaN;
   c.analysis.lag.known = false;
   c.sensor[0].value = "\xff";
   const nlohmann::json json = nlohmann::json::parse(certificate_json(c));

@@ -1,8 +1,8 @@
-#include "host/calibration/check/focus_guide.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "host/calibration/check/in_situ.h"
 
 namespace tagwrench {
 namespace {

@@ -1,10 +1,10 @@
-#include "host/calibration/check/reference_monitor.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "host/calibration/check/in_situ.h"
 
 namespace tagwrench {
 namespace {
@@ -44,7 +44,7 @@ std::vector<ReferenceFault> play(ReferenceMonitor& monitor, const Instrument& se
 using Said = std::vector<ReferenceFault>;
 
 TEST(ReferenceMonitor, SaysNothingWhileAllIsWell) {
-  ReferenceMonitor monitor({});
+  ReferenceMonitor monitor;
   EXPECT_EQ(play(monitor, {}, 0, 600), Said{});
   EXPECT_NEAR(monitor.scale(), 1, 2e-3);
   EXPECT_LT(monitor.scale_sigma(), 3e-3);
@@ -53,40 +53,40 @@ TEST(ReferenceMonitor, SaysNothingWhileAllIsWell) {
 
 TEST(ReferenceMonitor, FindsAScaleErrorOfThreePercentAndSaysItOnce) {
   for (const double scale : {0.97, 1.03, -1.0}) {
-    ReferenceMonitor monitor({});
+    ReferenceMonitor monitor;
     EXPECT_EQ(play(monitor, {.scale = scale}, 0, 300), Said{ReferenceFault::scale});
     EXPECT_NEAR(monitor.scale(), scale, 2e-3);
   }
 }
 
 TEST(ReferenceMonitor, AScaleThatChangesIsFoundWithinAMinute) {
-  ReferenceMonitor monitor({});
+  ReferenceMonitor monitor;
   EXPECT_EQ(play(monitor, {}, 0, 300), Said{});
   EXPECT_EQ(play(monitor, {.scale = 1.05}, 300, 360), Said{ReferenceFault::scale});
 }
 
 TEST(ReferenceMonitor, FindsAZeroThatHasDrifted) {
-  ReferenceMonitor monitor({});
+  ReferenceMonitor monitor;
   EXPECT_EQ(play(monitor, {.zero = 0.08}, 0, 300), Said{ReferenceFault::zero});
   EXPECT_NEAR(monitor.zero(), 0.08, 2e-3);  // N
 }
 
 TEST(ReferenceMonitor, ForcesThatHardlyVaryTellNothingOfTheScale) {
-  ReferenceMonitor monitor({});
+  ReferenceMonitor monitor;
   EXPECT_EQ(play(monitor, {.scale = 0.9, .excitation = 0.02}, 0, 300), Said{});
 }
 
 TEST(ReferenceMonitor, OtherLoadsAreNotComparedAndSpikesNotBelieved) {
-  ReferenceMonitor monitor({});
+  ReferenceMonitor monitor;
   EXPECT_EQ(play(monitor, {.other = 0.5}, 0, 300), Said{});
   EXPECT_NEAR(monitor.scale(), 1, 0.01);
-  ReferenceMonitor spiky({});
+  ReferenceMonitor spiky;
   EXPECT_EQ(play(spiky, {.spikes = 0.02}, 0, 300), Said{});
   EXPECT_NEAR(spiky.scale(), 1, 0.01);
 }
 
 TEST(ReferenceMonitor, WithoutARangeOrWithNumbersThatAreNoneItIsSilent) {
-  ReferenceMonitor monitor({});
+  ReferenceMonitor monitor;
   const Vector6 unknown = Vector6::Constant(1e9);
   for (int i = 0; i < 1000; ++i) {
     EXPECT_EQ(monitor.add(TimePoint(std::chrono::milliseconds(40 * i)), 2 * line(), line(), unknown,

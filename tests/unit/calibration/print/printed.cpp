@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "host/calibration/print/drawing.h"
+#include "host/calibration/print/sheets.h"
 #include "tests/support/temporary_folder.h"
 
 extern char** environ;

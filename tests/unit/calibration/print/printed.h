@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "host/calibration/print/drawing.h"
+#include "host/calibration/print/sheets.h"
 
 namespace tagwrench::test {
 

@@ -3,7 +3,6 @@
 #include <fstream>
 #include <iterator>
 
-#include "host/calibration/print/drawing.h"
 #include "host/calibration/print/sheets.h"
 #include "host/core/config_error.h"
 #include "tests/support/temporary_folder.h"
