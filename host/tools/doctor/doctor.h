@@ -1,10 +1,11 @@
 // Room tools/doctor: what of this machine is ready.
 // In:  device nodes, groups, udev rules, cameras, serial ports, sockets of CAD programs.
 // Out: a line each: ok, not needed, or missing with what to do.
-// Then: access.h (permissions), cad_programs.h (spacenavd and ours), bridges.h (what runs).
 //
 // `tagwrench doctor`: what of this machine is ready, line by line, and what to do about the rest.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <array>
 #include <cstdint>
@@ -52,6 +53,10 @@ class Report {
     static constexpr std::array<std::string_view, 3> kMarks = {"ok", "--", "!!"};
     out_ << kMarks[static_cast<std::size_t>(mark)] << "  " << text << '\n';
   }
+  template <class First, class... Rest>
+  void line(Mark mark, fmt::format_string<First, Rest...> text, First&& first, Rest&&... rest) {
+    line(mark, fmt::format(text, std::forward<First>(first), std::forward<Rest>(rest)...));
+  }
 
  private:
   std::ostream& out_;
@@ -71,17 +76,8 @@ std::string access_advice(const NodeAccess& access);
 /// What is so for `node` and who runs this.
 NodeAccess look_at_access(const std::filesystem::path& node);
 
-/// Where 70-tagwrench.rules is; empty: nowhere.
-std::filesystem::path installed_rule();
-
-void say_rule(Report& report);
-/// True if a virtual device can be made through the node.
-bool say_device_node(Report& report, const std::filesystem::path& node, const char* module,
-                     const char* use);
-
 /// Our devices among those of `folder` (/sys/class/hidraw): by the name that their uevent gives.
 std::vector<std::string> our_hidraw(const std::filesystem::path& folder);
-void say_hidraw(Report& report);
 
 // The sensors that run on this computer, and whether one starts by itself.
 
@@ -90,8 +86,6 @@ std::vector<std::string> running_sensors(const std::filesystem::path& folder);
 
 /// Whether a user of `home` has told systemd to start it at login.
 bool starts_at_login(const std::filesystem::path& home_configuration);
-
-void say_bridges(Report& report);
 
 // Through which socket CAD programs reach the puck, and what is between them.
 
@@ -116,7 +110,6 @@ struct SpnavFacts {
 };
 
 void say_spnav(Report& report, const SpnavFacts& facts);
-SpnavFacts look_at_spnav();
 
 /// A CAD program in a sandbox that hides the socket from it.
 struct SandboxedProgram {
@@ -127,6 +120,5 @@ struct SandboxedProgram {
 /// Those of flatpak (system's and user's folder of installed applications) and snap.
 std::vector<SandboxedProgram> sandboxed_programs(const std::vector<std::filesystem::path>& flatpak,
                                                  const std::filesystem::path& snap);
-void say_sandboxes(Report& report);
 
 }  // namespace tagwrench

@@ -2,21 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <sstream>
 #include <string_view>
 
+#include "host/core/parse.h"
+
 namespace tagwrench {
 namespace {
-
-std::vector<std::string> split(std::string_view text, char separator) {
-  std::vector<std::string> parts;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find(separator), text.size());
-    parts.emplace_back(text.substr(0, end));
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return parts;
-}
 
 /// "sim:SCENARIO.yaml" -> "sim:", "spnav[:PATH]" -> "spnav", "v4l2:/dev/videoN[...]" -> "v4l2:".
 std::string fixed_part(std::string_view word) {
@@ -42,8 +35,7 @@ void add_from_line(std::string_view line, std::vector<std::string>& words) {
   }
 }
 
-}  // namespace
-
+/// "FILE", "INT", "{cad,game}": what the word behind an option is, in the words of the help text.
 std::string value_name(const command_line::Option& option) {
   const std::string type = option.value_type();
   const std::size_t set = type.find('{');
@@ -51,17 +43,23 @@ std::string value_name(const command_line::Option& option) {
   return type.substr(0, type.find(':'));
 }
 
+/// The words that may follow: the members of a set, or the first words of the indented lines of its
+/// description. One that ends in a colon goes on, with a file say. Empty: there is no list.
 std::vector<std::string> value_choices(const command_line::Option& option) {
   std::vector<std::string> words;
   const std::string name = value_name(option);
-  if (!name.empty() && name.front() == '{') return split(name.substr(1, name.size() - 2), ',');
-  for (const std::string& line : split(option.description(), '\n')) {
+  if (name.starts_with('{')) {
+    for (const std::string_view word :
+         split(std::string_view(name).substr(1, name.size() - 2), ','))
+      words.emplace_back(word);
+    return words;
+  }
+  const std::string description = option.description();
+  for (const std::string_view line : split(description, '\n')) {
     if (line.starts_with("  ")) add_from_line(line, words);
   }
   return words;
 }
-
-namespace {
 
 constexpr const char* kProgram = "tagwrench";
 
@@ -101,9 +99,7 @@ std::string escaped(std::string_view text) {
 std::string paragraph(std::string_view text) {
   std::string out;
   bool table = false;
-  while (!text.empty()) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(line.size() + 1, text.size()));
+  for (const std::string_view line : split(text, '\n')) {
     const bool row = line.starts_with("  ");
     if (row != table) out += row ? ".nf\n" : ".fi\n";
     table = row;
@@ -113,10 +109,7 @@ std::string paragraph(std::string_view text) {
   return out;
 }
 
-std::string capital(std::string text) {
-  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
-  return text;
-}
+char upper(char c) { return static_cast<char>(std::toupper(static_cast<unsigned char>(c))); }
 
 /// "-o, --out FILE", in bold and italics.
 std::string heading(const command_line::Option& option) {
@@ -176,16 +169,17 @@ std::string page(const command_line::Command& verb, const std::string& words,
                  const std::string& version) {
   const std::string name = page_name(words);
   std::string title = name;
-  for (char& c : title) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  for (char& c : title) c = upper(c);
   std::string summary = verb.description();
   const bool first = words == kProgram;
   const std::string own_name = words + ": ";
   if (summary.starts_with(own_name)) summary.erase(0, own_name.size());
+  const std::string name_line = escaped(name) + " \\- " + escaped(replaced(summary, '\n', ' '));
+  if (!summary.empty()) summary[0] = upper(summary[0]);
   return ".TH " + escaped(title) + " 1 \"\" \"tagwrench " + version + "\" \"User Commands\"\n" +
-         ".SH NAME\n" + escaped(name) + " \\- " + escaped(replaced(summary, '\n', ' ')) + "\n" +
-         synopsis(verb, words) + ".SH DESCRIPTION\n" + paragraph(capital(summary) + ".") +
-         paragraph(verb.footer_text()) + verbs_section(verb, words) + options_section(verb) +
-         std::string(first ? kFiles : "") + std::string(kExitStatus) +
+         ".SH NAME\n" + name_line + "\n" + synopsis(verb, words) + ".SH DESCRIPTION\n" +
+         paragraph(summary + ".") + paragraph(verb.footer_text()) + verbs_section(verb, words) +
+         options_section(verb) + std::string(first ? kFiles : "") + std::string(kExitStatus) +
          (first ? "" : ".SH SEE ALSO\n.BR tagwrench (1)\n");
 }
 
@@ -196,12 +190,90 @@ void add_pages(const command_line::Command& verb, const std::string& words,
     add_pages(below, words + " " + below.name(), version, pages);
 }
 
+/// Where the typed words have led.
+struct Place {
+  command_line::Command verb;
+  std::optional<command_line::Option> open = {};  ///< whose value comes next
+};
+
+template <class Item, class Is>
+std::optional<Item> first_that(const std::vector<Item>& items, Is is) {
+  const auto found = std::ranges::find_if(items, is);
+  return found == items.end() ? std::nullopt : std::optional(*found);
+}
+
+void follow(const std::string& word, Place& place) {
+  if (word == "=") return;  // bash takes --option=value for three words
+  if (place.open) {
+    place.open.reset();
+  } else if (word.starts_with("-")) {
+    const auto option =
+        first_that(place.verb.options(), [&](const auto& o) { return o.has_name(word); });
+    if (option && option->takes_value()) place.open = option;
+  } else if (const auto verb = first_that(place.verb.subcommands(),
+                                          [&](const auto& v) { return v.name() == word; })) {
+    place.verb = *verb;
+  }
+}
+
+void add(std::string word, const std::string& typed, Completion& out) {
+  if (word.starts_with(typed)) out.words.push_back(std::move(word));
+}
+
+bool is_number(const command_line::Option& option) {
+  const std::string name = value_name(option);
+  return name == "INT" || name == "UINT" || name == "FLOAT" || name == "SECONDS";
+}
+
+void add_values(const command_line::Option& option, const std::string& typed,
+                const std::vector<std::string>& profiles, Completion& out) {
+  const bool profile = option.has_name("--profile") || option.has_name("profile");
+  const std::vector<std::string> choices = profile ? profiles : value_choices(option);
+  for (const std::string& choice : choices) {
+    if (choice.ends_with(":") && typed.starts_with(choice)) {
+      out = {{}, true, choice};
+      return;
+    }
+    add(choice, typed, out);
+  }
+  out.files = profile || (choices.empty() && !is_number(option));
+}
+
+void add_names(const command_line::Command& verb, const std::string& typed, Completion& out) {
+  for (const command_line::Option& option : verb.options()) {
+    for (const std::string& name : option.long_names()) add("--" + name, typed, out);
+  }
+}
+
 }  // namespace
 
 std::vector<ManPage> man_pages(const command_line::Command& program, const std::string& version) {
   std::vector<ManPage> pages;
   add_pages(program, kProgram, version, pages);
   return pages;
+}
+
+Completion complete(const command_line::Command& program, const std::vector<std::string>& typed,
+                    const std::vector<std::string>& profiles) {
+  Completion out;
+  if (typed.empty()) return out;
+  Place place{program};
+  std::for_each(typed.begin(), typed.end() - 1,
+                [&place](const std::string& word) { follow(word, place); });
+  const std::string last = typed.back() == "=" ? "" : typed.back();
+  if (place.open) {
+    add_values(*place.open, last, profiles, out);
+  } else if (last.starts_with("-")) {
+    add_names(place.verb, last, out);
+  } else if (const auto verbs = place.verb.subcommands(); !verbs.empty()) {
+    for (const command_line::Command& verb : verbs) add(verb.name(), last, out);
+  } else {
+    for (const command_line::Option& option : place.verb.options()) {
+      if (option.is_positional()) add_values(option, last, profiles, out);
+    }
+    if (last.empty()) add_names(place.verb, last, out);
+  }
+  return out;
 }
 
 }  // namespace tagwrench

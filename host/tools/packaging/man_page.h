@@ -1,4 +1,5 @@
-// Man pages from what the program says about its own verbs and options.
+// Man pages and the completion of shells, from what the program says about its own verbs and
+// options.
 #pragma once
 
 #include <string>
@@ -8,15 +9,6 @@
 
 namespace tagwrench {
 
-// What the help text says that may follow an option, for man pages and completion.
-
-/// "FILE", "INT", "{cad,game}": what the word is, in the words of the help text.
-std::string value_name(const command_line::Option& option);
-
-/// The words that may follow: the members of a set, or the first words of the indented lines of its
-/// description. One that ends in a colon goes on, with a file say. Empty: there is no list.
-std::vector<std::string> value_choices(const command_line::Option& option);
-
 struct ManPage {
   std::string name;  ///< "tagwrench-board-flash"
   std::string text;  ///< man(7)
@@ -25,5 +17,18 @@ struct ManPage {
 /// The page of `program` and one for each of its verbs and their verbs. `version` is shown at the
 /// foot.
 std::vector<ManPage> man_pages(const command_line::Command& program, const std::string& version);
+
+// What may come next on the command line.
+
+struct Completion {
+  std::vector<std::string> words;  ///< whole ones that begin with what is typed
+  bool files = false;              ///< names of files fit, too,
+  std::string before_file;         ///< behind this, which is typed already: "recording:"
+};
+
+/// `typed`: the words behind the program's name, the last one up to the cursor, perhaps empty.
+/// `profiles`: the ready ones.
+Completion complete(const command_line::Command& program, const std::vector<std::string>& typed,
+                    const std::vector<std::string>& profiles);
 
 }  // namespace tagwrench

@@ -3,23 +3,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <fstream>
 #include <iterator>
-#include <optional>
-#include <string_view>
+#include <map>
 #include <system_error>
 
 #include "host/core/config_error.h"
-#include "host/tools/reading/hid_text.h"
-#include "host/tools/reading/six_axis.h"
+#include "host/core/parse.h"
 #include "host/tools/reading/tagwrench_hid.h"
 
 namespace tagwrench {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::uint16_t kGenericDesktop = 0x01;
+constexpr std::uint16_t kMultiAxisController = 0x08;
+constexpr std::uint16_t kWrenchUsage = 0x10;
 
 constexpr std::size_t kMaxBytes = 4096;  // of an attribute; HID_MAX_DESCRIPTOR_SIZE is the same
 
@@ -33,62 +33,41 @@ std::optional<std::string> attribute(const fs::path& path) {
   return bytes;
 }
 
-/// One character of UTF-8 (RFC 3629), taken off `text`; '?' for a byte that begins none.
-wchar_t next_character(std::string_view& text) {
-  const auto first = static_cast<unsigned char>(text.front());
-  const std::size_t size = first < 0x80    ? 1
-                           : first < 0xc2  ? 0
-                           : first < 0xe0  ? 2
-                           : first < 0xf0  ? 3
-                           : first <= 0xf4 ? 4
-                                           : 0;
-  std::uint32_t character = size < 2 ? first : first & (0x7fU >> size);
-  bool whole = size > 0 && size <= text.size();
-  for (std::size_t i = 1; whole && i < size; ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    whole = (byte & 0xc0U) == 0x80U;
-    character = character << 6 | (byte & 0x3fU);
-  }
-  constexpr std::array<std::uint32_t, 5> kMin{0, 0, 0x80, 0x800, 0x10000};
-  whole = whole && character >= kMin[size];  // an overlong form is none
-  text.remove_prefix(whole ? size : 1);
-  return whole ? static_cast<wchar_t>(character) : L'?';
-}
-
+/// Fit for a terminal: '?' for control characters and for bytes that are no UTF-8.
 std::string shown(std::string_view text) {
-  std::wstring characters;
-  while (!text.empty()) characters += next_character(text);
-  std::array<char, TAGWRENCH_TEXT_SIZE> out{};
-  tagwrench_utf8(characters.c_str(), out.data(), out.size());
-  return out.data();
+  std::string out;
+  while (!text.empty() && out.size() + 4 < TAGWRENCH_TEXT_SIZE) {
+    const std::size_t length = utf8_length(text);
+    const auto first = static_cast<unsigned char>(text[0]);
+    // Of two bytes: U+0080 to U+009F.
+    const bool control =
+        length == 1 ? first < ' ' || first == 0x7f
+                    : text.starts_with('\xc2') && static_cast<unsigned char>(text[1]) < 0xa0;
+    out += length == 0 || control ? "?" : text.substr(0, length);
+    text.remove_prefix(std::max<std::size_t>(1, length));
+  }
+  return out;
 }
 
 std::string first_line(std::string_view text) { return shown(text.substr(0, text.find('\n'))); }
 
 /// What follows "KEY=" in a uevent file.
 std::optional<std::string_view> value_of(std::string_view key, std::string_view uevent) {
-  while (!uevent.empty()) {
-    const std::string_view line = uevent.substr(0, uevent.find('\n'));
+  for (const std::string_view line : split(uevent, '\n')) {
     if (line.size() > key.size() && line.starts_with(key) && line[key.size()] == '=')
       return line.substr(key.size() + 1);
-    uevent.remove_prefix(std::min(uevent.size(), line.size() + 1));
   }
   return std::nullopt;
 }
 
 /// "0003:00001209:00007A6E": bus, vendor, product.
-bool parse_id(std::string_view text, HidInterface& device) {
-  std::array<std::uint32_t, 3> numbers{};
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const std::string_view word = text.substr(0, text.find(':'));
-    const char* end = word.data() + word.size();
-    const auto [stopped, error] = std::from_chars(word.data(), end, numbers[i], 16);
-    if (error != std::errc() || stopped != end || numbers[i] > 0xffff) return false;
-    text.remove_prefix(std::min(text.size(), word.size() + 1));
-  }
-  device.vendor = static_cast<std::uint16_t>(numbers[1]);
-  device.product = static_cast<std::uint16_t>(numbers[2]);
-  return text.empty();
+std::optional<std::array<std::uint16_t, 2>> vendor_and_product(std::string_view text) {
+  const std::vector<std::string_view> words = split(text, ':');
+  if (words.size() != 3 || !parse_whole<std::uint16_t>(words[0], 16)) return std::nullopt;
+  const auto vendor = parse_whole<std::uint16_t>(words[1], 16);
+  const auto product = parse_whole<std::uint16_t>(words[2], 16);
+  if (!vendor || !product) return std::nullopt;
+  return std::array{*vendor, *product};
 }
 
 /// The kernel's name of a USB device begins with its manufacturer; the device itself, two folders
@@ -99,20 +78,36 @@ std::optional<std::string> usb_product(const fs::path& device) {
   return error ? std::nullopt : attribute(real.parent_path().parent_path() / "product");
 }
 
-std::optional<HidInterface> interface(const fs::path& entry) {
+std::optional<HidKind> kind_of(const HidNode& d, const HidUsage& usage) {
+  const bool ours = d.vendor == TAGWRENCH_VENDOR_ID && d.product == TAGWRENCH_PRODUCT_ID;
+  const bool ours_by_name = usage.usage == kWrenchUsage && d.name.starts_with("tagwrench");
+  if (usage.page == TAGWRENCH_USAGE_PAGE && (ours || ours_by_name)) return HidKind::wrench;
+  if (usage.page == kGenericDesktop && usage.usage == kMultiAxisController) return HidKind::puck;
+  return std::nullopt;
+}
+
+std::optional<HidNode> node_of(const fs::path& entry) {
   const fs::path device = entry / "device";
   const std::optional<std::string> uevent = attribute(device / "uevent");
   const std::optional<std::string> descriptor = attribute(device / "report_descriptor");
   if (!uevent || !descriptor) return std::nullopt;
-  HidInterface found;
-  if (!parse_id(value_of("HID_ID", *uevent).value_or(""), found)) return std::nullopt;
-  found.path = "/dev/" + entry.filename().string();
-  found.serial = shown(value_of("HID_UNIQ", *uevent).value_or(""));
+  const auto id = vendor_and_product(value_of("HID_ID", *uevent).value_or(""));
+  if (!id) return std::nullopt;
   const std::optional<std::string> product = usb_product(device);
-  found.name = product ? first_line(*product) : shown(value_of("HID_NAME", *uevent).value_or(""));
-  found.usages = top_level_usages(
-      {reinterpret_cast<const std::uint8_t*>(descriptor->data()), descriptor->size()});
-  return found;
+  HidNode node{
+      .vendor = (*id)[0],
+      .product = (*id)[1],
+      .path = "/dev/" + entry.filename().string(),
+      .serial = shown(value_of("HID_UNIQ", *uevent).value_or("")),
+      .name = product ? first_line(*product) : shown(value_of("HID_NAME", *uevent).value_or(""))};
+  for (const HidUsage& usage : top_level_usages(
+           {reinterpret_cast<const std::uint8_t*>(descriptor->data()), descriptor->size()})) {
+    if (const std::optional<HidKind> kind = kind_of(node, usage)) {
+      node.kind = *kind;
+      return node;
+    }
+  }
+  return std::nullopt;
 }
 
 std::uint32_t little_endian(std::span<const std::uint8_t> bytes) {
@@ -120,6 +115,33 @@ std::uint32_t little_endian(std::span<const std::uint8_t> bytes) {
   for (std::size_t i = 0; i < bytes.size(); ++i) value |= std::uint32_t{bytes[i]} << (8 * i);
   return value;
 }
+
+constexpr std::uint8_t kTranslationId = 1;  // and rotation, where combined
+constexpr std::uint8_t kRotationId = 2;
+constexpr std::uint8_t kButtonsId = 3;
+constexpr std::size_t kThreeAxes = 7;  // bytes, report id included
+constexpr std::size_t kSixAxes = 13;
+
+constexpr PuckModel kModels[] = {
+    {0x046d, 0xc621, "any", "Spaceball 5000"},
+    {0x046d, 0xc623, "split", "SpaceTraveler"},
+    {0x046d, 0xc625, "split", "SpacePilot"},
+    {0x046d, 0xc626, "split", "SpaceNavigator"},
+    {0x046d, 0xc627, "split", "SpaceExplorer"},
+    {0x046d, 0xc628, "split", "SpaceNavigator for Notebooks"},
+    {0x046d, 0xc629, "split", "SpacePilot Pro"},
+    {0x046d, 0xc62b, "split", "SpaceMouse Pro"},
+    {0x256f, 0xc62e, "combined", "SpaceMouse Wireless (cable)"},
+    {0x256f, 0xc62f, "combined", "SpaceMouse Wireless (receiver)"},
+    {0x256f, 0xc631, "combined", "SpaceMouse Pro Wireless (cable)"},
+    {0x256f, 0xc632, "combined", "SpaceMouse Pro Wireless (receiver)"},
+    {0x256f, 0xc633, "combined", "SpaceMouse Enterprise"},
+    {0x256f, 0xc635, "split", "SpaceMouse Compact"},
+    {0x256f, 0xc636, "any", "SpaceMouse Module"},
+    {0x256f, 0xc638, "combined", "SpaceMouse Pro Wireless (Bluetooth)"},
+    {0x256f, 0xc63a, "combined", "SpaceMouse Wireless (Bluetooth)"},
+    {0x256f, 0xc652, "combined", "3Dconnexion universal receiver"},
+};
 
 }  // namespace
 
@@ -157,76 +179,33 @@ std::vector<HidUsage> top_level_usages(std::span<const std::uint8_t> descriptor)
   return usages;
 }
 
-std::vector<HidInterface> hid_interfaces(const fs::path& hidraw_class) {
-  std::vector<std::pair<int, fs::path>> entries;
+std::string HidNode::label() const {
+  return fmt::format("{:04x}:{:04x}{}{} ({})", vendor, product, serial.empty() ? "" : " ", serial,
+                     path);
+}
+
+std::vector<HidNode> hid_nodes(const fs::path& hidraw_class) {
+  std::map<std::pair<HidKind, int>, HidNode> in_order;
   std::error_code error;
   for (fs::directory_iterator entry(hidraw_class, error), end; !error && entry != end;
        entry.increment(error)) {
     constexpr std::string_view kNode = "hidraw";
     const std::string name = entry->path().filename().string();
     if (!name.starts_with(kNode)) continue;
-    int number = 0;
-    const char* end_of_name = name.data() + name.size();
-    const auto [stopped, bad] = std::from_chars(name.data() + kNode.size(), end_of_name, number);
-    if (bad != std::errc() || stopped != end_of_name) continue;
-    entries.emplace_back(number, entry->path());
+    const auto number = parse_whole<int>(std::string_view(name).substr(kNode.size()));
+    const std::optional<HidNode> node = number ? node_of(entry->path()) : std::nullopt;
+    if (node) in_order.emplace(std::pair(node->kind, *number), *node);
   }
-  std::sort(entries.begin(), entries.end());
-  std::vector<HidInterface> devices;
-  for (const auto& [number, entry] : entries) {
-    if (std::optional<HidInterface> device = interface(entry)) devices.push_back(*device);
-  }
-  return devices;
-}
-
-namespace {
-
-constexpr std::uint16_t kGenericDesktop = 0x01;
-constexpr std::uint16_t kMultiAxisController = 0x08;
-constexpr std::uint16_t kWrenchUsage = 0x10;
-
-std::optional<HidKind> kind_of(const HidInterface& d, const HidUsage& usage) {
-  const bool ours = d.vendor == TAGWRENCH_VENDOR_ID && d.product == TAGWRENCH_PRODUCT_ID;
-  const bool ours_by_name = usage.usage == kWrenchUsage && d.name.starts_with("tagwrench");
-  if (usage.page == TAGWRENCH_USAGE_PAGE && (ours || ours_by_name)) return HidKind::wrench;
-  if (usage.page == kGenericDesktop && usage.usage == kMultiAxisController) return HidKind::puck;
-  return std::nullopt;
-}
-
-std::optional<std::uint16_t> hex4(std::string_view text) {
-  std::uint16_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-  if (text.size() != 4 || error != std::errc() || end != text.data() + text.size())
-    return std::nullopt;
-  return value;
-}
-
-}  // namespace
-
-std::string HidNode::label() const {
-  return fmt::format("{:04x}:{:04x}{}{} ({})", vendor, product, serial.empty() ? "" : " ", serial,
-                     path);
-}
-
-std::vector<HidNode> hid_nodes(const std::filesystem::path& hidraw_class) {
   std::vector<HidNode> nodes;
-  for (const HidInterface& d : hid_interfaces(hidraw_class)) {
-    std::optional<HidKind> kind;
-    for (const HidUsage& usage : d.usages) {
-      if (!kind) kind = kind_of(d, usage);
-    }
-    if (kind) nodes.push_back({*kind, d.vendor, d.product, d.path, d.serial, d.name});
-  }
-  std::stable_sort(nodes.begin(), nodes.end(),
-                   [](const HidNode& a, const HidNode& b) { return a.kind < b.kind; });
+  for (auto& [order, node] : in_order) nodes.push_back(std::move(node));
   return nodes;
 }
 
 HidChoice::HidChoice(const std::string& text) : text_(text), path_(text.starts_with('/')) {
   const std::string_view view = text_;
   if (view.size() != 9 || view[4] != ':') return;
-  const auto vendor = hex4(view.substr(0, 4));
-  const auto product = hex4(view.substr(5));
+  const auto vendor = parse_whole<std::uint16_t>(view.substr(0, 4), 16);
+  const auto product = parse_whole<std::uint16_t>(view.substr(5), 16);
   if (vendor && product) id_ = {*vendor, *product};
 }
 
@@ -257,6 +236,34 @@ std::string HidChoice::words() const {
   const char* what = "wrench sensor or 6-DOF device";
   if (text_.empty()) return what;
   return fmt::format("{} with the {} {}", what, path_ ? "path" : id_ ? "id" : "serial", text_);
+}
+
+const PuckModel* puck_model(std::uint16_t vendor, std::uint16_t product) noexcept {
+  for (const PuckModel& model : kModels) {
+    if (model.vendor == vendor && model.product == product) return &model;
+  }
+  return nullptr;
+}
+
+PuckDecoder::Change PuckDecoder::take(std::span<const std::uint8_t> report) noexcept {
+  if (report.empty()) return Change::stranger;
+  const std::uint8_t id = report[0];
+  if (id == kTranslationId || id == kRotationId) {
+    if (report.size() < kThreeAxes) return Change::stranger;
+    const bool combined = id == kTranslationId && report.size() >= kSixAxes;
+    const std::size_t first = id == kRotationId ? 3 : 0;
+    for (std::size_t i = 0; i < (combined ? 6 : 3); ++i)
+      state_.counts[first + i] =
+          static_cast<std::int16_t>(little_endian(report.subspan(1 + 2 * i, 2)));
+    return Change::motion;
+  }
+  if (id == kButtonsId) {
+    if (report.size() < 2) return Change::stranger;
+    state_.buttons = little_endian(
+        report.subspan(1, std::min<std::size_t>(report.size() - 1, sizeof state_.buttons)));
+    return Change::buttons;
+  }
+  return Change::none;
 }
 
 }  // namespace tagwrench

@@ -1,11 +1,14 @@
-// The 6-DOF and wrench HID devices that are plugged in, and the choice of one.
+// The 6-DOF and wrench HID devices that are plugged in, the choice of one, and what pucks say.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tagwrench {
@@ -21,22 +24,9 @@ struct HidUsage {
   friend bool operator==(const HidUsage&, const HidUsage&) = default;
 };
 
-struct HidInterface {
-  std::uint16_t vendor = 0;
-  std::uint16_t product = 0;
-  std::string path;              ///< "/dev/hidraw3"
-  std::string serial;            ///< may be empty
-  std::string name;              ///< without the manufacturer where the device is on USB
-  std::vector<HidUsage> usages;  ///< of its top-level collections
-};
-
 /// What each top-level collection is for, as far as the descriptor goes (HID 1.11, 6.2.2). Any
 /// bytes may come.
 std::vector<HidUsage> top_level_usages(std::span<const std::uint8_t> descriptor);
-
-/// In the order of their numbers. A device that is only half there is left out: it is coming or
-/// going. Texts are UTF-8 without control characters.
-std::vector<HidInterface> hid_interfaces(const std::filesystem::path& hidraw_class);
 
 enum class HidKind : std::uint8_t { wrench, puck };
 
@@ -48,7 +38,7 @@ struct HidNode {
   std::uint16_t product = 0;
   std::string path;    ///< "/dev/hidraw3"
   std::string serial;  ///< may be empty
-  std::string name;
+  std::string name;    ///< without the manufacturer where the device is on USB
 
   /// Whether this is the device that `other` was before it was plugged in again, perhaps as another
   /// node.
@@ -60,7 +50,9 @@ struct HidNode {
   std::string label() const;
 };
 
-/// Wrench sensors first; no device needs to be readable for it to be listed.
+/// Wrench sensors first, then in the order of their numbers; no device needs to be readable for it
+/// to be listed. One that is only half there is left out: it is coming or going. Texts are UTF-8
+/// without control characters.
 std::vector<HidNode> hid_nodes(const std::filesystem::path& hidraw_class);
 
 /// What a person names a device by. Empty: the only one, or the wrench sensor beside pucks.
@@ -82,6 +74,49 @@ class HidChoice {
   std::string text_;
   bool path_ = false;
   std::optional<std::pair<std::uint16_t, std::uint16_t>> id_;
+};
+
+// 6-DOF pucks on HID: which ones there are, and what their reports say. Pure.
+//
+// Two layouts are in use; every number is a little-endian int16, most often of +-350 counts.
+//   combined   01 X Y Z RX RY RZ (13 bytes)
+//   split      01 X Y Z (7), 02 RX RY RZ (7)
+// Both have buttons, one bit each, in report 03. Axes are those of the HID usage tables (X right, Y
+// toward the user, Z down) unless the device says otherwise.
+
+struct PuckModel {
+  std::uint16_t vendor = 0;
+  std::uint16_t product = 0;
+  std::string_view layout;  ///< "combined", "split"; "any": not known
+  std::string_view name;
+};
+
+/// Of 3Dconnexion's pucks, under its own vendor id 256f and under Logitech's 046d; nullptr if not
+/// in the table. A puck need not be in it to be read.
+const PuckModel* puck_model(std::uint16_t vendor, std::uint16_t product) noexcept;
+
+struct PuckState {
+  std::array<std::int16_t, 6> counts{};  ///< X Y Z RX RY RZ
+  std::uint32_t buttons = 0;             ///< bit 0 is the first button
+};
+
+/// Tells the layout from the reports themselves: a device may speak another one than its model did.
+class PuckDecoder {
+ public:
+  enum class Change : std::uint8_t {
+    none,    ///< another report: the battery, say
+    motion,  ///< counts are new; of a split pair, each half is
+    buttons,
+    stranger,  ///< too short for what its id promises
+  };
+
+  /// Any bytes may come, report id first.
+  Change take(std::span<const std::uint8_t> report) noexcept;
+
+  const PuckState& state() const noexcept { return state_; }
+
+ private:
+  PuckState state_;
 };
 
 }  // namespace tagwrench

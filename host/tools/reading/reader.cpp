@@ -8,26 +8,67 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
+#include <cmath>
 #include <memory>
-#include <vector>
 
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/unique_fd.h"
-#include "host/output/text_sink.h"
+#include "host/output/line_outputs.h"
 #include "host/tools/reading/hid_list.h"
 #include "host/tools/reading/hid_text.h"
-#include "host/tools/reading/reading_stats.h"
-#include "host/tools/reading/reading_text.h"
-#include "host/tools/reading/six_axis.h"
-#include "host/tools/reading/tagwrench_hid.h"
 
 namespace tagwrench {
 namespace {
 
 using std::chrono::milliseconds;
+
+constexpr double kMin_ns = 1e3;
+const double kLogStep = std::log(1.02);
+
+Duration from_seconds(double seconds) {
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+}
+
+std::int64_t ns(TimePoint time) {
+  return std::chrono::duration_cast<Duration>(time.time_since_epoch()).count();
+}
+
+double ms(Duration time) { return std::chrono::duration<double, std::milli>(time).count(); }
+
+/// Appends to a buffer and stops at its end.
+class Line {
+ public:
+  explicit Line(ReadingBuffer& buffer) : buffer_(buffer) {}
+
+  template <class... Args>
+  Line& put(fmt::format_string<Args...> format, Args&&... args) {
+    const std::size_t room = buffer_.size() - used_;
+    const auto result =
+        fmt::format_to_n(buffer_.data() + used_, room, format, std::forward<Args>(args)...);
+    used_ += std::min(room, result.size);
+    return *this;
+  }
+  Line& list(const double (&values)[3], const char* between) {
+    return put("{:.6f}{}{:.6f}{}{:.6f}", values[0], between, values[1], between, values[2]);
+  }
+  Line& counts(const PuckState& puck, const char* between) {
+    for (std::size_t i = 0; i < puck.counts.size(); ++i) {
+      put("{}{}", i > 0 ? between : "", puck.counts[i]);
+    }
+    return *this;
+  }
+  Line& latency(const std::optional<Duration>& value, const char* none) {
+    if (!value) return put("{}", none);
+    return put("{}", std::chrono::duration_cast<std::chrono::microseconds>(*value).count());
+  }
+  std::string_view view() const { return {buffer_.data(), used_}; }
+
+ private:
+  ReadingBuffer& buffer_;
+  std::size_t used_ = 0;
+};
 
 /// hidapi waits on a descriptor that it keeps to itself, so that a signal is seen this much later
 /// at most.
@@ -207,7 +248,7 @@ class Reader {
     const TimePoint now = clock_now();
     if (size > 0) take({report_.data(), static_cast<std::size_t>(size)}, now);
     // What came last is shown even if nothing comes after it: a release, above all.
-    if (unseen_ && sink_.show(reading_, lately(), all_.missing(), now)) unseen_ = false;
+    if (unseen_ && sink_.show(reading_, lately(), all_.missing, now)) unseen_ = false;
     return true;
   }
 
@@ -226,28 +267,28 @@ class Reader {
 
   /// Of the second that has passed, or of the first one so far.
   const ReadingStats& lately() const noexcept {
-    return last_span_.reports() > 1 ? last_span_ : span_;
+    return last_span_.reports > 1 ? last_span_ : span_;
   }
 
   bool decode(std::span<const std::uint8_t> report) noexcept {
     if (reading_.kind == HidKind::wrench) {
       const bool good = tagwrench_decode(report.data(), report.size(), &reading_.wrench) > 0;
-      if (!good) all_.stranger();
+      if (!good) ++all_.strangers;
       return good;
     }
     const PuckDecoder::Change change = puck_.take(report);
     reading_.puck = puck_.state();
-    if (change == PuckDecoder::Change::stranger) all_.stranger();
+    if (change == PuckDecoder::Change::stranger) ++all_.strangers;
     return change == PuckDecoder::Change::motion || change == PuckDecoder::Change::buttons;
   }
 
   void count_sample() noexcept {
     reading_.missing = 0;
     if (reading_.wrench.capture_time_ns == 0) return;  // of no picture: has no sequence
-    const std::uint64_t before = all_.missing();
+    const std::uint64_t before = all_.missing;
     const std::optional<Duration> latency = latency_of(reading_);
     for (ReadingStats* stats : {&all_, &span_}) stats->sampled(reading_.wrench.sequence, latency);
-    reading_.missing = static_cast<std::uint32_t>(all_.missing() - before);
+    reading_.missing = static_cast<std::uint32_t>(all_.missing - before);
   }
 
   void lose() {
@@ -292,6 +333,173 @@ class Reader {
 };
 
 }  // namespace
+
+void DurationHistogram::add(Duration value) noexcept {
+  const double ratio = std::max(1.0, static_cast<double>(value.count()) / kMin_ns);
+  const auto index = static_cast<std::size_t>(std::log(ratio) / kLogStep);
+  ++classes_[std::min(index, classes_.size() - 1)];
+  ++count_;
+  max_ = std::max(max_, value);
+}
+
+Duration DurationHistogram::quantile(double part) const noexcept {
+  const auto wanted = static_cast<std::uint64_t>(std::ceil(part * static_cast<double>(count_)));
+  std::uint64_t below = 0;
+  for (std::size_t i = 0; i < classes_.size(); ++i) {
+    below += classes_[i];
+    if (below >= wanted && below > 0) {
+      const double upper_ns = kMin_ns * std::exp(kLogStep * static_cast<double>(i + 1));
+      return std::min(max_, Duration(static_cast<Duration::rep>(upper_ns)));
+    }
+  }
+  return max_;
+}
+
+void ReadingStats::arrived(TimePoint time) noexcept {
+  ++reports;
+  if (last) {
+    const Duration interval = time - *last;
+    const double s = std::chrono::duration<double>(interval).count();
+    ++intervals;
+    const double off = s - mean_s;
+    mean_s += off / static_cast<double>(intervals);
+    squares_s2 += off * (s - mean_s);
+    interval_max = std::max(interval_max, interval);
+  }
+  last = time;
+}
+
+void ReadingStats::sampled(std::uint32_t sequence, std::optional<Duration> latency_of_it) noexcept {
+  if (last_sequence) {
+    const std::uint32_t between = tagwrench_missing(*last_sequence, sequence);
+    missing += between;
+    gaps += between > 0 ? 1 : 0;
+  }
+  last_sequence = sequence;
+  if (latency_of_it) latency.add(*latency_of_it);
+}
+
+void ReadingStats::next_span() noexcept {
+  ReadingStats next;
+  next.last = last;
+  next.last_sequence = last_sequence;
+  *this = next;
+}
+
+void ReadingStats::interrupted() noexcept {
+  last.reset();
+  last_sequence.reset();
+}
+
+double ReadingStats::rate_hz() const noexcept {
+  return intervals > 0 && mean_s > 0 ? 1 / mean_s : 0;
+}
+
+Duration ReadingStats::interval_mean() const noexcept { return from_seconds(mean_s); }
+
+Duration ReadingStats::interval_std() const noexcept {
+  if (intervals == 0) return Duration(0);
+  return from_seconds(std::sqrt(squares_s2 / static_cast<double>(intervals)));
+}
+
+std::optional<Duration> latency_of(const Reading& reading) noexcept {
+  constexpr Duration kMax = std::chrono::seconds(10);  // beyond, the clocks are not one
+  const std::chrono::nanoseconds captured(reading.wrench.capture_time_ns);
+  const Duration latency = reading.time - TimePoint(captured);
+  if (captured.count() == 0 || latency < Duration(0) || latency >= kMax) return std::nullopt;
+  return latency;
+}
+
+std::string_view json_line(ReadingBuffer& buffer, const Reading& reading) noexcept {
+  Line line(buffer);
+  if (reading.kind == HidKind::puck) {
+    line.put(R"({{"host_ns":{},"counts":[)", ns(reading.time)).counts(reading.puck, ",");
+    return line.put("],\"buttons\":{}}}\n", reading.puck.buttons).view();
+  }
+  const tagwrench_sample& s = reading.wrench;
+  line.put(R"({{"host_ns":{},"seq":{},"t_ns":{},"status":"{}","f_n":[)", ns(reading.time),
+           s.sequence, s.capture_time_ns, tagwrench_status_name(s.status));
+  line.list(s.force_n, ",").put("],\"m_nm\":[").list(s.torque_nm, ",").put("],\"w_sigma\":[");
+  line.list(s.force_sigma_n, ",").put(",").list(s.torque_sigma_nm, ",");
+  line.put("],\"dropped\":{},\"missing\":{},\"latency_us\":", s.lost, reading.missing);
+  return line.latency(latency_of(reading), "null").put("}}\n").view();
+}
+
+std::string_view csv_header(HidKind kind) noexcept {
+  if (kind == HidKind::puck) return "host_ns,x,y,z,rx,ry,rz,buttons\n";
+  return "host_ns,seq,t_ns,status,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,sigma_fx_n,sigma_fy_n,"
+         "sigma_fz_n,sigma_mx_nm,sigma_my_nm,sigma_mz_nm,dropped,missing,latency_us\n";
+}
+
+std::string_view csv_line(ReadingBuffer& buffer, const Reading& reading) noexcept {
+  Line line(buffer);
+  if (reading.kind == HidKind::puck) {
+    line.put("{},", ns(reading.time)).counts(reading.puck, ",");
+    return line.put(",{}\n", reading.puck.buttons).view();
+  }
+  const tagwrench_sample& s = reading.wrench;
+  line.put("{},{},{},{},", ns(reading.time), s.sequence, s.capture_time_ns,
+           tagwrench_status_name(s.status));
+  line.list(s.force_n, ",").put(",").list(s.torque_nm, ",").put(",");
+  line.list(s.force_sigma_n, ",").put(",").list(s.torque_sigma_nm, ",");
+  line.put(",{},{},", s.lost, reading.missing);
+  return line.latency(latency_of(reading), "").put("\n").view();
+}
+
+std::string_view live_line(ReadingBuffer& buffer, const Reading& reading,
+                           const ReadingStats& lately, std::uint64_t missing) noexcept {
+  Line line(buffer);
+  if (reading.kind == HidKind::puck) {
+    constexpr std::array<const char*, 6> kAxes = {"X", "Y", "Z", "RX", "RY", "RZ"};
+    for (std::size_t i = 0; i < kAxes.size(); ++i) {
+      line.put("{}{:+5d} ", kAxes[i], reading.puck.counts[i]);
+    }
+    line.put(" buttons {:x}", reading.puck.buttons);
+  } else {
+    const tagwrench_sample& s = reading.wrench;
+    line.put("{:9}", tagwrench_status_name(s.status));
+    line.put(" F {:+7.3f} {:+7.3f} {:+7.3f} N", s.force_n[0], s.force_n[1], s.force_n[2]);
+    line.put("  M {:+8.4f} {:+8.4f} {:+8.4f} N m", s.torque_nm[0], s.torque_nm[1], s.torque_nm[2]);
+  }
+  line.put("  {:5.1f}/s, jitter {:.2f} ms, longest {:.1f}", lately.rate_hz(),
+           ms(lately.interval_std()), ms(lately.interval_max));
+  if (reading.kind == HidKind::wrench) {
+    line.put(", missing {}", missing);
+    if (const auto latency = latency_of(reading)) line.put(", latency {:.1f} ms", ms(*latency));
+  }
+  return line.view();
+}
+
+std::string summary(const HidNode& node, const ReadingStats& stats, Duration time) {
+  std::string text = fmt::format(
+      "{}: {} reports in {:.1f} s, {:.2f}/s, interval {:.2f} ms, standard deviation {:.2f}, "
+      "longest {:.1f}",
+      node.label(), stats.reports, 1e-3 * ms(time), stats.rate_hz(), ms(stats.interval_mean()),
+      ms(stats.interval_std()), ms(stats.interval_max));
+  if (node.kind == HidKind::wrench && stats.reports > 0) {
+    const DurationHistogram& latency = stats.latency;
+    text += fmt::format("; {} frames missing in {} gaps; ", stats.missing, stats.gaps);
+    text += latency.count() == 0 ? "no latency: the capture times are of another clock"
+                                 : fmt::format("latency median {:.2f} ms, p99 {:.2f}, max {:.2f}",
+                                               ms(latency.quantile(0.5)),
+                                               ms(latency.quantile(0.99)), ms(latency.max()));
+  }
+  if (stats.strangers > 0) text += fmt::format("; not understood: {}", stats.strangers);
+  return text;
+}
+
+std::string list_text(const std::vector<HidNode>& nodes) {
+  std::string text;
+  for (const HidNode& node : nodes) {
+    const PuckModel* model = puck_model(node.vendor, node.product);
+    const std::string also =
+        model == nullptr ? "" : fmt::format(", as {} ({} layout)", model->name, model->layout);
+    text += fmt::format("{:6}  {:04x}:{:04x}  {:13}  {:16}  {}{}\n", name(node.kind), node.vendor,
+                        node.product, node.path, node.serial.empty() ? "-" : node.serial,
+                        node.name.empty() ? "-" : node.name, also);
+  }
+  return text;
+}
 
 int list_hid() {
   const std::vector<HidNode> nodes = hid_nodes(kHidrawClass);

@@ -1,16 +1,21 @@
 // Room tools/reading: wrench sensors and 6-DOF pucks on HID, ours and others; for `read`.
 // In:  HID reports; /sys for who is there.
 // Out: N and N m with sigmas, or counts of a puck; rate (Hz), jitter and latency (s).
-// Then: tagwrench_hid.h (the C library for other programs), six_axis.h, reading_stats.h.
+// Then: tagwrench_hid.h (the C library for other programs), hid_list.h.
 //
 // The loop of `tagwrench read`: one device, found, read, lost and found again.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "host/core/types.h"
 #include "host/tools/reading/hid_list.h"
+#include "host/tools/reading/tagwrench_hid.h"
 
 namespace tagwrench {
 
@@ -33,5 +38,83 @@ int list_hid();
 /// returns the exit status: 1 if the device went away, or what was read could not be written.
 /// Throws ConfigError if there is no such device, or it may not be opened.
 int read_hid(const ReadOptions& options, int stop_fd);
+
+// The stream of reports: its rate, jitter, gaps and latency, in constant memory.
+
+/// Durations counted in classes that are 2 % wide, from 1 us to about a minute; what is outside
+/// counts in the outermost ones.
+class DurationHistogram {
+ public:
+  void add(Duration value) noexcept;
+  std::uint64_t count() const noexcept { return count_; }
+  Duration max() const noexcept { return max_; }
+  /// The duration below which this part (0..1) lies, to 2 %; never above max(). 0 without any.
+  Duration quantile(double part) const noexcept;
+
+ private:
+  std::array<std::uint32_t, 1024> classes_{};
+  std::uint64_t count_ = 0;
+  Duration max_{};
+};
+
+struct ReadingStats {
+  void arrived(TimePoint time) noexcept;
+  /// Of a wrench sample, after arrived().
+  void sampled(std::uint32_t sequence, std::optional<Duration> latency_of_it) noexcept;
+  /// Counts anew, but knows the last report: no interval and no gap between two spans is lost.
+  void next_span() noexcept;
+  /// The device was away: the time until the next report is no interval, its sequence starts anew.
+  void interrupted() noexcept;
+
+  double rate_hz() const noexcept;  ///< 0 with fewer than two reports
+  Duration interval_mean() const noexcept;
+  Duration interval_std() const noexcept;  ///< of a population, not of a sample
+
+  std::uint64_t reports = 0;
+  std::uint64_t intervals = 0;
+  std::uint64_t missing = 0;
+  std::uint64_t gaps = 0;
+  std::uint64_t strangers = 0;
+  std::optional<TimePoint> last;
+  std::optional<std::uint32_t> last_sequence;
+  double mean_s = 0;
+  double squares_s2 = 0;  ///< sum of squared deviations from the mean (Welford 1962)
+  Duration interval_max{};
+  DurationHistogram latency;
+};
+
+// What is printed of it.
+
+/// What came last from the device that is being read. Of `wrench` and `puck` the one of `kind`
+/// counts.
+struct Reading {
+  HidKind kind = HidKind::wrench;
+  TimePoint time{};  ///< when it was read
+  tagwrench_sample wrench{};
+  std::uint32_t missing = 0;  ///< frames between it and the one before
+  PuckState puck;
+};
+
+/// Nothing for a sample that is of no picture, or whose clock cannot be ours: that of a simulated
+/// sensor, a recording or another computer.
+std::optional<Duration> latency_of(const Reading& reading) noexcept;
+
+using ReadingBuffer = std::array<char, 768>;
+
+/// Views into `buffer`, newline included; no heap. Keys and columns are those of the bridge's own
+/// jsonl and csv where they mean the same; `host_ns` is when the report was read.
+std::string_view json_line(ReadingBuffer& buffer, const Reading& reading) noexcept;
+std::string_view csv_line(ReadingBuffer& buffer, const Reading& reading) noexcept;
+std::string_view csv_header(HidKind kind) noexcept;
+
+/// ASCII, without newline: the newest reading, rate and jitter lately, frames missing in all.
+std::string_view live_line(ReadingBuffer& buffer, const Reading& reading,
+                           const ReadingStats& lately, std::uint64_t missing) noexcept;
+
+/// "1209:7a6e tagwrench-0 (/dev/hidraw3): 250 reports in ..."
+std::string summary(const HidNode& node, const ReadingStats& stats, Duration time);
+
+/// One line for each device.
+std::string list_text(const std::vector<HidNode>& nodes);
 
 }  // namespace tagwrench

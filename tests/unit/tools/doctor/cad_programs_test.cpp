@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "host/core/os/unique_fd.h"
-#include "host/output/spnav_link.h"
+#include "host/output/spnav_daemon.h"
 #include "host/tools/doctor/doctor.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,8 +1,7 @@
-#include "host/tools/packaging/completion.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "host/tools/packaging/man_page.h"
 #include "tests/unit/tools/packaging/sample_app.h"
 
 namespace tagwrench::test {

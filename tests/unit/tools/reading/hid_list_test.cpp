@@ -4,7 +4,7 @@
 
 #include "fake_hidapi.h"
 #include "host/core/config_error.h"
-#include "host/tools/reading/reading_text.h"
+#include "host/tools/reading/reader.h"
 
 namespace tagwrench {
 namespace {

@@ -31,7 +31,7 @@ class HidSysfs : public ::testing::Test {
     test::write_file(device / "report_descriptor", descriptor);
     return device;
   }
-  std::vector<HidInterface> list() const { return hid_interfaces(hidraw_class_); }
+  std::vector<HidNode> list() const { return hid_nodes(hidraw_class_); }
 
   test::TemporaryFolder folder_;
   fs::path hidraw_class_ = folder_ / "class/hidraw";
@@ -48,7 +48,7 @@ TEST_F(HidSysfs, AVirtualDeviceHasTheKernelsNameAndSerial) {
   EXPECT_EQ(devices[0].path, "/dev/hidraw3");
   EXPECT_EQ(devices[0].name, "tagwrench wrench sensor");
   EXPECT_EQ(devices[0].serial, "bench=2");
-  EXPECT_EQ(devices[0].usages, (Usages{{1, 8}}));
+  EXPECT_EQ(devices[0].kind, HidKind::puck);
 }
 
 TEST_F(HidSysfs, ADeviceOnUsbHasItsProductsNameWithoutTheManufacturer) {
@@ -98,7 +98,7 @@ TEST_F(HidSysfs, WhatIsHalfThereIsLeftOut) {
 }
 
 TEST_F(HidSysfs, AMachineWithoutHidDevicesHasNone) {
-  EXPECT_TRUE(hid_interfaces(folder_ / "no such folder").empty());
+  EXPECT_TRUE(hid_nodes(folder_ / "no such folder").empty());
 }
 
 TEST_F(HidSysfs, TextsAreFitForATerminal) {
