@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "host/tools/camera_timing/camera_timing_fit.h"
-#include "host/tools/camera_timing/global_shutter.h"
 
 namespace tagwrench {
 namespace {
@@ -154,7 +156,7 @@ void fit_rate(const CameraTimingInput& input, bool all, CameraTimingResult& resu
   double period = usual_interval(result.times, input.period);
   // Neighbours give the period to a few parts in a thousand, and the longer the stretch that is
   // numbered, the better it is known.
-  double n = 0, w = 0, x = 0, y = 0, xx = 0, xy = 0;
+  LineSums sums;
   const TimedFrame* last = nullptr;
   const double start = result.times.front().exposed;
   const auto usable = [all](const TimedFrame& frame) {
@@ -168,18 +170,10 @@ void fit_rate(const CameraTimingInput& input, bool all, CameraTimingResult& resu
       frame.number = last->number + std::llround((frame.exposed - last->exposed) / period);
     if (!usable(frame)) continue;
     last = &frame;
-    const auto number = static_cast<double>(frame.number);
-    const double time = frame.exposed - start, weight = weight_of(frame);
-    n += 1;
-    w += weight;
-    x += weight * number;
-    y += weight * time;
-    xx += weight * number * number;
-    xy += weight * number * time;
-    const double spread = w * xx - x * x;
-    if (n >= kMinTimed && spread > 0) period = (w * xy - x * y) / spread;
+    sums.add(static_cast<double>(frame.number), frame.exposed - start, weight_of(frame));
+    if (sums.n >= kMinTimed && sums.spread() > 0) period = sums.slope();
   }
-  if (n < kMinTimed) return;
+  if (sums.n < kMinTimed) return;
   Line line;
   for (const TimedFrame& frame : result.times) {
     if (usable(frame))
@@ -227,7 +221,215 @@ void fit_latency(const CameraTimingInput& input, const CameraTimingFit& fit,
   result.latency_most = delays.back();
 }
 
-void count_frames(const CameraTimingInput& input, CameraTimingResult& result);
+void count_frames(const CameraTimingInput& input, CameraTimingResult& result) {
+  result.frames = static_cast<int>(result.times.size());
+  std::set<std::int64_t> seen;
+  for (std::size_t i = 0; i < result.times.size(); ++i) {
+    const TimedFrame& frame = result.times[i];
+    result.stale += frame.freshness == Freshness::stale ? 1 : 0;
+    result.undecided += frame.freshness == Freshness::undecided ? 1 : 0;
+    result.strange += frame.freshness == Freshness::strange ? 1 : 0;
+    if (frame.freshness != Freshness::stale) seen.insert(frame.number);
+    if (i > 0) result.dropped_by_driver += static_cast<int>(input.frames[i].dropped);
+  }
+  if (!seen.empty()) {
+    result.missing = static_cast<int>(*seen.rbegin() - *seen.begin() + 1 -
+                                      static_cast<std::int64_t>(seen.size()));
+  }
+  result.elapsed = input.frames.back().stamp - input.frames.front().stamp;
+}
+
+// A global shutter's picture has one brightness, which fits many times: nothing but all pictures
+// together, and their stamps, tell latency, jitter and exposure.
+
+struct GlobalShutter {
+  Figure latency, jitter, exposure;  ///< s; less the uncertainty of the clocks
+  std::vector<double> times;         ///< per picture, middle of the exposure, host clock, s
+  std::vector<double> sigmas;        ///< s, of stamp and picture together
+  std::vector<double> misses;        ///< least difference of brightness from the light at any time
+                                     ///< near; 0 dark, 1 lit
+  std::vector<double> chances;  ///< that the light stood still for the exposure's ends, at this
+                                ///< brightness: a picture before it may have the same by chance
+  std::vector<double> changes;  ///< of brightness since the picture before; 0 for the first
+};
+
+constexpr int kParameters = 5;
+using Parameters = Eigen::Matrix<double, kParameters, 1>;  // latency (s), log jitter, log exposure,
+                                                           // brightness without and by the light
+constexpr double kNoise = 0.03;     // of the brightness; the response may bend a little
+constexpr double kOutliers = 0.03;  // share of pictures of any brightness
+constexpr double kReach = 4;        // standard deviations of the delay
+constexpr double kLevel = 1e-6;     // slope of the brightness, per exposure
+constexpr int kMinSteps = 40, kMaxSteps = 400;
+constexpr double kStepsPerExposure = 20;
+
+struct Moments {
+  double likelihood = 0, time = 0, sigma = 0;
+  double miss = 0;    ///< least difference of brightness, at any time near
+  double chance = 0;  ///< share of the times near that have this brightness and no slope
+};
+
+class Likelihood {
+ public:
+  Likelihood(const CameraTimingInput& input, const LightSignal& light)
+      : input_(input), light_(light) {
+    for (const ObservedFrame& frame : input.frames) {
+      double sum = 0, gains = 0;
+      for (std::size_t b = 0; b < input.bands.size(); ++b) {
+        sum += frame.rows[b] - input.dark[b];
+        gains += input.lit[b] - input.dark[b];
+      }
+      brightness_.push_back(sum / gains);
+    }
+  }
+
+  double minus_log(const Parameters& p) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < brightness_.size(); ++i) sum -= std::log(of(i, p).likelihood);
+    return sum;
+  }
+
+  Moments of(std::size_t picture, const Parameters& p) const {
+    const double jitter = std::exp(p[1]), exposure = std::exp(p[2]);
+    const double middle = input_.frames[picture].stamp - p[0];
+    const int steps = std::clamp(
+        static_cast<int>(2 * kReach * jitter / exposure * kStepsPerExposure), kMinSteps, kMaxSteps);
+    double weights = 0, sum = 0, first = 0, second = 0, level = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < steps; ++k) {
+      const double z = kReach * (2 * (k + 0.5) / steps - 1);
+      const double off = z * jitter;
+      const SeenLight seen = light_.seen({0.5, 0.5}, {middle + off, 0, exposure});
+      const double miss = (brightness_[picture] - p[3] - p[4] * seen.mean) / kNoise;
+      least = std::min(least, std::abs(miss));
+      const double weight = std::exp(-0.5 * z * z);
+      const double value = weight * std::exp(-0.5 * miss * miss);
+      weights += weight;
+      if (std::abs(seen.by_middle) * exposure < kLevel && std::abs(miss) < 1) level += weight;
+      sum += value;
+      first += value * off;
+      second += value * off * off;
+    }
+    const double inlier = (1 - kOutliers) * sum / (weights * kNoise * 2.5066);
+    Moments moments{inlier + kOutliers, middle, jitter, least * kNoise, level / weights};
+    if (inlier > kOutliers) {
+      moments.time = middle + first / sum;
+      moments.sigma = std::sqrt(std::max(second / sum - std::pow(first / sum, 2), 0.0));
+    }
+    return moments;
+  }
+
+  double change(std::size_t picture) const {
+    return picture > 0 ? brightness_[picture] - brightness_[picture - 1] : 0;
+  }
+
+ private:
+  const CameraTimingInput& input_;
+  const LightSignal& light_;
+  std::vector<double> brightness_;  ///< 0 dark, 1 lit, about
+};
+
+/// Nelder and Mead's simplex.
+Parameters lowest(const Likelihood& likelihood, const Parameters& start, const Parameters& step) {
+  constexpr int kSteps = 400;
+  struct Corner {
+    Parameters at;
+    double value;
+  };
+  std::array<Corner, kParameters + 1> corners;
+  for (int i = 0; i <= kParameters; ++i) {
+    Parameters at = start;
+    if (i > 0) at[i - 1] += step[i - 1];
+    corners[static_cast<std::size_t>(i)] = {at, likelihood.minus_log(at)};
+  }
+  const auto by_value = [](const Corner& a, const Corner& b) { return a.value < b.value; };
+  for (int i = 0; i < kSteps; ++i) {
+    std::sort(corners.begin(), corners.end(), by_value);
+    if (corners.back().value - corners.front().value < 1e-5) break;
+    Parameters centre = Parameters::Zero();
+    for (int c = 0; c < kParameters; ++c) centre += corners[static_cast<std::size_t>(c)].at;
+    centre /= kParameters;
+    Corner& worst = corners.back();
+    const auto along = [&](double way) -> Corner {
+      const Parameters at = centre + way * (centre - worst.at);
+      return {at, likelihood.minus_log(at)};
+    };
+    Corner tried = along(1);
+    if (tried.value < corners.front().value) {
+      const Corner further = along(2);
+      if (further.value < tried.value) tried = further;
+    } else if (tried.value >= corners[kParameters - 1].value) {
+      tried = along(tried.value < worst.value ? 0.5 : -0.5);
+    }
+    if (tried.value < worst.value) {
+      worst = tried;
+      continue;
+    }
+    for (std::size_t c = 1; c < corners.size(); ++c) {
+      corners[c].at = 0.5 * (corners[c].at + corners[0].at);
+      corners[c].value = likelihood.minus_log(corners[c].at);
+    }
+  }
+  return std::min_element(corners.begin(), corners.end(), by_value)->at;
+}
+
+/// Inverse of the second derivatives, or nothing where they are not those of a minimum.
+bool covariance(const Likelihood& likelihood, const Parameters& at, const Parameters& step,
+                Eigen::Matrix<double, kParameters, kParameters>& result) {
+  Eigen::Matrix<double, kParameters, kParameters> curvature;
+  const auto value = [&](int i, double di, int j, double dj) {
+    Parameters p = at;
+    p[i] += di * step[i];
+    p[j] += dj * step[j];
+    return likelihood.minus_log(p);
+  };
+  for (int i = 0; i < kParameters; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      curvature(i, j) = curvature(j, i) =
+          (value(i, 1, j, 1) - value(i, 1, j, -1) - value(i, -1, j, 1) + value(i, -1, j, -1)) /
+          (4 * step[i] * step[j]);
+    }
+  }
+  result = curvature.inverse();
+  return result.allFinite() && result.diagonal().minCoeff() > 0;
+}
+
+/// Greatest likelihood, each picture's time integrated out: its delay normal about the latency, its
+/// brightness that of the light at that time, but for a few outliers (stale ones). `start` is where
+/// to look: latency to half a bit, jitter and exposure to a factor of two.
+GlobalShutter fit_global_shutter(const CameraTimingInput& input, const LightSignal& light,
+                                 const GlobalShutter& start) {
+  const Likelihood likelihood(input, light);
+  const Parameters wide(0.3 * input.bit, 0.5, 0.5, 0.03, 0.05);
+  Parameters best(start.latency.value, std::log(start.jitter.value), std::log(start.exposure.value),
+                  0, 1);
+  best = lowest(likelihood, best, wide);
+  best = lowest(likelihood, best, -0.3 * wide);  // from another side, where the first got stuck
+  GlobalShutter out;
+  out.latency.value = best[0];
+  out.jitter.value = std::exp(best[1]);
+  out.exposure.value = std::exp(best[2]);
+  Eigen::Matrix<double, kParameters, kParameters> spread;
+  const Parameters narrow(0.02 * input.bit, 0.05, 0.05, 0.005, 0.005);
+  if (covariance(likelihood, best, narrow, spread)) {
+    out.latency = {best[0], std::sqrt(spread(0, 0)), true};
+    out.jitter.sigma = out.jitter.value * std::sqrt(spread(1, 1));
+    out.exposure.sigma = out.exposure.value * std::sqrt(spread(2, 2));
+    // A logarithm that is this uncertain says "small".
+    constexpr double kVague = 0.5;
+    out.jitter.known = std::sqrt(spread(1, 1)) < kVague;
+    out.exposure.known = std::sqrt(spread(2, 2)) < kVague;
+  }
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    const Moments moments = likelihood.of(i, best);
+    out.times.push_back(moments.time);
+    out.sigmas.push_back(moments.sigma);
+    out.misses.push_back(moments.miss);
+    out.chances.push_back(moments.chance);
+    out.changes.push_back(likelihood.change(i));
+  }
+  return out;
+}
 
 /// Pictures of a global shutter tell their times only together.
 void measure_global_shutter(const CameraTimingInput& input, CameraTimingFit& fit,
@@ -274,24 +476,6 @@ void measure_global_shutter(const CameraTimingInput& input, CameraTimingFit& fit
   result.exposure = found.exposure;
   result.exposure.sigma = std::hypot(found.exposure.sigma, shape);
   result.readout = {0, kGlobalReadout * input.bit, true};
-}
-
-void count_frames(const CameraTimingInput& input, CameraTimingResult& result) {
-  result.frames = static_cast<int>(result.times.size());
-  std::set<std::int64_t> seen;
-  for (std::size_t i = 0; i < result.times.size(); ++i) {
-    const TimedFrame& frame = result.times[i];
-    result.stale += frame.freshness == Freshness::stale ? 1 : 0;
-    result.undecided += frame.freshness == Freshness::undecided ? 1 : 0;
-    result.strange += frame.freshness == Freshness::strange ? 1 : 0;
-    if (frame.freshness != Freshness::stale) seen.insert(frame.number);
-    if (i > 0) result.dropped_by_driver += static_cast<int>(input.frames[i].dropped);
-  }
-  if (!seen.empty()) {
-    result.missing = static_cast<int>(*seen.rbegin() - *seen.begin() + 1 -
-                                      static_cast<std::int64_t>(seen.size()));
-  }
-  result.elapsed = input.frames.back().stamp - input.frames.front().stamp;
 }
 
 }  // namespace

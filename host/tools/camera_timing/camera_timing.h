@@ -3,7 +3,7 @@
 // exposure, and frames that are stale or missing.
 //
 // Model: brightness of band b of picture i = dark_b + gain_b * mean of the light over the exposure
-// of the band's rows (light_signal.h). Dark and gain of each band, read-out and exposure of the
+// of the band's rows (row_profile.h). Dark and gain of each band, read-out and exposure of the
 // camera and the middle t_i of each exposure are fitted by least squares; a camera is taken to
 // answer in proportion to light.
 #pragma once
@@ -12,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include "host/tools/camera_timing/light_signal.h"
 #include "host/tools/camera_timing/row_profile.h"
 
 namespace tagwrench {

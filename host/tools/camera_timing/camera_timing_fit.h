@@ -6,9 +6,27 @@
 #include <vector>
 
 #include "host/tools/camera_timing/camera_timing.h"
-#include "host/tools/camera_timing/light_signal.h"
+#include "host/tools/camera_timing/row_profile.h"
 
 namespace tagwrench {
+
+/// Of a straight line through points, each with its weight.
+struct LineSums {
+  double n = 0, w = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+
+  void add(double at, double value, double weight = 1) noexcept {
+    n += 1;
+    w += weight;
+    x += weight * at;
+    y += weight * value;
+    xx += weight * at * at;
+    xy += weight * at * value;
+    yy += weight * value * value;
+  }
+  double spread() const noexcept { return w * xx - x * x; }
+  double slope() const noexcept { return (w * xy - x * y) / spread(); }
+  double offset() const noexcept { return (y - slope() * x) / w; }
+};
 
 /// What is alike in all pictures. Times in s.
 struct CameraTimes {

@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "host/core/config_error.h"
-#include "host/web/server/page_message.h"
+#include "host/web/server/request_guard.h"
 
 namespace tagwrench {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/core/types.h"
-#include "host/tools/camera_timing/screen_measurement.h"
+#include "host/tools/camera_timing/measurement.h"
 #include "host/web/server/web_server.h"
 
 namespace tagwrench {

@@ -87,7 +87,9 @@ void add_processing(const CameraTimingMeasurement& m, const CameraTimingSetting&
   }
 }
 
-nlohmann::json figure(const Figure& f) {
+/// Json: keys in alphabetical order or as written.
+template <typename Json = nlohmann::json>
+Json figure(const Figure& f) {
   if (!f.known) return nullptr;
   return {{"value", f.value}, {"sigma", f.sigma}};
 }
@@ -173,6 +175,41 @@ std::string report_json(const CameraTimingMeasurement& m, const CameraTimingSett
   json["exposure_set_us"] = m.exposure_set_us > 0 ? nlohmann::json(m.exposure_set_us) : nullptr;
   json["bit_s"] = m.bit;
   json["edge_sigma_s"] = m.edge_sigma;
+  return dump_json(json, 2) + "\n";
+}
+
+std::string report_text(const ScreenMeasurement& m, const std::string& camera,
+                        const std::string& screen, double announced_period) {
+  Lines lines;
+  lines.add("camera", camera);
+  lines.add("screen", screen);
+  lines.add("frame rate",
+            fmt::format("{:.3f} +/- {:.3f} Hz", m.frame_rate.value, m.frame_rate.sigma),
+            announced_period > 0
+                ? fmt::format("by the time stamps; announced {:.5g} Hz", 1 / announced_period)
+                : "by the time stamps; none announced");
+  lines.add("latency",
+            fmt::format("{:.1f} +/- {:.1f} ms", 1e3 * m.latency.value, 1e3 * m.latency.sigma),
+            "screen and camera together, to the kernel's time stamp");
+  lines.add("round trip", fmt::format("{:.1f} ms", 1e3 * m.round_trip),
+            "mean, from a flip to the arrival of the picture that shows it");
+  lines.add("flips", fmt::format("{} seen, {} missed", m.flips, m.missed),
+            fmt::format("{:.0f} grey levels between black and white", m.contrast));
+  return lines.take();
+}
+
+std::string report_json(const ScreenMeasurement& m, const std::string& camera,
+                        const std::string& screen, double announced_period) {
+  nlohmann::ordered_json json;
+  json["format"] = "tagwrench-screen-1";
+  json["camera"] = camera;
+  json["screen"] = screen;
+  if (announced_period > 0) json["announced_hz"] = 1 / announced_period;
+  json["frame_rate_hz"] = figure<nlohmann::ordered_json>(m.frame_rate);
+  json["latency_s"] = figure<nlohmann::ordered_json>(m.latency);
+  json["round_trip_s"] = m.round_trip;
+  json["flips"] = {{"seen", m.flips}, {"missed", m.missed}};
+  json["contrast_counts"] = m.contrast;
   return dump_json(json, 2) + "\n";
 }
 

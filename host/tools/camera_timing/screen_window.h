@@ -1,7 +1,7 @@
 // A window that is black or white all over.
 #pragma once
 
-#include "host/tools/camera_timing/screen_measurement.h"
+#include "host/tools/camera_timing/measurement.h"
 
 struct SDL_Window;
 struct SDL_Renderer;

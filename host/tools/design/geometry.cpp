@@ -8,7 +8,7 @@
 
 #include "host/core/algebra/decompositions.h"
 #include "host/tools/design/design.h"
-#include "host/wrench/spring_model.h"
+#include "host/wrench/estimate.h"
 
 namespace tagwrench::hardware {
 namespace {

@@ -1,8 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <numbers>
+#include <utility>
 
 #include "host/core/config_error.h"
 #include "host/core/yaml/yaml_reader.h"
@@ -20,15 +23,16 @@ using hardware::TagLayout;
 constexpr double kMm = 1e-3;
 constexpr double kMax_mm = 1000;
 
-/// Zero is allowed; a part of a metre is not one of ours.
-double length(YamlReader& node, const char* key) { return kMm * node.within(key, 0, kMax_mm); }
-double present_length(YamlReader& node, const char* key) {
-  return kMm * node.within(key, 0.01, kMax_mm);
-}
+/// By their keys.
+using Lengths = std::initializer_list<std::pair<const char*, double&>>;
 
-CameraBoard load_camera(const std::string& path) {
-  YamlReader root = YamlReader::from_file(path);
-  CameraBoard out;
+/// Zero is allowed; a part of a metre is not one of ours.
+void lengths(YamlReader& node, Lengths rows, double least_mm = 0) {
+  for (const auto& [key, length] : rows) length = kMm * node.within(key, least_mm, kMax_mm);
+}
+void present_lengths(YamlReader& node, Lengths rows) { lengths(node, rows, 0.01); }
+
+void read_camera(YamlReader& root, CameraBoard& out) {
   out.name = root.text("name");
   out.about = root.text("about");
   out.body = static_cast<hardware::CameraBody>(root.one_of("body", {"board", "barrel"}));
@@ -45,17 +49,16 @@ CameraBoard load_camera(const std::string& path) {
     const std::vector<double> holes = root.numbers("hole_spacing_mm", 2);
     out.hole_spacing_x = kMm * holes[0];
     out.hole_spacing_y = kMm * holes[1];
-    out.hole = present_length(root, "hole_mm");
+    present_lengths(root, {{"hole_mm", out.hole}});
     if (!(out.hole_spacing_x > 0 && out.hole_spacing_x + out.hole < out.width &&
           out.hole_spacing_y > 0 && out.hole_spacing_y + out.hole < out.depth))
       root.fail("hole_spacing_mm", "the holes must lie inside size_mm");
   }
-  out.below = length(root, "below_mm");
-  out.plug_width = present_length(root, "plug_mm");
-  out.lens_diameter = present_length(root, "lens_diameter_mm");
-  out.lens_height = length(root, "lens_height_mm");
-  out.pupil_depth = length(root, "pupil_depth_mm");
-  out.nearest_focus = length(root, "nearest_focus_mm");
+  present_lengths(root, {{"plug_mm", out.plug_width}, {"lens_diameter_mm", out.lens_diameter}});
+  lengths(root, {{"below_mm", out.below},
+                 {"lens_height_mm", out.lens_height},
+                 {"pupil_depth_mm", out.pupil_depth},
+                 {"nearest_focus_mm", out.nearest_focus}});
   out.price = root.non_negative("price_usd");
   YamlReader image = root.child("image");
   out.image.width_px = image.integer("width", 64, 8192);
@@ -66,12 +69,9 @@ CameraBoard load_camera(const std::string& path) {
   out.image.mirrored = image.boolean_or("mirrored", false);
   out.frame_rate = image.within("fps", 1, 1000);
   image.finish();
-  root.finish();
-  return out;
 }
 
-hardware::TargetChoice read_target(YamlReader node) {
-  hardware::TargetChoice out;
+void read_target(YamlReader& node, hardware::TargetChoice& out) {
   out.family = node.text("family");
   const auto family = family_from_name(out.family);
   if (!family)
@@ -80,33 +80,27 @@ hardware::TargetChoice read_target(YamlReader node) {
                                     out.family));
   out.layout = static_cast<TagLayout>(node.one_of("layout", {"roof", "slope", "mirror"}));
   const std::size_t count = out.layout == TagLayout::slope ? 1 : 2;
-  const std::vector<double> ids = node.numbers("ids", count);
   out.ids.clear();
-  for (const double id : ids) {
+  for (const double id : node.numbers("ids", count)) {
     if (id != std::floor(id) || id < 0 || id >= id_count(*family))
       node.fail("ids", fmt::format("{} is not an id of {}; it has 0 to {}", id, out.family,
                                    id_count(*family) - 1));
     out.ids.push_back(static_cast<int>(id));
   }
   if (count == 2 && out.ids[0] == out.ids[1]) node.fail("ids", "must differ");
-  out.tag_size = present_length(node, "tag_size_mm");
-  out.border = length(node, "border_mm");
+  present_lengths(node, {{"tag_size_mm", out.tag_size}, {"lens_distance_mm", out.lens_distance}});
+  lengths(node, {{"border_mm", out.border}, {"ridge_gap_mm", out.ridge_gap}});
   out.angle = node.within("angle_deg", 0, 70) * std::numbers::pi / 180;
-  out.ridge_gap = length(node, "ridge_gap_mm");
-  out.lens_distance = present_length(node, "lens_distance_mm");
-  node.finish();
-  return out;
 }
 
-hardware::SpringChoice read_springs(YamlReader node) {
-  hardware::SpringChoice out;
-  out.free_length = present_length(node, "free_length_mm");
-  out.outer_diameter = present_length(node, "outer_diameter_mm");
-  out.wire = present_length(node, "wire_mm");
+void read_springs(YamlReader& node, hardware::SpringChoice& out) {
+  present_lengths(node, {{"free_length_mm", out.free_length},
+                         {"outer_diameter_mm", out.outer_diameter},
+                         {"wire_mm", out.wire}});
   if (2 * out.wire >= out.outer_diameter)
     node.fail("wire_mm", "leaves no hole in a spring of outer_diameter_mm; check both");
   out.axial = node.within("axial_n_per_mm", 1e-3, 1e4) / kMm;
-  out.socket = length(node, "socket_mm");
+  lengths(node, {{"socket_mm", out.socket}});
   if (2 * out.socket >= out.free_length)
     node.fail("socket_mm", "two sockets take the whole of free_length_mm; make them shallower");
   const double helix =
@@ -121,100 +115,68 @@ hardware::SpringChoice read_springs(YamlReader node) {
   out.spacing_x = kMm * spacing[0];
   out.spacing_y = kMm * spacing[1];
   out.price = node.non_negative("price_usd");
-  node.finish();
-  return out;
 }
 
-hardware::Stops read_stops(YamlReader node) {
-  hardware::Stops out;
-  out.x = present_length(node, "x_mm");
-  out.y = present_length(node, "y_mm");
-  out.z = present_length(node, "z_mm");
-  out.gap = length(node, "gap_mm");
-  out.screw = present_length(node, "screw_mm");
-  out.thread_hole = present_length(node, "thread_hole_mm");
-  out.grip = present_length(node, "grip_mm");
-  node.finish();
-  return out;
+void read_stops(YamlReader& node, hardware::Stops& out) {
+  present_lengths(node, {{"x_mm", out.x},
+                         {"y_mm", out.y},
+                         {"z_mm", out.z},
+                         {"screw_mm", out.screw},
+                         {"thread_hole_mm", out.thread_hole},
+                         {"grip_mm", out.grip}});
+  lengths(node, {{"gap_mm", out.gap}});
 }
 
-hardware::Printing read_printing(YamlReader node) {
-  hardware::Printing out;
+void read_printing(YamlReader& node, hardware::Printing& out) {
   out.nozzle = kMm * node.within("nozzle_mm", 0.1, 2);
   out.layer = kMm * node.within("layer_mm", 0.05, 1);
-  out.wall = length(node, "wall_mm");
-  out.clearance = length(node, "clearance_mm");
-  node.finish();
-  return out;
+  lengths(node, {{"wall_mm", out.wall}, {"clearance_mm", out.clearance}});
 }
 
-hardware::Top read_top(YamlReader node) {
-  hardware::Top out;
+void read_top(YamlReader& node, hardware::Top& out) {
   out.knob = node.one_of("shape", {"box", "knob"}) == 1;
   out.walls = node.integer("walls", 3, 4);
   if (out.knob && out.walls != 4) node.fail("walls", "a knob is closed all around; give 4");
-  out.plate = present_length(node, "plate_mm");
-  out.roof = present_length(node, "roof_mm");
-  if (out.knob) out.knob_diameter = present_length(node, "knob_mm");
-  out.screw = present_length(node, "screw_mm");
-  out.thread_hole = present_length(node, "thread_hole_mm");
-  node.finish();
-  return out;
+  if (out.knob) present_lengths(node, {{"knob_mm", out.knob_diameter}});
+  present_lengths(node, {{"plate_mm", out.plate},
+                         {"roof_mm", out.roof},
+                         {"screw_mm", out.screw},
+                         {"thread_hole_mm", out.thread_hole}});
 }
 
-hardware::Cover read_cover(YamlReader node) {
-  hardware::Cover out;
+void read_cover(YamlReader& node, hardware::Cover& out) {
   const std::vector<double> x = node.numbers("x_mm", 2);
   if (!(x[0] < 0 && x[1] > 0 && x[0] > -kMax_mm && x[1] < kMax_mm))
     node.fail("x_mm", "give where the upper block begins and ends, below and above 0");
   out.x_from = kMm * x[0];
   out.x_to = kMm * x[1];
-  out.y_half = 0.5 * present_length(node, "y_mm");
-  out.ledge = length(node, "ledge_mm");
-  out.thread_hole = present_length(node, "thread_hole_mm");
-  out.wall = length(node, "wall_mm");
-  node.finish();
-  return out;
+  present_lengths(node, {{"y_mm", out.y_half}, {"thread_hole_mm", out.thread_hole}});
+  out.y_half *= 0.5;
+  lengths(node, {{"ledge_mm", out.ledge}, {"wall_mm", out.wall}});
 }
 
-hardware::Mount read_mount(YamlReader node) {
-  hardware::Mount out;
+void read_mount(YamlReader& node, hardware::Mount& out) {
   out.puck = node.one_of("shape", {"ears", "puck"}) == 1;
-  out.thickness = present_length(node, "thickness_mm");
-  out.width = present_length(node, "width_mm");
-  out.hole = length(node, "hole_mm");
-  if (out.puck) {
-    out.bay_height = present_length(node, "bay_height_mm");
-    out.weight = 1e-3 * node.within("weight_g", 0, 10'000);
-  }
-  node.finish();
-  return out;
+  present_lengths(node, {{"thickness_mm", out.thickness}, {"width_mm", out.width}});
+  lengths(node, {{"hole_mm", out.hole}});
+  if (!out.puck) return;
+  present_lengths(node, {{"bay_height_mm", out.bay_height}});
+  out.weight = 1e-3 * node.within("weight_g", 0, 10'000);
 }
 
-hardware::Light read_light(YamlReader node) {
-  hardware::Light out;
-  out.width = present_length(node, "seat_mm");
-  out.height = present_length(node, "height_mm");
+void read_light(YamlReader& node, hardware::Light& out) {
+  present_lengths(node, {{"seat_mm", out.width}, {"height_mm", out.height}});
   const std::vector<double> at = node.numbers("position_mm", 2);
   out.x = kMm * at[0];
   out.y = kMm * at[1];
-  out.diffuser = length(node, "diffuser_mm");
-  node.finish();
-  return out;
+  lengths(node, {{"diffuser_mm", out.diffuser}});
 }
 
-hardware::Moving read_moving(YamlReader node) {
-  hardware::Moving out;
+void read_moving(YamlReader& node, hardware::Moving& out) {
   out.mass = 1e-3 * node.within("mass_g", 0.1, 10'000);
-  const std::vector<double> centre = node.numbers("centre_mm", 3);
-  const std::vector<double> inertia = node.numbers("inertia_g_mm2", 3);
-  for (int i = 0; i < 3; ++i) {
-    out.centre[i] = kMm * centre[static_cast<std::size_t>(i)];
-    out.inertia[i] = 1e-9 * inertia[static_cast<std::size_t>(i)];
-    if (!(out.inertia[i] > 0)) node.fail("inertia_g_mm2", "must be above 0");
-  }
-  node.finish();
-  return out;
+  out.centre = kMm * Eigen::Vector3d::Map(node.numbers("centre_mm", 3).data());
+  out.inertia = 1e-9 * Eigen::Vector3d::Map(node.numbers("inertia_g_mm2", 3).data());
+  if (!(out.inertia.minCoeff() > 0)) node.fail("inertia_g_mm2", "must be above 0");
 }
 
 }  // namespace
@@ -227,19 +189,26 @@ Parameters load_hardware(const std::string& path) {
   const std::string camera = root.text("camera");
   if (camera.empty() || camera.find('/') != std::string::npos)
     root.fail("camera", fmt::format("'{}' is not the name of a file in ../cameras", camera));
-  out.camera = load_camera(
+  YamlReader camera_file = YamlReader::from_file(
       (std::filesystem::path(path).parent_path() / ".." / "cameras" / (camera + ".yaml"))
           .lexically_normal()
           .string());
-  out.target = read_target(root.child("target"));
-  out.springs = read_springs(root.child("springs"));
-  out.stops = read_stops(root.child("stops"));
-  out.printing = read_printing(root.child("print"));
-  out.top = read_top(root.child("top"));
-  out.cover = read_cover(root.child("cover"));
-  out.mount = read_mount(root.child("mount"));
-  out.light = read_light(root.child("light"));
-  out.moving = read_moving(root.child("moving"));
+  read_camera(camera_file, out.camera);
+  camera_file.finish();
+  const auto section = [&root](const char* key, auto read, auto& into) {
+    YamlReader node = root.child(key);
+    read(node, into);
+    node.finish();
+  };
+  section("target", read_target, out.target);
+  section("springs", read_springs, out.springs);
+  section("stops", read_stops, out.stops);
+  section("print", read_printing, out.printing);
+  section("top", read_top, out.top);
+  section("cover", read_cover, out.cover);
+  section("mount", read_mount, out.mount);
+  section("light", read_light, out.light);
+  section("moving", read_moving, out.moving);
   root.finish();
   return out;
 }
@@ -313,12 +282,11 @@ sim::Scenario scenario_of(const Parameters& p) {
 
 sim::Scenario runnable_scenario_of(const Parameters& p) {
   sim::Scenario out = scenario_of(p);
-  const hardware::Geometry g = hardware::geometry(p);
-  std::vector<sim::TagPlacement> direct;
-  for (std::size_t i = 0; i < g.tags.size(); ++i) {
-    if (!g.tags[i].in_mirror) direct.push_back(out.target.tags[i]);
-  }
-  out.target.tags = direct;
+  std::erase_if(out.target.tags, [g = hardware::geometry(p)](const sim::TagPlacement& placed) {
+    return std::ranges::any_of(g.tags, [&](const hardware::TagPlace& tag) {
+      return tag.in_mirror && tag.id == placed.id;
+    });
+  });
   return out;
 }
 

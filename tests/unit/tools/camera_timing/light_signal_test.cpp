@@ -1,10 +1,10 @@
-#include "host/tools/camera_timing/light_signal.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
+
+#include "host/tools/camera_timing/row_profile.h"
 
 namespace tagwrench {
 namespace {
