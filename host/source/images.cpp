@@ -15,7 +15,7 @@
 #include <unordered_map>
 
 #include "host/core/config_error.h"
-#include "host/source/raw_decoder.h"
+#include "host/source/decode.h"
 
 namespace tagwrench {
 namespace {

@@ -19,8 +19,6 @@ class JpegLuma {
   ~JpegLuma();
   JpegLuma(JpegLuma&&) noexcept;
   JpegLuma& operator=(JpegLuma&&) noexcept;
-  JpegLuma(const JpegLuma&) = delete;
-  JpegLuma& operator=(const JpegLuma&) = delete;
 
   /// Decodes `region` (within the picture, not empty) into `luma`: `height` packed rows of `width`
   /// bytes, of which only the region's are written, and up to 31 columns on its left, for transform

@@ -9,8 +9,8 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/recording/reader.h"
+#include "host/source/decode.h"
 #include "host/source/frame_source.h"
-#include "host/source/raw_decoder.h"
 
 namespace tagwrench {
 

@@ -5,8 +5,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <string_view>
+
+#include "host/core/os/uninterrupted.h"
 
 namespace tagwrench {
 namespace {
@@ -44,11 +45,7 @@ constexpr std::array<Control, 14> kControls = {{
 constexpr std::int64_t kExposureUnit_us = 100;  ///< of V4L2_CID_EXPOSURE_ABSOLUTE
 
 bool control_ioctl(int fd, unsigned long request, void* argument) {
-  int result = 0;
-  do {
-    result = ::ioctl(fd, request, argument);
-  } while (result < 0 && errno == EINTR);
-  return result == 0;
+  return uninterrupted([&] { return ::ioctl(fd, request, argument); }) == 0;
 }
 
 std::int32_t within(const ControlRange& range, std::int64_t value) {

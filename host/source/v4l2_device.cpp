@@ -6,16 +6,20 @@
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <optional>
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
 #include "host/source/v4l2_controls.h"
-#include "host/source/v4l2_nodes.h"
 
 namespace tagwrench {
 namespace {
@@ -27,11 +31,15 @@ constexpr int kMaxSide = 16384;
 constexpr double kDefaultFps = 30;
 
 int device_ioctl(int fd, unsigned long request, void* argument) noexcept {
-  int result = 0;
-  do {
-    result = ::ioctl(fd, request, argument);
-  } while (result < 0 && errno == EINTR);
-  return result < 0 ? errno : 0;
+  return uninterrupted([&] { return ::ioctl(fd, request, argument); }) < 0 ? errno : 0;
+}
+
+v4l2_buffer mapped_buffer(unsigned index) {
+  v4l2_buffer buffer{};
+  buffer.index = index;
+  buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  buffer.memory = V4L2_MEMORY_MMAP;
+  return buffer;
 }
 
 template <std::size_t size>
@@ -71,6 +79,48 @@ int ask_capability(int fd, V4l2Capability& capability) {
   capability.driver = text_of(answer.driver);
   capability.captures = (caps & V4L2_CAP_VIDEO_CAPTURE) != 0 && (caps & V4L2_CAP_STREAMING) != 0;
   return 0;
+}
+
+namespace fs = std::filesystem;
+
+std::optional<int> number_after(std::string_view text, std::string_view prefix) {
+  if (!text.starts_with(prefix)) return std::nullopt;
+  text.remove_prefix(prefix.size());
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (text.empty() || error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+template <typename Visit>
+void for_each_entry(const fs::path& folder, Visit visit) {
+  std::error_code error;
+  fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error);
+  for (; !error && it != fs::directory_iterator(); it.increment(error)) visit(it->path());
+}
+
+CameraNode inspect(const std::string& path) {
+  CameraNode node;
+  node.path = path;
+  V4l2Capability capability;
+  node.error = query_capability(path, capability);
+  node.card = capability.card;
+  node.driver = capability.driver;
+  node.captures = capability.captures;
+  return node;
+}
+
+std::vector<std::string> node_paths() {
+  std::vector<int> numbers;
+  for_each_entry("/dev", [&](const fs::path& path) {
+    if (const auto number = number_after(path.filename().string(), "video")) {
+      numbers.push_back(*number);
+    }
+  });
+  std::sort(numbers.begin(), numbers.end());
+  std::vector<std::string> paths;
+  for (const int number : numbers) paths.push_back(fmt::format("/dev/video{}", number));
+  return paths;
 }
 
 }  // namespace
@@ -273,10 +323,7 @@ void V4l2Device::start() {
   }
   if (request.count < kMinBuffers) fail("get buffers", ENOMEM);
   for (unsigned i = 0; i < std::min(request.count, 2 * kBuffers); ++i) {
-    v4l2_buffer buffer{};
-    buffer.index = i;
-    buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    buffer.memory = V4L2_MEMORY_MMAP;
+    v4l2_buffer buffer = mapped_buffer(i);
     if (const int error = device_ioctl(fd_.get(), VIDIOC_QUERYBUF, &buffer)) {
       fail("get buffers", error);
     }
@@ -295,9 +342,7 @@ void V4l2Device::start() {
 }
 
 V4l2Device::Dequeue V4l2Device::dequeue(V4l2Buffer& out, int& error) noexcept {
-  v4l2_buffer buffer{};
-  buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  buffer.memory = V4L2_MEMORY_MMAP;
+  v4l2_buffer buffer = mapped_buffer(0);
   error = device_ioctl(fd_.get(), VIDIOC_DQBUF, &buffer);
   if (error == EAGAIN) return Dequeue::empty;
   if (error == 0 && buffer.index >= mappings_.size()) error = EPROTO;
@@ -317,10 +362,7 @@ V4l2Device::Dequeue V4l2Device::dequeue(V4l2Buffer& out, int& error) noexcept {
 }
 
 bool V4l2Device::requeue(unsigned index) noexcept {
-  v4l2_buffer buffer{};
-  buffer.index = index;
-  buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  buffer.memory = V4L2_MEMORY_MMAP;
+  v4l2_buffer buffer = mapped_buffer(index);
   return device_ioctl(fd_.get(), VIDIOC_QBUF, &buffer) == 0;
 }
 
@@ -332,6 +374,72 @@ bool V4l2Device::broken() const noexcept {
 std::string V4l2Device::lockable_controls() const {
   V4l2ControlPort port(fd_.get());
   return ControlLock::available(port);
+}
+
+std::vector<CameraNode> list_camera_nodes() {
+  std::vector<CameraNode> nodes;
+  for (const std::string& path : node_paths()) {
+    CameraNode node = inspect(path);
+    if (node.captures) {
+      try {
+        V4l2Device device(path);
+        node.modes = device.modes(640, 480);
+        node.controls = device.lockable_controls();
+      } catch (const ConfigError&) {
+        node.error = EBUSY;
+      }
+    }
+    nodes.push_back(std::move(node));
+  }
+  return nodes;
+}
+
+std::string capture_nodes_text() {
+  std::string text;
+  for (const std::string& path : node_paths()) {
+    const CameraNode node = inspect(path);
+    if (!node.captures) continue;
+    text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", path, node.card);
+  }
+  return text.empty() ? "no camera is connected" : "cameras here: " + text;
+}
+
+std::string stable_path(const std::string& path) {
+  std::error_code error;
+  const fs::path node = fs::canonical(path, error);
+  if (error) return path;
+  for (const char* folder : {"/dev/v4l/by-id", "/dev/v4l/by-path"}) {
+    if (path.starts_with(folder)) return path;
+  }
+  for (const char* folder : {"/dev/v4l/by-id", "/dev/v4l/by-path"}) {
+    std::string found;
+    for_each_entry(folder, [&](const fs::path& link) {
+      std::error_code broken;
+      if (fs::canonical(link, broken) == node && !broken) found = link.string();
+    });
+    if (!found.empty()) return found;
+  }
+  return path;
+}
+
+std::string holders_text(const std::string& path) {
+  std::error_code error;
+  const fs::path node = fs::canonical(path, error);
+  std::string text;
+  for_each_entry("/proc", [&](const fs::path& process) {
+    const auto pid = number_after(process.filename().string(), "");
+    if (!pid || *pid == ::getpid()) return;
+    bool holds = false;
+    for_each_entry(process / "fd", [&](const fs::path& link) {
+      std::error_code gone;
+      holds = holds || (fs::read_symlink(link, gone) == node && !gone);
+    });
+    if (!holds) return;
+    std::string name;
+    std::getline(std::ifstream(process / "comm"), name);
+    text += fmt::format("{}{} (pid {})", text.empty() ? "" : ", ", name, *pid);
+  });
+  return text;
 }
 
 }  // namespace tagwrench

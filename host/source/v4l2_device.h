@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "host/core/os/unique_fd.h"
-#include "host/source/v4l2_capture_queue.h"
 #include "host/source/v4l2_mode.h"
 
 namespace tagwrench {
@@ -32,6 +31,14 @@ struct V4l2Stream {
   Duration period{};  ///< between frames
 };
 
+/// What the driver wrote on a buffer, and when we took it.
+struct BufferStamp {
+  std::uint32_t sequence = 0;
+  TimePoint driver_time{};
+  bool monotonic = false;  ///< the driver does not deny that driver_time is CLOCK_MONOTONIC
+  TimePoint dequeued{};
+};
+
 struct V4l2Buffer {
   unsigned index = 0;
   std::span<const std::uint8_t> bytes;  ///< the whole mapping
@@ -48,8 +55,6 @@ class V4l2Device {
   /// exclusive_caps, asked while nobody feeds it, stops accepting feeders.)
   static std::unique_ptr<V4l2Device> reopen(const std::string& path);
   ~V4l2Device();
-  V4l2Device(const V4l2Device&) = delete;
-  V4l2Device& operator=(const V4l2Device&) = delete;
 
   /// The modes whose pixels are understood. Where the driver gives a range of sizes, the wanted
   /// size if it lies within, and both ends.
@@ -89,5 +94,31 @@ class V4l2Device {
   std::vector<std::span<std::uint8_t>> mappings_;
   bool streaming_ = false;
 };
+
+// Which camera nodes there are, what they are called and who holds them. For messages and the
+// doctor.
+
+struct CameraNode {
+  std::string path;  ///< /dev/videoN
+  int error = 0;     ///< errno of opening or asking it, 0 if it answered
+  std::string card;  ///< the camera's name
+  std::string driver;
+  bool captures = false;
+  std::vector<V4l2Mode> modes;  ///< understood ones; empty unless it captures
+  std::string controls;         ///< those that a run would lock, for people
+};
+
+/// Every /dev/videoN in order of N.
+std::vector<CameraNode> list_camera_nodes();
+
+/// "/dev/video0 (HD Webcam), /dev/video2 (...)", or a sentence that there is none.
+std::string capture_nodes_text();
+
+/// The link in /dev/v4l/by-id, else by-path, that leads to this node; else the path itself.
+std::string stable_path(const std::string& path);
+
+/// "ffmpeg (pid 41), obs (pid 7)": other processes that have the node open, as far as /proc shows
+/// them.
+std::string holders_text(const std::string& path);
 
 }  // namespace tagwrench

@@ -1,154 +1,292 @@
 #include "host/source/simulator/disturbances.h"
 
-#include <fmt/format.h>
-
-#include "host/source/simulator/fields.h"
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 
 namespace tagwrench::sim {
 namespace {
 
-constexpr int kMaxMarks = 100;
+constexpr double kTau = 2 * std::numbers::pi;
+constexpr double kSlowFade = 1.0;        // s; a slower change of light is a drift
+constexpr double kDark = 0.05;           // light factor
+constexpr int kRandomDirtPerTag = 3;     // different ones
+constexpr double kSecondEvent = 0.25;    // probability
+constexpr double kReachAcross_px = 800;  // the diagonal of an image 640 px wide
 
-Fields fields(Occurrence& w) {
-  return {
-      {"start_s", w.start, 0, 1e6}, {"length_s", w.length, 0, 1e6}, {"every_s", w.every, 0, 1e6}};
+DisturbanceKind kind_of(const Occluder&) { return DisturbanceKind::occluder; }
+DisturbanceKind kind_of(const Glare&) { return DisturbanceKind::glare; }
+DisturbanceKind kind_of(const Flicker&) { return DisturbanceKind::flicker; }
+DisturbanceKind kind_of(const TurningLight&) { return DisturbanceKind::turning_light; }
+DisturbanceKind kind_of(const FocusChange&) { return DisturbanceKind::focus; }
+DisturbanceKind kind_of(const LightChange& change) {
+  if (change.factor < kDark) return DisturbanceKind::darkness;
+  return change.fade >= kSlowFade ? DisturbanceKind::light_drift : DisturbanceKind::light_step;
 }
 
-Fields fields(Occluder& o) {
-  return {{"width_px", o.width_px, 0, 1e5},
-          {"softness_px", o.softness_px, 0, 1e4},
-          {"direction_rad", o.direction, -100, 100},
-          {"speed_px_per_s", o.speed_px_per_s, -1e6, 1e6},
-          {"aim_px", o.aim_px, -1e5, 1e5},
-          {"reflectance", o.reflectance, 0, 1},
-          {"texture", o.texture, 0, 1},
-          {"texture_wavelength_px", o.texture_wavelength_px, 1, 1e5}};
-}
-
-Fields fields(Glare& g) {
-  return {{"peak_counts", g.peak_counts, 0, 1e4}, {"sigma_px", g.sigma_px, 0.5, 1e5},
-          {"aim_px", g.aim_px, -1e5, 1e5},        {"wander_px", g.wander_px, 0, 1e5},
-          {"wander_hz", g.wander_hz, 0, 1e3},     {"fade_s", g.fade, 0, 1e6}};
-}
-
-Fields fields(LightChange& l) { return {{"factor", l.factor, 0, 100}, {"fade_s", l.fade, 0, 1e6}}; }
-
-Fields fields(Flicker& f) { return {{"depth", f.depth, 0, 1}, {"mains_hz", f.mains_hz, 0.1, 1e5}}; }
-
-Fields fields(TurningLight& t) {
-  return {{"depth", t.depth, 0, 1}, {"turn_s", t.turn, 1e-3, 1e6}, {"fade_s", t.fade, 0, 1e6}};
-}
-
-Fields fields(Dirt& d) {
-  return {{"size_mm", d.size, 1e-3, 100, kMilli}, {"reflectance", d.reflectance, 0, 1}};
-}
-
-Fields fields(FocusChange& f) {
-  return {{"shift_mm", f.shift, -1e3, 1e3, kMilli},
-          {"fade_s", f.fade, 0, 1e6},
-          {"hunt_hz", f.hunt_hz, 0, 1e3}};
-}
-
-Fields fields(LostFrames& l) { return {{"share", l.share, 0, 0.5}}; }
-
-Fields fields(RandomDisturbances& r) { return {{"every_s", r.every, 0.05, 1e6}}; }
-
-// What of a kind is no plain number.
-template <typename T>
-void read_rest(YamlSection&, T&) {}
-void read_rest(YamlSection& s, Occluder& o) { s.choice("shape", o.shape, {"band", "disc"}); }
-void read_rest(YamlSection& s, Dirt& d) {
-  d.tag = s.reader().integer_or("tag", 0, kMaxMarks, d.tag);
-  d.specks = s.reader().integer_or("specks", 0, kMaxMarks, d.specks);
-  d.scratches = s.reader().integer_or("scratches", 0, kMaxMarks, d.scratches);
+// The start of the turn that reaches into [from, to]; false if none does.
+bool turn_at(const Occurrence& when, double from, double to, double& begin) noexcept {
+  if (to < when.start) return false;
+  begin = when.start;
+  if (when.every > 0) begin += when.every * std::floor((to - when.start) / when.every);
+  return from < begin + when.length;
 }
 
 template <typename T>
-void read_list(YamlReader& reader, const char* key, std::vector<T>& list) {
-  if (!reader.has(key)) return;
-  for (const YamlReader& entry : reader.children(key)) {
-    YamlSection s(entry);
-    T& what = list.emplace_back();
-    read_fields(s, fields(what.when));
-    read_fields(s, fields(what));
-    read_rest(s, what);
-    s.finish();
+void add_going(const T& what, double begin, StaticVector<Going<T>>& into, Happening& h) noexcept {
+  into.push({what, begin});
+  h.kinds |= bit(kind_of(what));
+}
+
+template <typename T>
+void add_all(const std::vector<T>& list, double from, double to, StaticVector<Going<T>>& into,
+             Happening& h) noexcept {
+  double begin = 0;
+  for (const T& what : list) {
+    if (turn_at(what.when, from, to, begin)) add_going(what, begin, into, h);
   }
 }
 
-std::string count_outside(const char* list, const char* key, int value, int low, int high) {
-  double shown = value;
-  return outside(fmt::format("disturbances.{}", list), {{key, shown, double(low), double(high)}});
-}
-
+// 0 outside of the time of a disturbance, 1 inside, smooth in between.
 template <typename T>
-std::string rest_problem(const T&, int) {
-  return {};
-}
-std::string rest_problem(const Dirt& d, int tags) {
-  if (d.tag < 0 || d.tag >= tags)
-    return fmt::format("disturbances.dirt: tag counts target.tags from 0, so 0 to {}, not {}",
-                       tags - 1, d.tag);
-  const std::string found = count_outside("dirt", "specks", d.specks, 0, kMaxMarks);
-  return found.empty() ? count_outside("dirt", "scratches", d.scratches, 0, kMaxMarks) : found;
-}
-
-template <typename T>
-std::string list_problem(const char* name, std::vector<T> list, int tags) {
-  const std::string section = fmt::format("disturbances.{}", name);
-  for (T& what : list) {
-    std::string found = outside(section, fields(what.when));
-    if (found.empty() && what.when.every > 0 && what.when.every < what.when.length)
-      found = section + ": every_s must be 0 or at least length_s";
-    if (found.empty()) found = rest_problem(what, tags);
-    if (found.empty()) found = outside(section, fields(what));
-    if (!found.empty()) return found;
-  }
-  return {};
+double strength(const Going<T>& going, double time) noexcept {
+  const double inside = std::min(time - going.begin, going.end() - time);
+  if (inside < 0) return 0;
+  if (inside >= going.what.fade) return 1;
+  const double x = inside / going.what.fade;
+  return x * x * (3 - 2 * x);
 }
 
 }  // namespace
 
-std::string problem(const Disturbances& disturbances, int tags) {
-  Disturbances d = disturbances;
-  for (const std::string& text :
-       {list_problem("occluders", d.occluders, tags), list_problem("glare", d.glare, tags),
-        list_problem("light", d.light, tags), list_problem("flicker", d.flicker, tags),
-        list_problem("turning_light", d.turning_light, tags), list_problem("dirt", d.dirt, tags),
-        list_problem("focus", d.focus, tags),
-        outside("disturbances.lost_frames", fields(d.lost_frames)),
-        count_outside("lost_frames", "most_in_a_row", d.lost_frames.most_in_a_row, 1, kMaxMarks),
-        outside("disturbances.random", fields(d.random))}) {
-    if (!text.empty()) return text;
+DisturbancePlayer::DisturbancePlayer(const Disturbances& disturbances, std::uint64_t seed,
+                                     int width_px, int tags)
+    : all_(disturbances),
+      seed_(seed),
+      image_scale_(width_px / 640.0),
+      tags_(tags),
+      dirt_(disturbances.dirt) {
+  if (!std::isfinite(all_.random.start)) return;
+  Random random(seed_, kDirt);
+  for (int i = 0; i < tags * kRandomDirtPerTag; ++i) {
+    Dirt dirt;
+    dirt.tag = i / kRandomDirtPerTag;
+    dirt.specks = 1 + static_cast<int>(random.uniform(0, 6));
+    dirt.scratches = static_cast<int>(random.uniform(0, 3));
+    dirt.size = random.uniform(0.08e-3, 0.5e-3);
+    dirt.reflectance = random.uniform(0.1, 0.8);
+    dirt_.push_back(dirt);
   }
-  if (!(d.random.start >= 0)) {  // infinity is never
-    return "disturbances.random: start_s must not be negative";
-  }
-  return {};
 }
 
-void read_disturbances(YamlReader reader, Disturbances& d) {
-  read_list(reader, "occluders", d.occluders);
-  read_list(reader, "glare", d.glare);
-  read_list(reader, "light", d.light);
-  read_list(reader, "flicker", d.flicker);
-  read_list(reader, "turning_light", d.turning_light);
-  read_list(reader, "dirt", d.dirt);
-  read_list(reader, "focus", d.focus);
-  if (reader.has("lost_frames")) {
-    YamlSection s(reader.child("lost_frames"));
-    read_fields(s, fields(d.lost_frames));
-    d.lost_frames.most_in_a_row =
-        s.reader().integer_or("most_in_a_row", 1, kMaxMarks, d.lost_frames.most_in_a_row);
-    s.finish();
+Happening DisturbancePlayer::between(double from, double to) const noexcept {
+  Happening h;
+  add_all(all_.occluders, from, to, h.occluders, h);
+  add_all(all_.glare, from, to, h.glare, h);
+  add_all(all_.light, from, to, h.light, h);
+  add_all(all_.flicker, from, to, h.flicker, h);
+  add_all(all_.turning_light, from, to, h.turning_light, h);
+  add_all(all_.focus, from, to, h.focus, h);
+  double begin = 0;
+  for (std::size_t i = 0; i < all_.dirt.size(); ++i) {
+    if (!turn_at(all_.dirt[i].when, from, to, begin)) continue;
+    h.dirt.push({static_cast<std::size_t>(all_.dirt[i].tag), i});
+    h.kinds |= bit(DisturbanceKind::dirt);
   }
-  if (reader.has("random")) {
-    YamlSection s(reader.child("random"));
-    d.random.start = s.reader().number("start_s");
-    read_fields(s, fields(d.random));
-    s.finish();
+  if (to >= all_.random.start) {
+    // Nothing reaches over the end of a period, so the one at `to` is all that can be there.
+    const auto period = static_cast<std::uint64_t>((to - all_.random.start) / all_.random.every);
+    add_random(period, from, to, h);
   }
-  reader.finish();
+  return h;
+}
+
+void DisturbancePlayer::add_random(std::uint64_t period, double from, double to,
+                                   Happening& h) const noexcept {
+  Random random = Random::numbered(seed_, kDisturbances, period);
+  const double start = all_.random.start + static_cast<double>(period) * all_.random.every;
+  const int next = Random::shuffled(seed_, kDisturbanceOrder, period, kEvents.size());
+  add_one(kEvents[static_cast<std::size_t>(next)], random, start, from, to, h);
+  if (random.uniform() >= kSecondEvent) return;
+  const double any = random.uniform(0, kEvents.size());
+  add_one(kEvents[static_cast<std::size_t>(any)], random, start, from, to, h);
+}
+
+void DisturbancePlayer::add_one(Event event, Random& random, double period_start, double from,
+                                double to, Happening& h) const noexcept {
+  const double begin = period_start + all_.random.every * random.uniform(0, 0.25);
+  Occurrence when;
+  when.length = all_.random.every * random.uniform(0.1, 0.5);
+  // Numbers of its own: what comes after it stays the same whether or not it is on.
+  Random own(random.next());
+  if (to < begin || from >= begin + when.length) return;
+  const auto add = [&](auto what, auto& into) {
+    what.when = when;
+    add_going(what, begin, into, h);
+  };
+  const bool coin = own.uniform() < 0.5;
+  switch (event) {
+    case Event::hair:
+    case Event::cable:
+    case Event::fingertip:
+    case Event::hand:
+      add(random_occluder(event, own, when.length), h.occluders);
+      break;
+    case Event::glare:
+      add(random_glare(own), h.glare);
+      break;
+    case Event::light_step:  // down, or up to clipping
+      add(LightChange{when, coin ? own.uniform(0.25, 0.85) : own.uniform(1.15, 2.0),
+                      own.uniform() < 0.5 ? 0.0 : 0.2},
+          h.light);
+      break;
+    case Event::darkness:
+      add(LightChange{when, 0.0, coin ? 0.0 : 0.15}, h.light);
+      break;
+    case Event::flicker:
+      add(Flicker{when, own.uniform(0.03, 0.35), coin ? 50.0 : 60.0}, h.flicker);
+      break;
+    case Event::turning_light:
+      add(TurningLight{when, own.uniform(0.1, 0.5), own.uniform(0.5, 4.0), 0.1}, h.turning_light);
+      break;
+    case Event::dirt: {
+      const int tag = static_cast<int>(own.uniform(0, tags_));
+      const int face =
+          tag * kRandomDirtPerTag + static_cast<int>(own.uniform(0, kRandomDirtPerTag));
+      h.dirt.push(
+          {static_cast<std::size_t>(tag), all_.dirt.size() + static_cast<std::size_t>(face)});
+      h.kinds |= bit(DisturbanceKind::dirt);
+      break;
+    }
+    case Event::focus:
+      add(FocusChange{when, coin ? own.uniform(1e-3, 9e-3) : own.uniform(-9e-3, -1e-3), 0.1,
+                      own.uniform() < 0.3 ? own.uniform(1, 4) : 0.0},
+          h.focus);
+      break;
+  }
+}
+
+Occluder DisturbancePlayer::random_occluder(Event event, Random& random,
+                                            double length) const noexcept {
+  Occluder o;
+  o.direction = random.uniform(0, kTau);
+  o.aim_px = image_scale_ * Eigen::Vector2d(random.uniform(-90, 90), random.uniform(-120, 120));
+  o.reflectance = random.uniform(0.02, 0.9);
+  o.texture = random.uniform(0.0, 0.15);
+  o.texture_wavelength_px = image_scale_ * random.uniform(8, 60);
+  if (event == Event::hair) {  // falls onto the lens and lies, or creeps across
+    o.width_px = image_scale_ * random.uniform(2, 8);
+    o.softness_px = image_scale_ * random.uniform(1, 4);
+    o.speed_px_per_s = random.uniform() < 0.5 ? 0.0 : image_scale_ * random.uniform(20, 150);
+    return o;
+  }
+  if (event == Event::cable) {
+    o.width_px = image_scale_ * random.uniform(15, 70);
+    o.softness_px = image_scale_ * random.uniform(2, 12);
+  } else if (event == Event::fingertip) {
+    o.shape = OccluderShape::disc;
+    o.width_px = image_scale_ * random.uniform(60, 300);
+    o.softness_px = image_scale_ * random.uniform(3, 25);
+  } else {  // a hand over everything
+    o.width_px = image_scale_ * random.uniform(500, 1500);
+    o.softness_px = image_scale_ * random.uniform(5, 40);
+  }
+  // It comes from outside of the view and leaves it.
+  const double across = image_scale_ * kReachAcross_px + o.width_px;
+  o.speed_px_per_s = across / length * random.uniform(1.0, 1.5);
+  return o;
+}
+
+Glare DisturbancePlayer::random_glare(Random& random) const noexcept {
+  Glare g;
+  g.peak_counts = random.uniform(60, 800);
+  g.sigma_px = image_scale_ * random.uniform(6, 70);
+  g.aim_px = image_scale_ * Eigen::Vector2d(random.uniform(-90, 90), random.uniform(-120, 120));
+  g.wander_px = image_scale_ * random.uniform(0, 80);
+  g.wander_hz = random.uniform(0.2, 3);
+  g.fade = random.uniform() < 0.3 ? 0.0 : random.uniform(0.02, 0.2);
+  return g;
+}
+
+bool DisturbancePlayer::frame_lost(std::uint64_t sequence) const noexcept {
+  const LostFrames& lost = all_.lost_frames;
+  if (lost.share <= 0) return false;
+  const auto reach = static_cast<std::uint64_t>(lost.most_in_a_row);
+  for (std::uint64_t back = 0; back < reach && back <= sequence; ++back) {
+    Random random = Random::numbered(seed_, kLostFrames, sequence - back);
+    if (random.uniform() >= lost.share) continue;
+    if (1 + std::floor(random.uniform(0, lost.most_in_a_row)) > static_cast<double>(back))
+      return true;
+  }
+  return false;
+}
+
+Eigen::Vector2d place(const Going<Occluder>& occluder, double time) noexcept {
+  const Occluder& o = occluder.what;
+  const double since_middle = time - occluder.begin - 0.5 * o.when.length;
+  const double way = o.speed_px_per_s * since_middle;
+  return o.aim_px + way * Eigen::Vector2d(std::cos(o.direction), std::sin(o.direction));
+}
+
+double half_edge_px(const Occluder& occluder, double exposure) noexcept {
+  return 0.5 * (occluder.softness_px + std::abs(occluder.speed_px_per_s) * exposure) + 1e-3;
+}
+
+double covered(const Going<Occluder>& occluder, const Eigen::Vector2d& pixel, double time,
+               double exposure) noexcept {
+  const Occluder& o = occluder.what;
+  if (time < occluder.begin || time >= occluder.end()) return 0;
+  const Eigen::Vector2d off = pixel - place(occluder, time);
+  const double from_middle =
+      o.shape == OccluderShape::disc
+          ? off.norm()
+          : std::abs(off.x() * std::cos(o.direction) + off.y() * std::sin(o.direction));
+  const double outside = from_middle - 0.5 * o.width_px;
+  return std::clamp(0.5 - 0.5 * outside / half_edge_px(o, exposure), 0.0, 1.0);
+}
+
+Spot spot(const Going<Glare>& glare, double time) noexcept {
+  const Glare& g = glare.what;
+  const double turned = kTau * g.wander_hz * (time - glare.begin);
+  return {g.aim_px + g.wander_px * Eigen::Vector2d(std::sin(0.73 * turned), std::sin(turned + 1)),
+          g.peak_counts * strength(glare, time)};
+}
+
+double light_factor(const Happening& happening, double time, double exposure) noexcept {
+  double factor = 1;
+  for (const auto& change : happening.light) {
+    factor *= 1 + (change.what.factor - 1) * strength(change, time);
+  }
+  for (const auto& lamp : happening.flicker) {
+    if (time < lamp.begin || time >= lamp.end()) continue;
+    // The mean of a sine over a window T is the sine times sin(pi f T) / (pi f T).
+    const double frequency = 2 * lamp.what.mains_hz;
+    const double half_turn = 0.5 * kTau * frequency * exposure;
+    const double kept = half_turn > 1e-9 ? std::sin(half_turn) / half_turn : 1.0;
+    factor *= 1 + lamp.what.depth * kept * std::sin(kTau * frequency * time);
+  }
+  return factor;
+}
+
+Eigen::Vector2d light_gradient(const Happening& happening, double time) noexcept {
+  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+  for (const auto& light : happening.turning_light) {
+    const double angle = kTau * (time - light.begin) / light.what.turn;
+    gradient += light.what.depth * strength(light, time) *
+                Eigen::Vector2d(std::cos(angle), std::sin(angle));
+  }
+  // Several together do not make the light negative in a corner.
+  return gradient / std::max(1.0, gradient.norm());
+}
+
+double focus_shift(const Happening& happening, double time) noexcept {
+  double shift = 0;
+  for (const auto& focus : happening.focus) {
+    const double swing =
+        focus.what.hunt_hz > 0 ? std::sin(kTau * focus.what.hunt_hz * (time - focus.begin)) : 1.0;
+    shift += focus.what.shift * strength(focus, time) * swing;
+  }
+  return shift;
 }
 
 }  // namespace tagwrench::sim

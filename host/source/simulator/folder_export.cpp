@@ -6,12 +6,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -24,6 +24,7 @@ namespace tagwrench::sim {
 namespace {
 
 constexpr int kDefaultJpegQuality = 95;
+constexpr std::array<const char*, 3> kEndings{".png", ".pgm", ".jpg"};  // in FileFormat's order
 
 /// Room for the largest grey JPEG of this size.
 std::vector<std::uint8_t> room_for_jpeg(int width, int height) {
@@ -43,73 +44,25 @@ unsigned long encode_jpeg(tjhandle encoder, const std::uint8_t* pixels, int widt
   return failed != 0 ? 0 : size;
 }
 
-std::vector<std::uint8_t> jpeg_file(const std::uint8_t* pixels, int width, int height,
-                                    int quality) {
-  std::vector<std::uint8_t> file = room_for_jpeg(width, height);
-  const std::unique_ptr<void, int (*)(void*)> encoder(tjInitCompress(), tjDestroy);
-  file.resize(encode_jpeg(encoder.get(), pixels, width, height, quality, file));
-  if (file.empty()) throw std::runtime_error(std::string("JPEG: ") + tjGetErrorStr2(encoder.get()));
-  return file;
-}
-
-std::vector<std::uint8_t> pgm_file(const std::uint8_t* pixels, int width, int height) {
+/// The picture as a file of the scenario's format.
+std::vector<std::uint8_t> encode_image(const ImageView& image, const Compression& compression) {
+  const auto [pixels, width, height, stride] = image;
+  if (compression.file == FileFormat::png) return encode_png(pixels, width, height);
+  if (compression.file == FileFormat::jpeg) {
+    std::vector<std::uint8_t> file = room_for_jpeg(width, height);
+    const std::unique_ptr<void, int (*)(void*)> encoder(tjInitCompress(), tjDestroy);
+    const int quality =
+        compression.jpeg_quality > 0 ? compression.jpeg_quality : kDefaultJpegQuality;
+    file.resize(encode_jpeg(encoder.get(), pixels, width, height, quality, file));
+    if (file.empty())
+      throw std::runtime_error(std::string("JPEG: ") + tjGetErrorStr2(encoder.get()));
+    return file;
+  }
   const std::string header = fmt::format("P5\n{} {}\n255\n", width, height);
   std::vector<std::uint8_t> file(header.begin(), header.end());
-  file.insert(file.end(), pixels,
-              pixels + static_cast<std::ptrdiff_t>(width) * static_cast<std::ptrdiff_t>(height));
+  file.insert(file.end(), pixels, pixels + static_cast<std::ptrdiff_t>(width) * height);
   return file;
 }
-
-}  // namespace
-
-const char* extension(FileFormat format) {
-  switch (format) {
-    case FileFormat::png:
-      return ".png";
-    case FileFormat::pgm:
-      return ".pgm";
-    case FileFormat::jpeg:
-      return ".jpg";
-  }
-  return "";
-}
-
-std::vector<std::uint8_t> encode_image(const std::uint8_t* pixels, int width, int height,
-                                       FileFormat format, int jpeg_quality) {
-  switch (format) {
-    case FileFormat::png:
-      return encode_png(pixels, width, height);
-    case FileFormat::pgm:
-      return pgm_file(pixels, width, height);
-    case FileFormat::jpeg:
-      return jpeg_file(pixels, width, height,
-                       jpeg_quality > 0 ? jpeg_quality : kDefaultJpegQuality);
-  }
-  return {};
-}
-
-JpegRoundTrip::JpegRoundTrip(int width, int height, int quality)
-    : width_(width),
-      height_(height),
-      quality_(quality),
-      encoder_(quality > 0 ? tjInitCompress() : nullptr, tjDestroy),
-      decoder_(quality > 0 ? tjInitDecompress() : nullptr, tjDestroy) {
-  if (quality <= 0) return;
-  if (!encoder_ || !decoder_) throw std::runtime_error("JPEG: out of memory");
-  encoded_ = room_for_jpeg(width, height);
-}
-
-void JpegRoundTrip::apply(std::uint8_t* pixels) noexcept {
-  if (quality_ <= 0) return;
-  const unsigned long size =
-      encode_jpeg(encoder_.get(), pixels, width_, height_, quality_, encoded_);
-  // Out of memory: the picture stays as it was.
-  if (size == 0) return;
-  tjDecompress2(decoder_.get(), encoded_.data(), size, pixels, width_, width_, height_, TJPF_GRAY,
-                TJFLAG_ACCURATEDCT);
-}
-
-namespace {
 
 namespace fs = std::filesystem;
 
@@ -139,9 +92,8 @@ bool is_frame_name(const fs::path& name) {
   const std::string stem = name.stem().string();
   const std::string ending = name.extension().string();
   return stem.size() == 6 &&
-         std::all_of(stem.begin(), stem.end(),
-                     [](unsigned char c) { return std::isdigit(c) != 0; }) &&
-         (ending == ".png" || ending == ".pgm" || ending == ".jpg");
+         std::ranges::all_of(stem, [](unsigned char c) { return std::isdigit(c) != 0; }) &&
+         std::ranges::find(kEndings, ending) != kEndings.end();
 }
 
 bool is_ours(const fs::path& name) {
@@ -199,9 +151,9 @@ void write_all(const Scenario& scenario, const fs::path& partial, int frames) {
   for (int i = 0; i < frames; ++i) {
     Frame frame;
     source.read(frame);
-    const std::string name = fmt::format("{:06}{}", i, extension(scenario.compression.file));
-    const auto bytes = encode_image(frame.image.pixels, frame.image.width, frame.image.height,
-                                    scenario.compression.file, scenario.compression.jpeg_quality);
+    const std::string name =
+        fmt::format("{:06}{}", i, kEndings[static_cast<std::size_t>(scenario.compression.file)]);
+    const auto bytes = encode_image(frame.image, scenario.compression);
     write_file(partial / name, bytes.data(), bytes.size());
     times += fmt::format("{},{}\n", name, frame.capture_time.time_since_epoch().count());
     truths += truth_row(source.truth());
@@ -230,35 +182,49 @@ std::string list(const double* values, std::size_t count, double scale) {
 
 }  // namespace
 
+JpegRoundTrip::JpegRoundTrip(int width, int height, int quality)
+    : width_(width),
+      height_(height),
+      quality_(quality),
+      encoder_(quality > 0 ? tjInitCompress() : nullptr, tjDestroy),
+      decoder_(quality > 0 ? tjInitDecompress() : nullptr, tjDestroy) {
+  if (quality <= 0) return;
+  if (!encoder_ || !decoder_) throw std::runtime_error("JPEG: out of memory");
+  encoded_ = room_for_jpeg(width, height);
+}
+
+void JpegRoundTrip::apply(std::uint8_t* pixels) noexcept {
+  if (quality_ <= 0) return;
+  const unsigned long size =
+      encode_jpeg(encoder_.get(), pixels, width_, height_, quality_, encoded_);
+  // Out of memory: the picture stays as it was.
+  if (size == 0) return;
+  tjDecompress2(decoder_.get(), encoded_.data(), size, pixels, width_, width_, height_, TJPF_GRAY,
+                TJFLAG_ACCURATEDCT);
+}
+
 std::string sensor_yaml(const Scenario& s) {
   const Camera& c = s.camera;
-  std::string text = "# The simulated sensor as its owner knows it.\n";
-  text += fmt::format(
-      "camera:\n  width: {}\n  height: {}\n  fx: {:.10g}\n  fy: {:.10g}\n  cx: {:.10g}\n  cy: "
-      "{:.10g}\n",
-      c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px);
-  text += fmt::format("  distortion: {}\n  mirrored: {}\n", list(c.distortion.data(), 5, 1),
-                      c.mirrored);
-  text +=
-      fmt::format("target:\n  family: {}\n  tag_size_mm: {:.10g}\n  border_mm: {:.10g}\n  tags:\n",
-                  s.target.family, s.target.tag_size * 1e3, s.target.border * 1e3);
-  for (const TagPlacement& tag : s.target.tags) text += fmt::format("    - {{id: {}}}\n", tag.id);
-  const int rest_frames =
-      std::clamp(static_cast<int>(0.8 * s.trajectory.rest_time * s.camera.frame_rate), 1, 25);
-  text += fmt::format("rest:\n  frames: {}\n", rest_frames);
-  text += "wrench:\n  springs:\n    centres_mm:\n";
-  const Eigen::Matrix<double, 4, 3, Eigen::RowMajor> centres = spring_centres(s.mechanics);
+  const Mechanics& m = s.mechanics;
+  std::string tags, centres;
+  for (const TagPlacement& tag : s.target.tags) tags += fmt::format("    - {{id: {}}}\n", tag.id);
+  const Eigen::Matrix<double, 4, 3, Eigen::RowMajor> places = spring_centres(m);
   for (int i = 0; i < 4; ++i)
-    text += fmt::format("      - {}\n", list(centres.data() + 3 * i, 3, 1e3));
-  text += fmt::format(
-      "    axial_n_per_mm: {:.10g}\n    lateral_n_per_mm: {:.10g}\n    bending_nm_per_rad: "
-      "{:.10g}\n"
-      "    torsion_nm_per_rad: {:.10g}\n",
-      s.mechanics.axial_stiffness * 1e-3, s.mechanics.lateral_stiffness * 1e-3,
-      s.mechanics.bending_stiffness, s.mechanics.torsion_stiffness);
-  text += fmt::format("  range_n: {}\n  range_nm: {}\n", list(s.mechanics.range.data(), 3, 1),
-                      list(s.mechanics.range.data() + 3, 3, 1));
-  return text;
+    centres += fmt::format("      - {}\n", list(places.data() + 3 * i, 3, 1e3));
+  return fmt::format(
+      "# The simulated sensor as its owner knows it.\n"
+      "camera:\n  width: {}\n  height: {}\n  fx: {:.10g}\n  fy: {:.10g}\n  cx: {:.10g}\n"
+      "  cy: {:.10g}\n  distortion: {}\n  mirrored: {}\n"
+      "target:\n  family: {}\n  tag_size_mm: {:.10g}\n  border_mm: {:.10g}\n  tags:\n{}"
+      "rest:\n  frames: {}\n"
+      "wrench:\n  springs:\n    centres_mm:\n{}    axial_n_per_mm: {:.10g}\n"
+      "    lateral_n_per_mm: {:.10g}\n    bending_nm_per_rad: {:.10g}\n"
+      "    torsion_nm_per_rad: {:.10g}\n  range_n: {}\n  range_nm: {}\n",
+      c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, list(c.distortion.data(), 5, 1),
+      c.mirrored, s.target.family, s.target.tag_size * 1e3, s.target.border * 1e3, tags,
+      std::clamp(static_cast<int>(0.8 * s.trajectory.rest_time * c.frame_rate), 1, 25), centres,
+      m.axial_stiffness * 1e-3, m.lateral_stiffness * 1e-3, m.bending_stiffness,
+      m.torsion_stiffness, list(m.range.data(), 3, 1), list(m.range.data() + 3, 3, 1));
 }
 
 void export_folder(const Scenario& scenario, const fs::path& dir, int frames) {

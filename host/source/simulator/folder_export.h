@@ -12,16 +12,6 @@
 
 namespace tagwrench::sim {
 
-// Pictures as files, and what JPEG does to them.
-
-/// The name's ending, dot included.
-const char* extension(FileFormat format);
-
-/// Grey levels, row by row, no padding; of a JPEG the quality is 1 to 100 (0: 95). Throws
-/// std::runtime_error if the picture cannot be encoded.
-std::vector<std::uint8_t> encode_image(const std::uint8_t* pixels, int width, int height,
-                                       FileFormat format, int jpeg_quality);
-
 /// Encodes and decodes a picture in place, as a camera with JPEG output and its driver do. Quality
 /// 0 does nothing. Throws std::runtime_error if memory is short.
 class JpegRoundTrip {

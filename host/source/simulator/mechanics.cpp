@@ -84,9 +84,8 @@ PlatformMotion::PlatformMotion(const Mechanics& mechanics, const TrajectoryPlaye
       player_(player),
       applied_(load),
       stiffness_(stiffness(mechanics)),
-      inertia_(inertia(mechanics)),
       damping_(damping(mechanics)),
-      inverse_inertia_(inverse(inertia_)),
+      inverse_inertia_(inverse(inertia(mechanics))),
       ring_(static_cast<std::size_t>(std::ceil(memory / kStep)) + 4),
       start_time_(start_time),
       load_(load_at(start_time, Vector6::Zero())),
@@ -199,11 +198,6 @@ Vector6 PlatformMotion::seen(double time) const noexcept {
 
 Vector6 PlatformMotion::applied_wrench(double time) const noexcept {
   return applied_ ? applied_->wrench(time, at(time).displacement) : player_.applied_wrench(time);
-}
-
-double PlatformMotion::energy(const State& state) const noexcept {
-  return 0.5 * state.rate.dot(inertia_ * state.rate) +
-         0.5 * state.displacement.dot(stiffness_ * state.displacement);
 }
 
 void PlatformMotion::set_state(const State& state) noexcept {

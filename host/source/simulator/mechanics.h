@@ -17,40 +17,6 @@
 
 namespace tagwrench::sim {
 
-// Someone outside the simulation who loads the platform, in place of the scenario's trajectory.
-
-/// Asked at `time` seconds of the source's simulation time, in the order of time but for the
-/// latest frame period: the integration runs ahead to the end of a frame's exposure, and the truth
-/// of the frame is asked for afterwards. The same question has the same answer every time.
-class AppliedLoad {
- public:
-  AppliedLoad() = default;
-  AppliedLoad(const AppliedLoad&) = delete;
-  AppliedLoad& operator=(const AppliedLoad&) = delete;
-  virtual ~AppliedLoad() = default;
-
-  /// N and N m about the platform origin at rest, camera axes. `displacement` is the platform's
-  /// just then (m, rad): what takes hold of a point moves with it. Asked several times a step of
-  /// the integration.
-  virtual Vector6 wrench(double time, const Vector6& displacement) noexcept = 0;
-
-  /// Gravity now less gravity at time 0, m/s^2, camera axes: the platform's own weight pulls
-  /// elsewhere when the sensor is held differently.
-  virtual Eigen::Vector3d gravity_change(double /*time*/) noexcept {
-    return Eigen::Vector3d::Zero();
-  }
-
-  /// By how much the platform seems displaced without any load (m, rad): the camera was knocked,
-  /// the mount grew warm.
-  virtual Vector6 rest_change(double /*time*/) noexcept { return Vector6::Zero(); }
-
-  /// By how much a tag (position in target.tags) has slipped in its own plane: m along its x and
-  /// y, rad about its z.
-  virtual Eigen::Vector3d slip(int /*tag*/, double /*time*/) noexcept {
-    return Eigen::Vector3d::Zero();
-  }
-};
-
 // The light of an LED outside of the simulation: of a board, real, emulated or played.
 
 class LedLight {
@@ -102,9 +68,6 @@ class PlatformMotion {
   /// What the user applies there.
   Vector6 applied_wrench(double time) const noexcept;
 
-  /// Kinetic plus elastic energy, J.
-  double energy(const State& state) const noexcept;
-
   void set_state(const State& state) noexcept;
   const Matrix6& stiffness_matrix() const noexcept { return stiffness_; }
 
@@ -118,7 +81,7 @@ class PlatformMotion {
   Mechanics mechanics_;
   TrajectoryPlayer player_;
   AppliedLoad* applied_;
-  Matrix6 stiffness_, inertia_, damping_, inverse_inertia_;
+  Matrix6 stiffness_, damping_, inverse_inertia_;
   std::vector<State> ring_;
   long long newest_ = 0;  ///< step number; its state is ring_[newest_ % size]
   long long oldest_ = 0;

@@ -10,12 +10,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/source/simulator/disturbance_player.h"
+#include "host/source/simulator/disturbances.h"
 #include "host/source/simulator/geometry.h"
 #include "host/source/simulator/mechanics.h"
+#include "host/source/simulator/prints.h"
 #include "host/source/simulator/random.h"
 #include "host/source/simulator/scenario.h"
-#include "host/source/simulator/texture.h"
 
 namespace tagwrench::sim {
 

@@ -4,36 +4,427 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
+#include <functional>
+#include <limits>
 #include <numbers>
 #include <set>
-#include <utility>
+#include <span>
+#include <string_view>
+#include <variant>
 
+#include "host/core/yaml/yaml_reader.h"
 #include "host/source/simulator/prints.h"
 
 namespace tagwrench::sim {
 namespace {
 
 constexpr double kRidgeGap = 0.15e-3;  // m, between a paper's edge and the ridge
+constexpr double kMilli = 1e-3;
+constexpr double kMicro = 1e-6;
+constexpr double kPercent = 1e-2;
+constexpr double kLeast = std::numeric_limits<double>::min();  // above 0
+constexpr double kMost = std::numeric_limits<double>::max();
+constexpr int kMaxMarks = 100;
+constexpr int kMaxOrders = 100'000;
 
-using Named = std::pair<const char*, double>;
+/// A setting by its key in scenario.yaml: where it is kept, and the limits of a number in the unit
+/// of the key.
+struct Field {
+  struct Choice {
+    std::vector<std::string_view> names;
+    std::function<void(std::size_t)> take;
+  };
 
-std::string not_positive(std::initializer_list<Named> values) {
-  for (const auto& [key, value] : values) {
-    if (!(value > 0) || !std::isfinite(value)) {
-      return std::string(key) + " must be a positive number";
+  Field(const char* name, double& value, double lowest, double highest, double its_unit = 1)
+      : key(name), setting(&value), low(lowest), high(highest), unit(its_unit) {}
+  template <typename Vector>
+  requires requires(Vector& list) { list.data(); }
+  Field(const char* name, Vector& list, double lowest, double highest, double its_unit = 1)
+      : key(name),
+        setting(std::span<double>(list.data(), static_cast<std::size_t>(list.size()))),
+        low(lowest),
+        high(highest),
+        unit(its_unit) {}
+  Field(const char* name, int& value, int lowest, int highest)
+      : key(name), setting(&value), low(lowest), high(highest) {}
+  Field(const char* name, bool& value) : key(name), setting(&value) {}
+  template <typename Enum>
+  Field(const char* name, Enum& value, std::vector<std::string_view> names)
+      : key(name), setting(Choice{std::move(names), [&value](std::size_t which) {
+                                    value = static_cast<Enum>(which);
+                                  }}) {}
+
+  const char* key;
+  std::variant<double*, std::span<double>, int*, bool*, Choice> setting;
+  double low = -kMost, high = kMost, unit = 1;
+};
+using Fields = std::vector<Field>;
+
+void read(YamlReader& reader, const Field& field) {
+  if (!reader.has(field.key)) return;
+  if (auto* number = std::get_if<double*>(&field.setting)) {
+    **number = field.unit * reader.number(field.key);
+  } else if (auto* list = std::get_if<std::span<double>>(&field.setting)) {
+    const std::vector<double> numbers = reader.numbers(field.key, list->size());
+    std::ranges::transform(numbers, list->begin(), [&](double v) { return field.unit * v; });
+  } else if (auto* whole = std::get_if<int*>(&field.setting)) {
+    **whole = reader.integer(field.key, static_cast<int>(field.low), static_cast<int>(field.high));
+  } else if (auto* flag = std::get_if<bool*>(&field.setting)) {
+    **flag = reader.boolean(field.key);
+  } else if (auto* choice = std::get_if<Field::Choice>(&field.setting)) {
+    choice->take(reader.one_of(field.key, choice->names));
+  }
+}
+
+/// The mapping at `key`, if it is there: its fields, and what `rest` reads beside them.
+template <typename Rest>
+void read_section(YamlReader& reader, const char* key, const Fields& fields, Rest rest) {
+  if (!reader.has(key)) return;
+  YamlReader section = reader.child(key);
+  for (const Field& field : fields) read(section, field);
+  rest(section);
+  section.finish();
+}
+
+/// The first value beyond its limits, as a message that begins with `prefix`; empty: none is.
+std::string outside(const std::string& prefix, const Fields& fields) {
+  for (const Field& field : fields) {
+    double one = 0;
+    std::span<const double> values(&one, 1);
+    if (auto* number = std::get_if<double*>(&field.setting)) {
+      one = **number;
+    } else if (auto* whole = std::get_if<int*>(&field.setting)) {
+      one = **whole;
+    } else if (auto* list = std::get_if<std::span<double>>(&field.setting)) {
+      values = *list;
+    } else {
+      continue;
+    }
+    for (const double value : values) {
+      const double shown = value / field.unit;
+      if (shown >= field.low && shown <= field.high) continue;
+      if (field.high == kMost) {
+        return fmt::format("{}{} must be a {} number", prefix, field.key,
+                           field.low > 0 ? "positive" : "finite");
+      }
+      return fmt::format("{}{} must lie between {:g} and {:g}, is {:g}", prefix, field.key,
+                         field.low, field.high, shown);
     }
   }
   return {};
 }
 
-std::string outside(std::initializer_list<Named> values, double low, double high) {
-  for (const auto& [key, value] : values) {
-    if (!(value >= low && value <= high)) {
-      return fmt::format("{} must lie between {:g} and {:g}, is {:g}", key, low, high, value);
+Fields fields(Mechanics& m) {
+  return {{"mass_g", m.mass, 0.01, 1e4, kMilli},
+          {"centre_of_mass_mm", m.centre_of_mass, -1e3, 1e3, kMilli},
+          {"inertia_g_mm2", m.principal_inertia, 1, 1e7, 1e-9},
+          {"damping_ratio", m.damping_ratio, 0, 1},
+          {"spring_half_spacing_x_mm", m.spring_half_spacing_x, 0.1, 1e3, kMilli},
+          {"spring_half_spacing_y_mm", m.spring_half_spacing_y, 0.1, 1e3, kMilli},
+          {"spring_length_mm", m.spring_length, 0.1, 1e3, kMilli},
+          {"spring_attachment_z_mm", m.spring_attachment_z, -1e3, 1e3, kMilli},
+          {"axial_n_per_mm", m.axial_stiffness, 1e-4, 1e3, 1 / kMilli},
+          {"lateral_n_per_mm", m.lateral_stiffness, 1e-4, 1e3, 1 / kMilli},
+          {"bending_nm_per_rad", m.bending_stiffness, 1e-6, 1e2},
+          {"torsion_nm_per_rad", m.torsion_stiffness, 1e-6, 1e2},
+          {"range", m.range, kLeast, 1e6},
+          {"creep_share", m.creep_share, 0, 1},
+          {"creep_s", m.creep_time, 0.1, 1e6},
+          {"friction", m.friction, 0, 1},
+          {"friction_travel", m.friction_travel, 1e-3, 1}};
+}
+
+Fields fields(Camera& c) {
+  return {{"width", c.width_px, 64, 4096},
+          {"height", c.height_px, 64, 4096},
+          {"fx", c.fx_px, 1, 1e5},
+          {"fy", c.fy_px, 1, 1e5},
+          {"cx", c.cx_px, -kMost, kMost},
+          {"cy", c.cy_px, -kMost, kMost},
+          {"distortion", c.distortion, -kMost, kMost},
+          {"fps", c.frame_rate, 0.1, 2000},
+          {"mirrored", c.mirrored}};
+}
+
+Fields fields(Optics& o) {
+  return {{"psf_sigma_px", o.psf_sigma_px, 0, 4},
+          {"focus_mm", o.focus_distance, kLeast, kMost, kMilli},
+          {"defocus_px_per_mm", o.defocus_px_per_m, 0, 100, 1 / kMilli},
+          {"vignetting", o.vignetting, 0, 1}};
+}
+
+Fields fields(Target& t) {
+  return {{"tag_size_mm", t.tag_size, 0.1, 1e3, kMilli},
+          {"border_mm", t.border, -kMost, kMost, kMilli},
+          {"position_error_mm", t.position_error, 0, 1, kMilli},
+          {"rotation_error_rad", t.rotation_error, 0, 0.5},
+          {"rest_position_mm", t.rest_position, -kMost, kMost, kMilli},
+          {"paper_reflectance", t.paper_reflectance, 0, 1},
+          {"ink_reflectance", t.ink_reflectance, 0, 1},
+          {"ink_spread_um", t.ink_spread, -kMost, kMost, kMicro},
+          {"ink_edge_roughness_um", t.ink_edge_roughness, 0, 1e3, kMicro},
+          {"ink_grain", t.ink_grain, 0, 0.5},
+          {"paper_raggedness_um", t.paper_raggedness, 0, 1e3, kMicro}};
+}
+
+Fields fields(Light& l) {
+  return {{"level_counts", l.level_counts, 0, 1e4},
+          {"unevenness", l.unevenness, 0, 1},
+          {"direction_rad", l.direction, -kMost, kMost},
+          {"ambient", l.ambient, 0, 1},
+          {"glare_counts", l.glare_counts, 0, 1e4},
+          {"led_level", l.led_level, 0.001, 1},
+          {"room", l.room, 0, 100}};
+}
+
+Fields fields(Trajectory& t) {
+  return {{"motion",
+           t.motion,
+           {"rest", "hold", "push", "steps", "sweep", "tap", "drop", "compound", "hard", "desk"}},
+          {"rest_s", t.rest_time, 0, 1e6},
+          {"amplitude", t.amplitude, -kMost, kMost},
+          {"axis", t.axis, std::vector<std::string_view>{"fx", "fy", "fz", "mx", "my", "mz"}},
+          {"share", t.share, -kMost, kMost},
+          {"hold_s", t.hold_time, 0, 1e6},
+          {"bandwidth_hz", t.bandwidth, kLeast, kMost},
+          {"sweep_from_hz", t.sweep_from, kLeast, kMost},
+          {"sweep_to_hz", t.sweep_to, kLeast, kMost},
+          {"sweep_s", t.sweep_time, kLeast, kMost},
+          {"event_s", t.event_time, kLeast, kMost}};
+}
+
+Fields fields(DeskSettings& d) {
+  return {{"length_s", d.length, 1, 1e5},
+          {"gesture_share", d.gesture_share, 0, 1},
+          {"wander", d.wander, 0, 1},
+          {"knock_m_per_s2", d.knock, 0, 1e3}};
+}
+
+Fields fields(Exposure& e) {
+  return {{"time_ms", e.time, 0, 1e9, kMilli},
+          {"rolling_readout_ms", e.rolling_readout, 0, 1e9, kMilli},
+          {"even", e.even}};
+}
+
+Fields fields(Delivery& d) {
+  return {{"latency_ms", d.latency, 0, 1e4, kMilli},
+          {"jitter_ms", d.jitter, -kMost, kMost, kMilli},
+          {"stale_share", d.stale_share, 0, 0.5},
+          {"true_fps", d.true_frame_rate, -kMost, kMost}};
+}
+
+Fields fields(Noise& n) {
+  return {{"read_counts", n.read_counts, 0, 1e4},
+          {"shot_counts_per_count", n.shot_counts_per_count, 0, 1e4}};
+}
+
+Fields fields(Compression& c) {
+  return {{"jpeg_quality", c.jpeg_quality, 0, 100}, {"file", c.file, {"png", "pgm", "jpeg"}}};
+}
+
+Fields fields(Occurrence& w) {
+  return {
+      {"start_s", w.start, 0, 1e6}, {"length_s", w.length, 0, 1e6}, {"every_s", w.every, 0, 1e6}};
+}
+
+Fields fields(Occluder& o) {
+  return {{"width_px", o.width_px, 0, 1e5},
+          {"softness_px", o.softness_px, 0, 1e4},
+          {"direction_rad", o.direction, -100, 100},
+          {"speed_px_per_s", o.speed_px_per_s, -1e6, 1e6},
+          {"aim_px", o.aim_px, -1e5, 1e5},
+          {"reflectance", o.reflectance, 0, 1},
+          {"texture", o.texture, 0, 1},
+          {"texture_wavelength_px", o.texture_wavelength_px, 1, 1e5},
+          {"shape", o.shape, std::vector<std::string_view>{"band", "disc"}}};
+}
+
+Fields fields(Glare& g) {
+  return {{"peak_counts", g.peak_counts, 0, 1e4}, {"sigma_px", g.sigma_px, 0.5, 1e5},
+          {"aim_px", g.aim_px, -1e5, 1e5},        {"wander_px", g.wander_px, 0, 1e5},
+          {"wander_hz", g.wander_hz, 0, 1e3},     {"fade_s", g.fade, 0, 1e6}};
+}
+
+Fields fields(LightChange& l) { return {{"factor", l.factor, 0, 100}, {"fade_s", l.fade, 0, 1e6}}; }
+
+Fields fields(Flicker& f) { return {{"depth", f.depth, 0, 1}, {"mains_hz", f.mains_hz, 0.1, 1e5}}; }
+
+Fields fields(TurningLight& t) {
+  return {{"depth", t.depth, 0, 1}, {"turn_s", t.turn, 1e-3, 1e6}, {"fade_s", t.fade, 0, 1e6}};
+}
+
+Fields fields(Dirt& d) {
+  return {{"tag", d.tag, 0, kMaxMarks},
+          {"specks", d.specks, 0, kMaxMarks},
+          {"scratches", d.scratches, 0, kMaxMarks},
+          {"size_mm", d.size, 1e-3, 100, kMilli},
+          {"reflectance", d.reflectance, 0, 1}};
+}
+
+Fields fields(FocusChange& f) {
+  return {{"shift_mm", f.shift, -1e3, 1e3, kMilli},
+          {"fade_s", f.fade, 0, 1e6},
+          {"hunt_hz", f.hunt_hz, 0, 1e3}};
+}
+
+Fields fields(LostFrames& l) {
+  return {{"share", l.share, 0, 0.5}, {"most_in_a_row", l.most_in_a_row, 1, kMaxMarks}};
+}
+
+Fields fields(RandomDisturbances& r) { return {{"every_s", r.every, 0.05, 1e6}}; }
+
+Fields fields(BenchErrors& e) {
+  return {{"mass_percent", e.mass, 0, 30, kPercent}, {"point_mm", e.point, 0, 10, kMilli},
+          {"contact_mm", e.contact, 0, 10, kMilli},  {"gravity_rad", e.gravity_rad, 0, 0.3},
+          {"lean_rad", e.lean_rad, 0, 0.3},          {"direction_rad", e.direction_rad, 0, 0.3},
+          {"sway_rad", e.sway_rad, 0, 0.3},          {"tremor", e.tremor, 0, 0.3},
+          {"string_mn", e.string, 0, 100, kMilli}};
+}
+
+Fields fields(BenchTimes& t) {
+  return {{"swing_rad", t.swing_rad, 0, 0.3},
+          {"reaction_s", t.reaction, 0.01, 60},
+          {"turn_s", t.turn, 0.01, 60},
+          {"load_s", t.load, 0.01, 60},
+          {"swing_decay_s", t.swing_decay, 0.01, 60},
+          {"string_mm", t.string_length, 1, 1e4, kMilli}};
+}
+
+Fields fields(BenchFaults& f) {
+  return {{"wrong_mass", f.wrong_mass, 0, kMaxOrders},
+          {"bump", f.bump, 0, kMaxOrders},
+          {"slip", f.slip, 0, kMaxOrders},
+          {"slip_tag", f.slip_tag, 0, kMaxOrders},
+          {"wrong_mass_factor", f.wrong_mass_factor, 0, 10},
+          {"bump_change", f.bump_change, -0.5, 0.5},
+          {"slip_change", f.slip_change, -0.5, 0.5},
+          {"drift_per_hour", f.drift_per_hour, -0.5, 0.5}};
+}
+
+/// An instrument's own, and what all of them have.
+Fields with_faults(Fields own, ReferenceFaults& f) {
+  const Fields common{{"silent_from_s", f.silent_from, -kNever, kNever},
+                      {"silent_to_s", f.silent_to, -kNever, kNever},
+                      {"wrong_sign", f.wrong_sign},
+                      {"clock_offset_s", f.clock_offset, -1e6, 1e6},
+                      {"clock_ppm", f.clock_ppm, -1e5, 1e5}};
+  own.insert(own.end(), common.begin(), common.end());
+  return own;
+}
+
+Fields fields(LoadCellSettings& c) {
+  return with_faults({{"ideal", c.ideal},
+                      {"rate_hz", c.rate, 1, 1000},
+                      {"noise_mn", c.noise, 0, 1e5, kMilli},
+                      {"counts_per_newton", c.counts_per_newton, 1, 1e9},
+                      {"lag_ms", c.lag, 0, 1000, kMilli},
+                      {"scale_error_percent", c.scale_error, 0, 30, kPercent},
+                      {"range_n", c.range, 1e-3, 1e6}},
+                     c.faults);
+}
+
+Fields fields(SixAxisSettings& x) {
+  return with_faults({{"ideal", x.ideal},
+                      {"counts_per_unit", x.counts_per_unit, 1e-3, 1e9},
+                      {"range", x.range, 1e-6, 1e6},
+                      {"rate_hz", x.rate, 0.1, 1000},
+                      {"filter_hz", x.filter_hz, 0.1, 1000},
+                      {"noise_counts", x.noise_counts, 0, 1e5},
+                      {"lag_ms", x.lag, 0, 1000, kMilli},
+                      {"origin_mm", x.origin, -1e3, 1e3, kMilli},
+                      {"place_error_mm", x.place_error, 0, 10, kMilli},
+                      {"turn_error_rad", x.turn_error, 0, 0.3}},
+                     x.faults);
+}
+
+Fields fields(BenchSettings& b) {
+  return {{"perfect", b.perfect}, {"gravity", b.gravity, 0.1, 100}};
+}
+
+struct Section {
+  const char* key;
+  Fields fields;
+};
+
+std::vector<Section> sections(Scenario& s) {
+  return {{"mechanics", fields(s.mechanics)},
+          {"camera", fields(s.camera)},
+          {"optics", fields(s.optics)},
+          {"target", fields(s.target)},
+          {"light", fields(s.light)},
+          {"trajectory", fields(s.trajectory)},
+          {"desk", fields(s.desk)},
+          {"exposure", fields(s.exposure)},
+          {"delivery", fields(s.delivery)},
+          {"noise", fields(s.noise)},
+          {"compression", fields(s.compression)}};
+}
+
+std::vector<Section> sections(BenchSettings& b) {
+  return {{"errors", fields(b.errors)},
+          {"times", fields(b.times)},
+          {"faults", fields(b.faults)},
+          {"load_cell", fields(b.load_cell)},
+          {"six_axis", fields(b.six_axis)}};
+}
+
+/// Each list of disturbances with its key.
+template <typename Visit>
+void for_each_list(Disturbances& d, Visit visit) {
+  visit("occluders", d.occluders);
+  visit("glare", d.glare);
+  visit("light", d.light);
+  visit("flicker", d.flicker);
+  visit("turning_light", d.turning_light);
+  visit("dirt", d.dirt);
+  visit("focus", d.focus);
+}
+
+// Without a placement, one tag lies on a slope through the origin and two on a roof.
+void read_tags(YamlReader& reader, Target& t) {
+  std::vector<TagPlacement> tags;
+  bool placed = false;
+  bool all_placed = true;
+  if (reader.has("tags")) {
+    for (YamlReader& entry : reader.children("tags")) {
+      TagPlacement& tag = tags.emplace_back();
+      tag.id = entry.integer("id", 0, 1'000'000);
+      const bool here = entry.has("position_mm");
+      placed = placed || here;
+      all_placed = all_placed && here;
+      read(entry, {"position_mm", tag.position, -kMost, kMost, kMilli});
+      read(entry, {"rotation_rad", tag.rotation, -kMost, kMost});
+      entry.finish();
     }
+  } else {
+    tags = t.tags;
   }
-  return {};
+  if (!placed && tags.size() <= 2) {
+    const auto roof = roof_placement(tags.front().id, tags.back().id, t.tag_size, t.border);
+    t.tags =
+        tags.size() == 2
+            ? roof
+            : std::vector<TagPlacement>{{tags[0].id, Eigen::Vector3d::Zero(), roof[0].rotation}};
+    return;
+  }
+  if (!all_placed)
+    reader.fail("tags", "position_mm is needed for every tag, or for none of one or two");
+  t.tags = tags;
+}
+
+void read_disturbances(YamlReader& reader, Disturbances& d) {
+  for_each_list(d, [&reader](const char* key, auto& list) {
+    if (!reader.has(key)) return;
+    for (YamlReader& entry : reader.children(key)) {
+      auto& what = list.emplace_back();
+      for (const Field& field : fields(what.when)) read(entry, field);
+      for (const Field& field : fields(what)) read(entry, field);
+      entry.finish();
+    }
+  });
+  read_section(reader, "lost_frames", fields(d.lost_frames), [](YamlReader&) {});
+  read_section(reader, "random", fields(d.random),
+               [&](YamlReader& section) { d.random.start = section.number("start_s"); });
 }
 
 std::string target_problem(const Target& t) {
@@ -64,29 +455,56 @@ std::string target_problem(const Target& t) {
   return {};
 }
 
-std::string delivery_problem(const Scenario& s) {
-  const Delivery& d = s.delivery;
-  std::string found = outside({{"delivery.latency_ms", d.latency * 1e3}}, 0, 1e4);
-  if (found.empty()) found = outside({{"delivery.stale_share", d.stale_share}}, 0, 0.5);
-  if (found.empty() && d.true_frame_rate != 0)
-    found = outside({{"delivery.true_fps", d.true_frame_rate}}, 0.1, 2000);
-  if (!found.empty()) return found;
+std::string delivery_problem(Scenario& s) {
+  Delivery& d = s.delivery;
+  if (d.true_frame_rate != 0) {
+    std::string found = outside("delivery.", {{"true_fps", d.true_frame_rate, 0.1, 2000}});
+    if (!found.empty()) return found;
+  }
   // Less than a tenth of the period: then stamps stay in order.
   const double most = std::min(d.latency, 0.1 * true_period(s));
-  if (!(d.jitter >= 0 && d.jitter <= most)) {
-    return fmt::format(
-        "delivery.jitter_ms must lie between 0 and the smaller of latency_ms and a tenth of the "
-        "frame period, {:g}, is {:g}",
-        most * 1e3, d.jitter * 1e3);
-  }
-  return {};
+  if (d.jitter >= 0 && d.jitter <= most) return {};
+  return fmt::format(
+      "delivery.jitter_ms must lie between 0 and the smaller of latency_ms and a tenth of the "
+      "frame period, {:g}, is {:g}",
+      most * 1e3, d.jitter * 1e3);
 }
 
-std::string first_of(std::initializer_list<std::string> problems) {
-  for (const std::string& text : problems) {
-    if (!text.empty()) return text;
+std::string disturbance_problem(Disturbances& d, int tags) {
+  std::string found;
+  for_each_list(d, [&](const char* key, auto& list) {
+    const std::string section = fmt::format("disturbances.{}: ", key);
+    for (auto& what : list) {
+      if (found.empty()) found = outside(section, fields(what.when));
+      if (found.empty() && what.when.every > 0 && what.when.every < what.when.length)
+        found = section + "every_s must be 0 or at least length_s";
+      if constexpr (requires { what.specks; }) {
+        if (found.empty() && (what.tag < 0 || what.tag >= tags))
+          found = fmt::format("{}tag counts target.tags from 0, so 0 to {}, not {}", section,
+                              tags - 1, what.tag);
+      }
+      if (found.empty()) found = outside(section, fields(what));
+    }
+  });
+  if (found.empty()) found = outside("disturbances.lost_frames: ", fields(d.lost_frames));
+  if (found.empty()) found = outside("disturbances.random: ", fields(d.random));
+  if (found.empty() && !(d.random.start >= 0))  // infinity is never
+    found = "disturbances.random: start_s must not be negative";
+  return found;
+}
+
+std::string bench_problem(BenchSettings& b, int tags) {
+  std::string found = outside("bench.", fields(b));
+  for (const auto& [key, fields] : sections(b))
+    if (found.empty()) found = outside(fmt::format("bench.{}: ", key), fields);
+  if (found.empty())
+    found = outside("bench.faults: ", {{"slip_tag", b.faults.slip_tag, 0, tags - 1}});
+  for (const auto& [key, faults] :
+       {std::pair{"load_cell", &b.load_cell.faults}, std::pair{"six_axis", &b.six_axis.faults}}) {
+    if (found.empty() && !(faults->silent_from <= faults->silent_to))
+      found = fmt::format("bench.{}: silent_to_s must not come before silent_from_s", key);
   }
-  return {};
+  return found;
 }
 
 }  // namespace
@@ -104,98 +522,41 @@ double true_period(const Scenario& s) {
   return 1 / (rate > 0 ? rate : s.camera.frame_rate);
 }
 
-std::string problem(const Scenario& s) {
-  const Mechanics& m = s.mechanics;
-  const Trajectory& j = s.trajectory;
-  if (s.camera.width_px < 64 || s.camera.width_px > 4096 || s.camera.height_px < 64 ||
-      s.camera.height_px > 4096) {
-    return "camera.width and height must lie between 64 and 4096";
+void read_scenario(YamlReader& root, Scenario& scenario) {
+  scenario.seed = static_cast<std::uint64_t>(root.integer_or("seed", 0, 2'147'483'647, 1));
+  for (const auto& [key, fields] : sections(scenario)) {
+    read_section(root, key, fields, [&, key = std::string_view(key)](YamlReader& section) {
+      if (key != "target") return;
+      scenario.target.family = section.text_or("family", scenario.target.family);
+      read_tags(section, scenario.target);
+    });
   }
-  if (j.axis < 0 || j.axis > 5) return "trajectory.axis: must be one of the six axes";
-  for (const double k : s.camera.distortion) {
-    if (!std::isfinite(k)) return "camera.distortion must be finite numbers";
-  }
+  read_section(root, "disturbances", {},
+               [&](YamlReader& section) { read_disturbances(section, scenario.disturbances); });
+  read_section(root, "bench", fields(scenario.bench), [&](YamlReader& bench) {
+    for (const auto& [key, fields] : sections(scenario.bench))
+      read_section(bench, key, fields, [](YamlReader&) {});
+  });
+}
+
+std::string problem(const Scenario& scenario) {
+  Scenario s = scenario;
+  const int tags = static_cast<int>(s.target.tags.size());
+  if (s.trajectory.axis < 0 || s.trajectory.axis > 5)
+    return "trajectory.axis: must be one of the six axes";
   for (std::size_t i = 0; i < 6; ++i) {
-    if (!(std::abs(j.amplitude[i]) <= (i < 3 ? 1e3 : 1e2))) {
+    if (!(std::abs(s.trajectory.amplitude[i]) <= (i < 3 ? 1e3 : 1e2)))
       return "trajectory.amplitude must lie within 1000 N and 100 N m";
-    }
-    if (!(m.range[i] > 0 && m.range[i] <= 1e6)) return "mechanics.range must be positive numbers";
   }
-  if (!(m.centre_of_mass.cwiseAbs().maxCoeff() <= 1)) {
-    return "mechanics.centre_of_mass_mm must lie within 1000 mm";
-  }
-  if (s.compression.jpeg_quality < 0 || s.compression.jpeg_quality > 100) {
-    return "compression.jpeg_quality must lie between 0 and 100";
-  }
-  const double window = s.exposure.time + s.exposure.rolling_readout;
-  std::string found = first_of(
-      {outside({{"mechanics.mass_g", m.mass * 1e3}}, 0.01, 1e4),
-       outside({{"mechanics.axial_n_per_mm", m.axial_stiffness * 1e-3},
-                {"mechanics.lateral_n_per_mm", m.lateral_stiffness * 1e-3}},
-               1e-4, 1e3),
-       outside({{"mechanics.bending_nm_per_rad", m.bending_stiffness},
-                {"mechanics.torsion_nm_per_rad", m.torsion_stiffness}},
-               1e-6, 1e2),
-       outside({{"mechanics.inertia_g_mm2", m.principal_inertia.minCoeff() * 1e9},
-                {"mechanics.inertia_g_mm2", m.principal_inertia.maxCoeff() * 1e9}},
-               1, 1e7),
-       outside({{"mechanics.spring_length_mm", m.spring_length * 1e3},
-                {"mechanics.spring_half_spacing_x_mm", m.spring_half_spacing_x * 1e3},
-                {"mechanics.spring_half_spacing_y_mm", m.spring_half_spacing_y * 1e3}},
-               0.1, 1e3),
-       outside({{"mechanics.spring_attachment_z_mm", m.spring_attachment_z * 1e3}}, -1e3, 1e3),
-       outside({{"camera.fx", s.camera.fx_px}, {"camera.fy", s.camera.fy_px}}, 1, 1e5),
-       outside({{"target.tag_size_mm", s.target.tag_size * 1e3}}, 0.1, 1e3),
-       not_positive({{"trajectory.bandwidth_hz", j.bandwidth},
-                     {"trajectory.sweep_from_hz", j.sweep_from},
-                     {"trajectory.sweep_to_hz", j.sweep_to},
-                     {"trajectory.sweep_s", j.sweep_time},
-                     {"trajectory.event_s", j.event_time},
-                     {"optics.focus_mm", s.optics.focus_distance}}),
-       outside({{"light.led_level", s.light.led_level}}, 0.001, 1),
-       outside({{"light.room", s.light.room}}, 0, 100),
-       outside({{"camera.fps", s.camera.frame_rate}}, 0.1, 2000),
-       delivery_problem(s),
-       outside({{"mechanics.damping_ratio", m.damping_ratio},
-                {"mechanics.creep_share", m.creep_share},
-                {"mechanics.friction", m.friction},
-                {"optics.vignetting", s.optics.vignetting},
-                {"light.unevenness", s.light.unevenness},
-                {"light.ambient", s.light.ambient},
-                {"target.paper_reflectance", s.target.paper_reflectance},
-                {"target.ink_reflectance", s.target.ink_reflectance}},
-               0, 1),
-       outside({{"optics.psf_sigma_px", s.optics.psf_sigma_px}}, 0, 4),
-       outside({{"optics.defocus_px_per_mm", s.optics.defocus_px_per_m}}, 0, 1e5),
-       outside({{"exposure.time_ms", s.exposure.time},
-                {"exposure.rolling_readout_ms", s.exposure.rolling_readout},
-                {"trajectory.rest_s", j.rest_time},
-                {"trajectory.hold_s", j.hold_time}},
-               0, 1e6),
-       outside({{"noise.read_counts", s.noise.read_counts},
-                {"noise.shot_counts_per_count", s.noise.shot_counts_per_count},
-                {"light.level_counts", s.light.level_counts},
-                {"light.glare_counts", s.light.glare_counts}},
-               0, 1e4),
-       outside({{"target.ink_edge_roughness_um", s.target.ink_edge_roughness},
-                {"target.paper_raggedness_um", s.target.paper_raggedness},
-                {"target.position_error_mm", s.target.position_error}},
-               0, 1e-3),
-       outside({{"target.ink_grain", s.target.ink_grain},
-                {"target.rotation_error_rad", s.target.rotation_error}},
-               0, 0.5),
-       target_problem(s.target),
-       outside({{"mechanics.creep_s", m.creep_time}}, 0.1, 1e6),
-       outside({{"mechanics.friction_travel", m.friction_travel}}, 1e-3, 1),
-       outside({{"desk.length_s", s.desk.length}}, 1, 1e5),
-       outside({{"desk.gesture_share", s.desk.gesture_share}, {"desk.wander", s.desk.wander}}, 0,
-               1),
-       outside({{"desk.knock_m_per_s2", s.desk.knock}}, 0, 1e3),
-       problem(s.disturbances, static_cast<int>(s.target.tags.size())),
-       problem(s.bench, static_cast<int>(s.target.tags.size()))});
-  if (found.empty() && window > true_period(s)) {
+  std::string found;
+  for (const auto& [key, fields] : sections(s))
+    if (found.empty()) found = outside(fmt::format("{}.", key), fields);
+  if (found.empty()) found = delivery_problem(s);
+  if (found.empty()) found = target_problem(s.target);
+  if (found.empty()) found = disturbance_problem(s.disturbances, tags);
+  if (found.empty()) found = bench_problem(s.bench, tags);
+  if (found.empty() && s.exposure.time + s.exposure.rolling_readout > true_period(s))
     found = "exposure: time and readout together are longer than a frame period of camera.fps";
-  }
   return found;
 }
 

@@ -13,15 +13,19 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
-#include "host/source/simulator/bench_settings.h"
-#include "host/source/simulator/disturbances.h"
+#include "host/core/types.h"
+
+namespace tagwrench {
+class YamlReader;
+}
 
 namespace tagwrench::sim {
 
-// How an hour at the desk goes (desk_use.h); used where trajectory.motion is `desk`.
+// How an hour at the desk goes (trajectory.h); used where trajectory.motion is `desk`.
 
 struct DeskSettings {
   double length = 3600;        ///< s, after the first rest; then nothing happens any more
@@ -144,7 +148,7 @@ enum class Motion : std::uint8_t {
   drop,
   compound,
   hard,  ///< all of them in an order, with a size and at times drawn from the seed
-  desk,  ///< somebody works with it (desk_use.h)
+  desk,  ///< somebody works with it (trajectory.h)
 };
 
 struct Trajectory {
@@ -195,6 +199,208 @@ struct Compression {
   FileFormat file = FileFormat::png;  ///< of exported frames
 };
 
+// What goes wrong in front of a real lens: things that pass before it, glare, light that changes,
+// dirt, lost focus, lost frames. All off by default; none of it changes the truth of the motion.
+//
+// Pixel lengths are pixels of the image as the lens makes it (before any mirroring), positions
+// count from its centre, x right and y down. Seconds count from the first frame.
+
+/// When a disturbance is there: from `start` for `length`, and again every `every`.
+struct Occurrence {
+  double start = 3.0;   ///< s
+  double length = 1.0;  ///< s
+  double every = 0.0;   ///< s; 0 = once
+};
+
+enum class OccluderShape : std::uint8_t {
+  band,  ///< straight edges across its way: a hair, a cable, a hand
+  disc,  ///< a fingertip
+};
+
+/// An opaque object near the lens. It moves along a straight line and is at `aim` in the middle of
+/// its time; at speed 0 it is there at once and lies still. Its edges are a linear ramp, widened by
+/// the way it goes during the exposure.
+struct Occluder {
+  Occurrence when;
+  OccluderShape shape = OccluderShape::band;
+  double width_px = 40;          ///< of the band; the disc's diameter
+  double softness_px = 3;        ///< width of the edge
+  double direction = 0;          ///< in which it moves, rad from x towards y
+  double speed_px_per_s = 0;     ///< along `direction`
+  Eigen::Vector2d aim_px{0, 0};  ///< of its middle
+  double reflectance = 0.3;      ///< it is lit as a plate that faces the camera
+  double texture = 0.05;         ///< largest deviation of its reflectance, both ways
+  double texture_wavelength_px = 25;
+};
+
+/// A specular spot, a Gaussian of light that wanders about `aim`.
+struct Glare {
+  Occurrence when;
+  double peak_counts = 400;  ///< grey levels added in its middle
+  double sigma_px = 30;
+  Eigen::Vector2d aim_px{0, 0};
+  double wander_px = 20;   ///< largest way from `aim` along x and along y
+  double wander_hz = 0.5;  ///< of the faster of the two sines that it wanders by
+  double fade = 0.05;      ///< s to come and to go
+};
+
+/// All light times `factor`: a step, a lens cap (factor 0) or, with a long fade, a drifting LED.
+struct LightChange {
+  Occurrence when;
+  double factor = 0.6;
+  double fade = 0.0;  ///< s to come and to go
+};
+
+/// Lamps on mains: light times 1 + depth sin(2 pi 2 mains_hz t), averaged over each row's exposure.
+/// A rolling readout shows bands, a global shutter a gain that changes from frame to frame.
+struct Flicker {
+  Occurrence when;
+  double depth = 0.1;      ///< 0..1
+  double mains_hz = 50.0;  ///< the light has twice this frequency
+};
+
+/// Light from the side that turns about the optical axis: times 1 + depth (off . direction(t)),
+/// with `off` the pixel's place from the image centre over half the image's diagonal.
+struct TurningLight {
+  Occurrence when;
+  double depth = 0.3;  ///< 0..1
+  double turn = 4.0;   ///< s for a full turn
+  double fade = 0.2;   ///< s to come and to go
+};
+
+/// Specks and scratches on one tag's paper: texture that nobody learned.
+struct Dirt {
+  Occurrence when;
+  int tag = 0;               ///< position in target.tags
+  int specks = 4;            ///< round, up to `size` across
+  int scratches = 1;         ///< straight, a sixth of `size` wide, up to half the tag long
+  double size = 0.25e-3;     ///< m
+  double reflectance = 0.4;  ///< of the dirt
+};
+
+/// The lens focuses elsewhere; the image's scale stays (a breathing lens would change it).
+struct FocusChange {
+  Occurrence when;
+  double shift = 4.0e-3;  ///< m, added to optics.focus_distance
+  double fade = 0.15;     ///< s to go there and back
+  double hunt_hz = 0.0;   ///< an autofocus in search: the shift swings as a sine; 0 = it stays
+};
+
+/// Frames that never arrive. Whether a frame is lost depends on the seed and its number alone.
+struct LostFrames {
+  double share = 0.0;     ///< probability that a gap begins at a frame, 0..0.5
+  int most_in_a_row = 1;  ///< gaps have 1 to this many frames, equally likely
+};
+
+/// Disturbances of every kind above but lost frames, drawn from the seed: one in each period of
+/// `every`, a second one beside it in a quarter of them. Each begins in the first quarter of its
+/// period and is over by three quarters, so that undisturbed time lies in between.
+struct RandomDisturbances {
+  double start = std::numeric_limits<double>::infinity();  ///< s; never
+  double every = 2.0;                                      ///< s
+};
+
+struct Disturbances {
+  std::vector<Occluder> occluders;
+  std::vector<Glare> glare;
+  std::vector<LightChange> light;
+  std::vector<Flicker> flicker;
+  std::vector<TurningLight> turning_light;
+  std::vector<Dirt> dirt;
+  std::vector<FocusChange> focus;
+  LostFrames lost_frames;
+  RandomDisturbances random;
+};
+
+// What is imperfect at the simulated bench: the person, the masses, the reference instruments.
+// Every error is drawn from the scenario's seed; a plan that states these numbers as its own
+// standard deviations is honest about this bench.
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+/// The person and the masses. All `_error` are standard deviations of seeded normal errors, cut at
+/// three of them.
+struct BenchErrors {
+  double mass = 0.002;          ///< relative; the same each time that the same mass is hung
+  double point = 0.2e-3;        ///< of each coordinate of a point, m; the same at each use of it
+  double contact = 0.1e-3;      ///< and anew at each use: where in its dimple the load sits, m
+  double gravity_rad = 0.0087;  ///< about each of the two axes that matter, anew at each mounting
+  double lean_rad = 0.003;      ///< of a string that rubs, about each of two axes, anew at each use
+  double string = 0.3e-3;       ///< weight of string and knot, N, anew at each use
+  double direction_rad = 0.0087;  ///< of a push, about each of two axes, anew at each push
+  double sway_rad = 0.004;        ///< of a push's direction while it lasts, about each of two axes
+  double tremor = 0.02;           ///< of a hand's force, relative, at 8 to 12 Hz
+};
+
+struct BenchTimes {
+  double reaction = 0.4;        ///< s until an order is begun
+  double turn = 1.0;            ///< s to mount the sensor another way
+  double load = 0.5;            ///< s to hang a mass or to take it off
+  double swing_rad = 0.06;      ///< of a mass that has just been let go
+  double swing_decay = 0.7;     ///< s after which it swings by a factor e less
+  double string_length = 0.12;  ///< m, which gives the swing's frequency
+};
+
+/// What goes wrong on purpose, once. Counted from 1; 0: never.
+struct BenchFaults {
+  int wrong_mass = 0;            ///< this mass, in the order in which they are hung, is another ...
+  double wrong_mass_factor = 2;  ///< ... by this factor
+  int bump = 0;                  ///< the sensor is knocked at the beginning of this order ...
+  Vector6 bump_change = (Vector6() << 20e-6, -15e-6, 30e-6, 1e-3, -5e-4, 4e-4)
+                            .finished();  ///< ... so that its rest is elsewhere, m and rad
+  int slip = 0;                           ///< a tag slips at the beginning of this order ...
+  int slip_tag = 0;                       ///< ... this one (position in target.tags) ...
+  Eigen::Vector3d slip_change{60e-6, 40e-6, 0.01};  ///< ... by this, in its plane: m, m, rad
+  Vector6 drift_per_hour = Vector6::Zero();         ///< of the rest, m and rad
+};
+
+/// What is wrong with a reference instrument.
+struct ReferenceFaults {
+  double silent_from = kNever;  ///< s
+  double silent_to = kNever;    ///< s
+  bool wrong_sign = false;      ///< wired the other way round
+  double clock_offset = 0;      ///< s added to its times
+  double clock_ppm = 0;         ///< its clock is fast by this
+};
+
+/// A load cell on an amplifier HX711 at 80 conversions a second.
+struct LoadCellSettings {
+  bool ideal = false;     ///< no noise, no steps, no lag, no error of scale, no saturation
+  double rate = 80;       ///< Hz
+  double noise = 0.5e-3;  ///< standard deviation of one conversion, N
+  double counts_per_newton = 2.0e5;  ///< whole counts
+  double lag = 0.010;                ///< s: a reading stamped t shows t - lag
+  double scale_error = 0.002;        ///< standard deviation of its calibration, relative; seeded
+  double range = 10;                 ///< N, either way; beyond it is saturated
+  ReferenceFaults faults;
+};
+
+/// A six-axis sensor under the simulated one, after OptoForce's HEX-58-RE-400N.
+struct SixAxisSettings {
+  bool ideal = false;  ///< no noise, no steps, no filter, no lag, no saturation, exactly in place
+  double rate = 100;   ///< Hz
+  std::array<double, 6> counts_per_unit{96.11,   95.64,   20.92,
+                                        5425.36, 5524.60, 8103.25};  ///< per N, per N m
+  double noise_counts = 1;  ///< standard deviation of a reading, before it becomes whole counts
+  double filter_hz = 15;    ///< of its first-order low pass
+  double lag = 0.040;       ///< s in all at low frequency, the filter's share of it included
+  std::array<double, 6> range{400, 400, 2000, 10, 10, 10};  ///< N, N m; beyond it is saturated
+  Eigen::Vector3d origin{0, 0, -0.051};  ///< where its torque counts from, platform frame, m
+  double place_error = 0.3e-3;  ///< standard deviation of each coordinate of the origin, m; seeded
+  double turn_error = 0.003;    ///< how it is turned about each axis, rad; seeded
+  ReferenceFaults faults;
+};
+
+struct BenchSettings {
+  bool perfect = false;      ///< no errors, no tremor, no swing, ideal references; faults stay
+  double gravity = 9.80665;  ///< m/s^2
+  BenchErrors errors;
+  BenchTimes times;
+  BenchFaults faults;
+  LoadCellSettings load_cell;
+  SixAxisSettings six_axis;
+};
+
 struct Scenario {
   std::uint64_t seed = 1;  ///< of placement errors, paper, ink, motion and noise
   Mechanics mechanics;
@@ -211,6 +417,10 @@ struct Scenario {
   DeskSettings desk;    ///< of use where trajectory.motion is `desk`
   BenchSettings bench;  ///< of use where someone calibrates the simulated sensor
 };
+
+/// Lays the sections of a scenario.yaml over `scenario`: its members by their names, with the unit
+/// of a key after it; all may be left out. Throws ConfigError with file, line and key.
+void read_scenario(YamlReader& root, Scenario& scenario);
 
 /// Time between the exposures of two frames, s.
 double true_period(const Scenario& scenario);

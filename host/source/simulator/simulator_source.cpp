@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
-#include "host/source/simulator/desk_use.h"
+#include "host/source/simulator/trajectory.h"
 
 namespace tagwrench {
 namespace {

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/source/raw_decoder.h"
+#include "host/source/decode.h"
 #include "tests/unit/source/jpeg_fixture.h"
 
 namespace tagwrench {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "host/core/png/png.h"
-#include "host/source/raw_decoder.h"
+#include "host/source/decode.h"
 
 namespace tagwrench {
 namespace {

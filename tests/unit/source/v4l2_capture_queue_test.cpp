@@ -1,6 +1,6 @@
-#include "host/source/v4l2_capture_queue.h"
-
 #include <gtest/gtest.h>
+
+#include "host/source/v4l2_source.h"
 
 namespace tagwrench {
 namespace {

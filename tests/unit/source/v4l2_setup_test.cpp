@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "host/source/v4l2_nodes.h"
+#include "host/source/v4l2_device.h"
 #include "host/source/v4l2_source.h"
 #include "tests/unit/source/message.h"
 

@@ -1,6 +1,4 @@
 // The simulated reference instruments: their times, lags, noise, steps, and what can be wrong.
-#include "host/source/simulator/bench_references.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -8,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "host/source/simulator/bench.h"
 #include "tests/unit/source/simulator/bench_rig.h"
 
 namespace tagwrench::sim {

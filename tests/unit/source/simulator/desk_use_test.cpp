@@ -1,6 +1,4 @@
 // The person at the simulated desk: a plan that can be counted against.
-#include "host/source/simulator/desk_use.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include "host/app/scenario_config.h"
 #include "host/core/config_error.h"
 #include "host/source/simulator/mechanics.h"
+#include "host/source/simulator/trajectory.h"
 
 namespace tagwrench::sim {
 namespace {

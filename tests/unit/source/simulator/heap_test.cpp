@@ -2,7 +2,7 @@
 
 #include <bit>
 
-#include "host/source/simulator/bench_references.h"
+#include "host/source/simulator/bench.h"
 #include "host/source/simulator/simulator_source.h"
 #include "tests/support/heap_count.h"
 
