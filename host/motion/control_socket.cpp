@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "host/core/config_error.h"
-#include "host/core/os/runtime_folder.h"
 #include "host/core/os/uninterrupted.h"
+#include "host/core/os/user_folders.h"
 
 namespace tagwrench {
 namespace {

@@ -4,15 +4,16 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 
 namespace tagwrench {
-
-class FocusSource;
 
 /// What is said of the focus.
 struct Focus {
@@ -24,48 +25,20 @@ struct Focus {
 
 class FocusWatch {
  public:
-  /// Of the desktop that $SWAYSOCK, $I3SOCK, the session's D-Bus or $DISPLAY lead to, the first
-  /// that answers; nothing if there is none.
-  static std::optional<FocusWatch> open();
+  FocusWatch() = default;
+  FocusWatch(const FocusWatch&) = delete;
+  FocusWatch& operator=(const FocusWatch&) = delete;
+  virtual ~FocusWatch() = default;
 
-  FocusWatch(FocusWatch&&) noexcept;
-  FocusWatch& operator=(FocusWatch&&) noexcept;
-  ~FocusWatch();
+  /// Of the desktop that $SWAYSOCK, $I3SOCK, the session's D-Bus or $DISPLAY lead to, the first
+  /// that answers; null if there is none.
+  static std::unique_ptr<FocusWatch> open();
 
   /// Readable when changed() has something to do.
-  int fd() const noexcept;
-  /// What is new since the last call; nothing: it is where it was.
-  std::optional<Focus> changed() noexcept;
-
- private:
-  explicit FocusWatch(std::unique_ptr<FocusSource> source);
-
-  std::unique_ptr<FocusSource> source_;
-};
-
-// Who tells the focus: one kind for each way that desktops have.
-
-class FocusSource {
- public:
-  FocusSource() = default;
-  FocusSource(const FocusSource&) = delete;
-  FocusSource& operator=(const FocusSource&) = delete;
-  virtual ~FocusSource() = default;
-
-  /// As FocusWatch has them.
   virtual int fd() const noexcept = 0;
+  /// What is new since the last call; nothing: it is where it was.
   virtual std::optional<Focus> changed() noexcept = 0;
 };
-
-/// Extended Window Manager Hints 1.5, _NET_ACTIVE_WINDOW; ICCCM 4.1.2.5, WM_CLASS. Null: no
-/// $DISPLAY, or nobody answers there.
-std::unique_ptr<FocusSource> focus_on_x11();
-/// i3's IPC, which sway has too (i3-ipc(7), sway-ipc(7)). Null: nobody listens at `path`.
-std::unique_ptr<FocusSource> focus_by_i3_ipc(const std::string& path);
-
-/// KDE's compositor on Wayland, by a script that it is given. Null: it does not run in this
-/// session.
-std::unique_ptr<FocusSource> focus_in_kwin();
 
 inline std::string lower_case(std::string_view text) {
   std::string lower(text);
@@ -73,5 +46,42 @@ inline std::string lower_case(std::string_view text) {
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return lower;
 }
+
+// i3's IPC as pure bytes, which sway speaks too (i3-ipc(7), sway-ipc(7)): "i3-ipc", the length and
+// the type of what follows in host byte order, then JSON.
+
+enum class I3Type : std::uint32_t {
+  subscribe = 2,
+  tree = 4,
+  window_event = 0x80000003U,
+};
+
+std::string i3_message(I3Type type, std::string_view payload);
+
+struct I3Message {
+  std::uint32_t type = 0;
+  std::string payload;
+};
+
+/// Bytes as they come, cut into messages. Of a message longer than kMax the payload is passed
+/// over and counts as empty.
+class I3Stream {
+ public:
+  static constexpr std::size_t kMax = 1 << 20;
+
+  /// False: this is not i3's IPC.
+  bool put(std::string_view bytes);
+  std::optional<I3Message> next();
+
+ private:
+  static constexpr std::size_t kHead = 14;
+
+  std::string bytes_;
+  std::size_t passed_over_ = 0;  ///< bytes still to come of a payload that is too long
+};
+
+/// The window with the focus, in the answer to `tree` or in a window's event. Nothing: the text
+/// does not say which one it is now.
+std::optional<Focus> focus_in(const I3Message& message);
 
 }  // namespace tagwrench

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/motion/shaping.h"
+#include "host/wrench/zero.h"
+
 namespace tagwrench {
 namespace {
 
@@ -31,22 +34,6 @@ double seconds(Duration time) { return std::chrono::duration<double>(time).count
 
 std::uint32_t bit(int button) {
   return button >= 0 && button < 32 ? std::uint32_t{1} << button : 0U;
-}
-
-/// Independent errors, along other axes.
-Vector6 turned_sigma(const Eigen::Matrix3d& rotation, const Vector6& sigma) {
-  const Eigen::Matrix3d weights = rotation.cwiseAbs2();
-  const Eigen::Vector3d force = weights * sigma.head<3>().cwiseAbs2();
-  const Eigen::Vector3d torque = weights * sigma.tail<3>().cwiseAbs2();
-  Vector6 turned;
-  turned << force.cwiseSqrt(), torque.cwiseSqrt();
-  return turned;
-}
-
-Vector6 turned_load(const Eigen::Matrix3d& rotation, const Vector6& load) {
-  Vector6 turned;
-  turned << rotation * load.head<3>(), rotation * load.tail<3>();
-  return turned;
 }
 
 }  // namespace
@@ -94,7 +81,7 @@ GestureResult Gestures::feel(const Sample& sample) noexcept {
 
 void Gestures::note(const Sample& sample, Reading& now) noexcept {
   now.time = sample.capture_time;
-  now.load = turned_load(options_.hid_R_camera, sample.wrench);
+  now.load = turned(options_.hid_R_camera, sample.wrench);
   now.saturated = sample.status == Status::saturated;
   if (phase_ != Phase::unsettled && phase_ != Phase::ready) return;
   // Under load the sensor knows less; what rest is has been seen at rest.
@@ -334,8 +321,15 @@ void Gestures::keep_pressed(const Reading& now) noexcept {
 }
 
 void Gestures::complete(Gesture gesture, TimePoint now) noexcept {
+  static constexpr std::array<GestureAction GestureOptions::*, 6> kActions = {
+      nullptr,
+      &GestureOptions::tap,
+      &GestureOptions::double_tap,
+      &GestureOptions::press_hold,
+      &GestureOptions::twist_left,
+      &GestureOptions::twist_right};
   unsettle();
-  const GestureAction& does = action(gesture);
+  const GestureAction& does = options_.*kActions[static_cast<std::size_t>(gesture)];
   if (!does.does_something()) return;
   result_.recognised = gesture;
   wanted_ = does.command;
@@ -392,6 +386,23 @@ void Gestures::follow_swing(const Reading& now) noexcept {
   if (!swings_) return;
   calm_frames_ = at_rest(now.load, kCalm) ? calm_frames_ + 1 : 0;
   if (calm_frames_ >= kCalmFrames || now.time >= swing_until_) swings_ = false;
+}
+
+GestureOptions gestures_for(const Vector6& range, const Eigen::Matrix3d& hid_R_camera) {
+  GestureOptions options;
+  options.hid_R_camera = hid_R_camera;
+  const Vector6 felt = range_along(hid_R_camera, range);
+  for (int i = 0; i < 6; ++i) {
+    if (felt[i] <= 0) continue;
+    options.quiet[i] = 0.06 * felt[i];
+    options.twist_others[i] = 0.3 * felt[i];
+  }
+  if (felt[2] > 0) {
+    options.tap_force = 0.2 * felt[2];
+    options.press_force = 0.4 * felt[2];
+  }
+  if (felt[5] > 0) options.twist_torque = felt[5] / 3;
+  return options;
 }
 
 }  // namespace tagwrench

@@ -21,27 +21,16 @@
 #include <cstdint>
 
 #include "host/core/types.h"
+#include "host/motion/shaping.h"
 
 namespace tagwrench {
 
 enum class Gesture : std::uint8_t { none, tap, double_tap, press_hold, twist_left, twist_right };
 
 constexpr const char* name(Gesture gesture) {
-  switch (gesture) {
-    case Gesture::none:
-      return "none";
-    case Gesture::tap:
-      return "tap";
-    case Gesture::double_tap:
-      return "double tap";
-    case Gesture::press_hold:
-      return "press-hold";
-    case Gesture::twist_left:
-      return "twist left";
-    case Gesture::twist_right:
-      return "twist right";
-  }
-  return "?";
+  constexpr std::array kNames = {"none",       "tap",        "double tap",
+                                 "press-hold", "twist left", "twist right"};
+  return kNames[static_cast<std::size_t>(gesture)];
 }
 
 enum class GestureCommand : std::uint8_t { none, zero, next_profile };
@@ -59,7 +48,7 @@ struct GestureAction {
 /// them.
 struct GestureOptions {
   /// Rows: HID X, Y, Z along the axes of the wrench.
-  Eigen::Matrix3d hid_R_camera = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  Eigen::Matrix3d hid_R_camera = ShapingOptions{}.hid_R_camera;
 
   double tap_force = 0.5;      ///< N, least peak of a tap
   double press_force = 1.0;    ///< N, least force of a press-hold
@@ -160,7 +149,6 @@ class Gestures {
     int landed = 0;
   };
 
-  const GestureAction& action(Gesture gesture) const noexcept;
   bool looks_for_taps() const noexcept;
   bool looks_for_twists() const noexcept;
   void note(const Sample& sample, Reading& now) noexcept;

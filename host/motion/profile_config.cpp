@@ -1,16 +1,23 @@
 #include "host/motion/profile_config.h"
 
 #include <fmt/format.h>
+#include <sys/inotify.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
+#include <vector>
 
 #include "host/core/config_error.h"
+#include "host/core/yaml/yaml_edit.h"
 #include "host/core/yaml/yaml_reader.h"
+#include "host/motion/focus_watch.h"
 #include "host/wrench/estimate.h"
 #include "host/wrench/zero.h"
 
@@ -239,15 +246,6 @@ Profile named_after(const std::string& file, Profile profile) {
   return profile;
 }
 
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c;
-  }
-  return out + '"';
-}
-
 /// What reads back to the same number, if it was read from a file.
 double milli(double seconds) { return std::round(seconds * 1e9) / 1e6; }
 
@@ -288,25 +286,62 @@ std::string filter_text(const FilterOptions& filter) {
   return "{kind: none}";
 }
 
+std::string dominant_text(const DominantOptions& dominant) {
+  return fmt::format("{{on: {}, ratio: {}}}", dominant.on, dominant.ratio);
+}
+
+std::string_view lock_text(Lock lock) { return kLocks[static_cast<std::size_t>(lock)]; }
+
+auto press_ms(const GestureOptions& gestures) {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(gestures.press_time).count();
+}
+
 std::string gestures_text(const GestureOptions& gestures) {
   std::string out = "gestures:\n";
   const auto all = actions(gestures);
   for (std::size_t i = 0; i < all.size(); ++i)
     out += fmt::format("  {}: {}\n", kGestures[i], action_text(*all[i]));
-  return out +
-         fmt::format(
-             "  tap_force_n: {}\n  press_force_n: {}\n  twist_torque_nm: {}\n"
-             "  press_ms: {}\n  hold_motion: {}\n",
-             gestures.tap_force, gestures.press_force, gestures.twist_torque,
-             std::chrono::duration_cast<std::chrono::milliseconds>(gestures.press_time).count(),
-             gestures.hold_motion);
+  return out + fmt::format(
+                   "  tap_force_n: {}\n  press_force_n: {}\n  twist_torque_nm: {}\n"
+                   "  press_ms: {}\n  hold_motion: {}\n",
+                   gestures.tap_force, gestures.press_force, gestures.twist_torque,
+                   press_ms(gestures), gestures.hold_motion);
 }
 
-std::string lower(std::string_view text) {
-  std::string out;
-  std::transform(text.begin(), text.end(), std::back_inserter(out),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return out;
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxFile = 65536;
+
+/// One byte more of a file that is too long.
+std::optional<std::string> read_start(const std::string& path) {
+  std::error_code none;
+  if (!fs::is_regular_file(path, none)) return {};  // a pipe would be waited for
+  std::ifstream in(path, std::ios::binary);
+  std::string text(kMaxFile + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (in.bad() || (!in.eof() && in.fail())) return {};
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+std::vector<std::string> yaml_files(const std::string& folder) {
+  std::vector<std::string> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".yaml") found.push_back(entry->path());
+  }
+  if (error)
+    throw ConfigError(folder + ": cannot be read: " + error.message() +
+                      "; give --profile a folder of yours");
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+bool ready_made(const std::string& name) {
+  const auto& ready = ready_profiles();
+  return std::any_of(ready.begin(), ready.end(),
+                     [&](const ReadyProfile& profile) { return profile.name == name; });
 }
 
 }  // namespace
@@ -332,10 +367,10 @@ Profile parse_profile(const std::string& text, const std::string& file, const Pr
 std::string profile_text(const Profile& profile) {
   std::string applications;
   for (const std::string& application : profile.applications)
-    applications += (applications.empty() ? "" : ", ") + quoted(application);
+    applications += (applications.empty() ? "" : ", ") + yaml_quoted(application);
   const ShapingOptions& shaping = profile.shaping;
   std::string out =
-      fmt::format("name: {}\napplications: [{}]\n", quoted(profile.name), applications);
+      fmt::format("name: {}\napplications: [{}]\n", yaml_quoted(profile.name), applications);
   out += fmt::format("rate_hz: {}\nfill: {}\n", profile.rate_hz,
                      kFills[static_cast<std::size_t>(shaping.fill)]);
   out += axes_text(shaping);
@@ -343,17 +378,143 @@ std::string profile_text(const Profile& profile) {
       "dead_zone_release: {}\nnoise_sigmas: {}\nswing_ms: {}\ntranslation: {}\nrotation: {}\n",
       shaping.release, shaping.noise_sigmas, milli(shaping.swing), shaping.translation,
       shaping.rotation);
-  out += fmt::format("dominant: {{on: {}, ratio: {}}}\nlock: {}\nfilter: {}\n", shaping.dominant.on,
-                     shaping.dominant.ratio, kLocks[static_cast<std::size_t>(shaping.lock)],
-                     filter_text(shaping.filter));
+  out += fmt::format("dominant: {}\nlock: {}\nfilter: {}\n", dominant_text(shaping.dominant),
+                     lock_text(shaping.lock), filter_text(shaping.filter));
   return out + gestures_text(profile.gestures);
 }
 
+std::string with_changes(const std::string& text, const std::string& file, const Profile& before,
+                         const Profile& after) {
+  std::string changed = text;
+  const auto put = [&](const std::vector<std::string>& path, const auto& was, const auto& is) {
+    if (was != is) changed = with_value(changed, path, fmt::format("{}", is), file);
+  };
+  const ShapingOptions& was = before.shaping;
+  const ShapingOptions& is = after.shaping;
+  put({"translation"}, was.translation, is.translation);
+  put({"rotation"}, was.rotation, is.rotation);
+  put({"curve"}, curve_text(was.axes[0].curve), curve_text(is.axes[0].curve));
+  put({"dominant"}, dominant_text(was.dominant), dominant_text(is.dominant));
+  put({"lock"}, lock_text(was.lock), lock_text(is.lock));
+  put({"filter"}, filter_text(was.filter), filter_text(is.filter));
+  for (int i = 0; i < 6; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const std::string axis(kAxes[at]);
+    const std::string unit = is_force(is.axes[at].source) ? "n" : "nm";
+    put({"axes", axis, "full_scale_" + unit}, was.full_scale[i], is.full_scale[i]);
+    put({"axes", axis, "dead_zone_" + unit}, was.dead_zone[i], is.dead_zone[i]);
+    put({"axes", axis, "invert"}, was.axes[at].invert, is.axes[at].invert);
+  }
+  const GestureOptions& felt = before.gestures;
+  const GestureOptions& feels = after.gestures;
+  put({"gestures", "tap_force_n"}, felt.tap_force, feels.tap_force);
+  put({"gestures", "press_force_n"}, felt.press_force, feels.press_force);
+  put({"gestures", "twist_torque_nm"}, felt.twist_torque, feels.twist_torque);
+  put({"gestures", "press_ms"}, press_ms(felt), press_ms(feels));
+  return changed;
+}
+
 bool serves(const Profile& profile, std::string_view application) {
-  const std::string whole = lower(application);
+  const std::string whole = lower_case(application);
   return std::any_of(
       profile.applications.begin(), profile.applications.end(),
-      [&](const std::string& part) { return whole.find(lower(part)) != std::string::npos; });
+      [&](const std::string& part) { return whole.find(lower_case(part)) != std::string::npos; });
+}
+
+ProfileFiles::ProfileFiles(const std::vector<std::string>& chosen, Profile defaults)
+    : defaults_(std::move(defaults)) {
+  for (const std::string& what : chosen) {
+    std::error_code none;
+    if (ready_made(what)) {
+      profiles_.push_back(load_profile(what, defaults_));
+    } else if (fs::is_directory(what, none)) {
+      const std::vector<std::string> files = yaml_files(what);
+      if (files.empty()) throw ConfigError(what + ": there is no profile in it (*.yaml)");
+      for (const std::string& file : files) take(file);
+    } else {
+      profiles_.push_back(
+          load_profile(what, defaults_));  // it says best what is wrong with the file
+      profiles_.pop_back();
+      take(what);
+    }
+  }
+  if (profiles_.empty()) profiles_.push_back(defaults_);
+  for (auto a = profiles_.begin(); a != profiles_.end(); ++a) {
+    for (auto b = std::next(a); b != profiles_.end(); ++b) {
+      if (a->name == b->name)
+        throw ConfigError("profile " + a->name + ": two have this name; change `name:` in one");
+    }
+  }
+  if (!files_.empty()) watch();
+}
+
+void ProfileFiles::take(const std::string& path) {
+  const std::optional<std::string> text = read_start(path);
+  if (!text) throw ConfigError(path + ": cannot be read; give --profile a file of yours");
+  Profile profile = checked(*text, path);
+  const fs::path whole = fs::absolute(path);
+  files_.push_back({whole.parent_path(), whole.filename(), *text, profiles_.size()});
+  profiles_.push_back(std::move(profile));
+}
+
+Profile ProfileFiles::checked(const std::string& text, const std::string& path) const {
+  if (text.size() > kMaxFile)
+    throw ConfigError(path + ": longer than 64 kB; a profile is a page of text");
+  return parse_profile(text, path, defaults_);
+}
+
+/// Folders and not files: an editor puts a new file in the place of the old one.
+void ProfileFiles::watch() {
+  watch_.reset(inotify_init1(IN_CLOEXEC | IN_NONBLOCK));
+  bool good = static_cast<bool>(watch_);
+  for (const File& file : files_) {
+    // And where a link leads to.
+    const fs::path real = fs::weakly_canonical(fs::path(file.folder) / file.name).parent_path();
+    for (const fs::path& folder : {fs::path(file.folder), real}) {
+      good = good &&
+             inotify_add_watch(watch_.get(), folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO) >= 0;
+    }
+  }
+  if (!good)
+    throw ConfigError(std::string("profiles: cannot be watched: ") + std::strerror(errno) +
+                      "; raise fs.inotify.max_user_watches, or take ready-made ones");
+}
+
+std::string ProfileFiles::file_of(std::size_t profile) const {
+  for (const File& file : files_) {
+    if (file.profile == profile) return file.folder + "/" + file.name;
+  }
+  return {};
+}
+
+Profile ProfileFiles::parse(const std::string& text, std::size_t profile) const {
+  const std::string file = file_of(profile);
+  return parse_profile(text, file.empty() ? profiles_[profile].name : file, defaults_);
+}
+
+std::vector<ProfileFiles::Change> ProfileFiles::reread() {
+  std::array<char, 4096> events;
+  bool any = false;
+  while (::read(watch_.get(), events.data(), events.size()) > 0) any = true;
+  std::vector<Change> changes;
+  if (!any) return changes;
+  for (File& file : files_) {
+    if (std::optional<Change> change = look_again(file)) changes.push_back(std::move(*change));
+  }
+  return changes;
+}
+
+std::optional<ProfileFiles::Change> ProfileFiles::look_again(File& file) {
+  const std::string path = file.folder + "/" + file.name;
+  std::optional<std::string> text = read_start(path);
+  if (!text || *text == file.text) return {};
+  file.text = std::move(*text);
+  try {
+    profiles_[file.profile] = checked(file.text, path);
+    return Change{file.profile, "profile " + profiles_[file.profile].name + ": read again"};
+  } catch (const ConfigError& e) {
+    return Change{{}, std::string(e.what()) + "; the earlier profile stays"};
+  }
 }
 
 }  // namespace tagwrench

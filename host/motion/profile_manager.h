@@ -2,7 +2,7 @@
 // In:  Sample with its wrench, N and N m; profiles; requests; which program has the focus.
 // Out: Sample::deflection, -1..1 on the HID axes (X right, Y toward the user, Z down), and buttons.
 //      At rest it is exactly zero. Formats and figures: docs/profiles.md.
-// Then: shaping.h (one frame's way), dead_zone.h, axis_filter.h, gestures.h, profile_config.h.
+// Then: shaping.h (one frame's way), gestures.h, profile_config.h.
 //
 // What the person at the desk has chosen, and what it makes of newtons: the profile in force, its
 // shaping and gestures, and how it changes while the sensor runs.
@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,10 +21,9 @@
 #include "host/motion/control_socket.h"
 #include "host/motion/focus_watch.h"
 #include "host/motion/gestures.h"
-#include "host/motion/profile_files.h"
+#include "host/motion/profile_config.h"
 #include "host/motion/shaping.h"
 #include "host/wrench/zero.h"
-#include "host/wrench/zero_text.h"
 
 namespace tagwrench {
 
@@ -41,7 +41,7 @@ struct LiveReading {
 /// "ok: STATUS, wrench, motion, buttons, 0 or 1", separated by blanks.
 std::string live_text(const LiveReading& reading);
 /// Nothing, if the text is none of live_text().
-std::optional<LiveReading> parse_live(std::string_view text) noexcept;
+std::optional<LiveReading> parse_live(std::string_view text);
 
 class ProfileManager {
  public:
@@ -51,7 +51,7 @@ class ProfileManager {
   /// The first profile is in force until somebody says otherwise. Throws ConfigError if the system
   /// has no more descriptors.
   ProfileManager(ProfileFiles files, std::optional<ControlSocket> control,
-                 std::optional<FocusWatch> focus);
+                 std::unique_ptr<FocusWatch> focus);
 
   /// Where the focus is not known, the program chooses that connected last: `last_program` gives
   /// its name, empty if none is connected, and is asked with every sample.
@@ -98,6 +98,7 @@ class ProfileManager {
   void take_files();
   void take_requests();
   void take_focus();
+  void follow_focus(bool told, std::string_view program);
   void take_program() noexcept;
   void take_lapse();
   std::string granted(const ControlRequest& request);
@@ -116,7 +117,7 @@ class ProfileManager {
 
   ProfileFiles files_;
   std::optional<ControlSocket> control_;
-  std::optional<FocusWatch> focus_;
+  std::unique_ptr<FocusWatch> focus_;
   UniqueFd lapse_;   ///< timer: a trial's end
   UniqueFd events_;  ///< epoll of them all
   std::size_t current_ = 0;

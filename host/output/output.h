@@ -2,7 +2,8 @@
 // In:  Sample: displacement (m, rad), wrench (N, N m), deflection (-1..1, HID axes), buttons.
 // Out: HID and uinput devices, a USB gadget, sockets, lines of text. A status that carries no
 //      numbers is neutral everywhere. Formats: docs/outputs.md.
-// Then: hid_report.h (bytes), watchdog.h (devices to rest when the program is not there), jsonl.h.
+// Then: hid_report.h (bytes), watchdog.h (devices to rest when the program is not there),
+// line_outputs.h.
 //
 // Where samples go: every sample to those who want data, motion and buttons to input devices. None
 // blocks, none queues.

@@ -1,73 +1,136 @@
-// The process that holds the spnav socket: one thread, one epoll loop, many programs, one bridge.
+// What the daemon of the spnav socket and the bridge say to each other, and the sockets of both.
+//
+// The socket that programs connect to is held by a small process of its own, the daemon, so that
+// they stay connected while the bridge restarts: FreeCAD spins at 100 % CPU when its server ends,
+// and neither it nor Blender connects again. Beside PATH lies PATH.bridge, a SOCK_SEQPACKET socket
+// for one bridge, its owner's alone. Whoever connects there is told at once whether it is welcome,
+// says what the device is, and from then on what it shows. Numbers are in host byte order; all
+// messages are of fixed size and start with what they are.
 #pragma once
 
-#include <sys/epoll.h>
+#include <sys/stat.h>
 
 #include <array>
 #include <cstdint>
-#include <memory>
+#include <cstring>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
-#include <vector>
+#include <type_traits>
 
 #include "host/core/os/unique_fd.h"
 #include "host/core/types.h"
-#include "host/output/spnav_link.h"
 #include "host/output/spnav_protocol.h"
 
 namespace tagwrench {
 
-// One program that is connected to the spnav socket. Nothing queues for it: an event that it has no
-// room for is dropped, and when it has room again it gets the newest state. What it has been told
-// is remembered, so that no release, and no return to zero, is ever lost to it.
-
-class SpnavClient {
- public:
-  /// Makes the kernel's own queue short: about 20 events, a sixth of a second at 125 Hz; a program
-  /// that draws that slowly loses no motion.
-  SpnavClient(UniqueFd socket, const SpnavPeer& peer, bool device_present) noexcept;
-
-  /// Reads and answers requests, a bounded number of them. `device` is null while there is none.
-  void read(const SpnavDevice* device, std::string_view path) noexcept;
-
-  /// Tells what has changed since it was told last; off-centre the motion too, if `moved`. Nothing
-  /// before the program has said which version it speaks, or has not for a while: libspnav would
-  /// take an event for the answer.
-  void show(const SpnavState& state, const SpnavDevice* device, bool moved, TimePoint now) noexcept;
-
-  /// After EPOLLOUT: sends the rest of what went half way, then what was missed.
-  void resume(const SpnavState& state, const SpnavDevice* device, TimePoint now) noexcept;
-
-  int fd() const noexcept { return socket_.get(); }
-  const SpnavPeer& peer() const noexcept { return peer_; }
-  /// What epoll is to wait for: EPOLLIN, or EPOLLOUT while it is slow; then its requests wait too.
-  std::uint32_t interest() const noexcept;
-  std::uint32_t watched = 0;  ///< the interest that epoll knows of
-  bool gone() const noexcept { return gone_; }
-  void hang_up() noexcept { gone_ = true; }
-
- private:
-  bool put(const SpnavRecord& record) noexcept;
-  bool flush() noexcept;
-  void answer(std::span<const std::uint8_t> bytes) noexcept;
-  bool show_buttons(std::uint32_t buttons) noexcept;
-  bool show_motion(const Counts6& motion, bool moved, TimePoint now) noexcept;
-  bool show_device(const SpnavDevice* device) noexcept;
-
-  UniqueFd socket_;
-  SpnavPeer peer_;
-  SpnavDialogue dialogue_;
-  SpnavState told_;
-  SpnavDevice told_device_;
-  bool device_told_;
-  TimePoint told_at_;       ///< of the last motion
-  TimePoint silent_until_;  ///< unless it speaks before
-  bool behind_ = false;     ///< an event was dropped since the last room
-  bool gone_ = false;
-  std::array<std::uint8_t, SpnavDialogue::kMaxAnswers * sizeof(SpnavRecord)> rest_{};
-  std::size_t rest_size_ = 0;  ///< bytes of rest_: the end of a record or answer that is under way
+/// The last byte is the version: a daemon may be older than the bridge.
+enum class SpnavWord : std::uint32_t {
+  greeting = 0x74776701,
+  hello = 0x74776801,
+  update = 0x74777501,
+  program = 0x74777001,
 };
+
+/// Daemon to bridge, first of all.
+struct SpnavGreeting {
+  static constexpr SpnavWord kWord = SpnavWord::greeting;
+  SpnavWord word = kWord;
+  std::int32_t daemon_pid = 0;
+  std::uint32_t refused = 0;      ///< another bridge feeds it already:
+  std::int32_t other_bridge = 0;  ///< this one; 0 if unknown
+};
+
+/// Bridge to daemon: what the device is.
+struct SpnavHello {
+  static constexpr SpnavWord kWord = SpnavWord::hello;
+  SpnavWord word = kWord;
+  SpnavDevice device;
+};
+
+/// Bridge to daemon: what it shows. Off-centre or with a button pressed it must come again in time.
+struct SpnavUpdate {
+  static constexpr SpnavWord kWord = SpnavWord::update;
+  SpnavWord word = kWord;
+  SpnavState state;
+  std::uint32_t valid_ms = 0;  ///< without another one by then all is neutral
+};
+
+/// Who is at the other end of a socket.
+struct SpnavPeer {
+  std::int32_t pid = 0;         ///< 0: unknown
+  std::array<char, 16> name{};  ///< as the kernel has it, "freecad" say; ends with a zero
+};
+
+/// Daemon to bridge: a program has connected, or has gone.
+struct SpnavProgram {
+  static constexpr SpnavWord kWord = SpnavWord::program;
+  SpnavWord word = kWord;
+  std::uint32_t connected = 0;
+  SpnavPeer peer;
+};
+
+constexpr std::size_t kSpnavLongestMessage = 128;
+
+template <typename Message>
+std::optional<Message> spnav_message(std::span<const std::uint8_t> bytes) noexcept {
+  static_assert(std::is_trivially_copyable_v<Message> && sizeof(Message) <= kSpnavLongestMessage);
+  if (bytes.size() != sizeof(Message)) return {};
+  Message message;
+  std::memcpy(&message, bytes.data(), sizeof message);
+  if (message.word != Message::kWord) return {};
+  return message;
+}
+
+/// What recv() on a link has brought: the bytes; empty and `open`: nothing yet; not `open`: the
+/// other side has gone.
+struct SpnavReceived {
+  std::span<const std::uint8_t> bytes;
+  bool open = true;
+};
+SpnavReceived receive_spnav(int link, std::span<std::uint8_t> buffer) noexcept;
+
+/// False: no room, or gone; `errno` tells. Never blocks.
+bool send_spnav_bytes(int link, std::span<const std::uint8_t> bytes) noexcept;
+
+template <typename Message>
+bool send_spnav(int link, const Message& message) noexcept {
+  static_assert(std::is_trivially_copyable_v<Message>);
+  return send_spnav_bytes(link, {reinterpret_cast<const std::uint8_t*>(&message), sizeof message});
+}
+
+/// Where libspnav looks if nothing else is said.
+inline constexpr const char* kSpnavSystemSocket = "/var/run/spnav.sock";
+
+/// `given` as an absolute path; where it is empty spnav.sock in runtime_folder(), or, for root,
+/// libspnav's own place if no other server has it. Throws ConfigError: no place, path too long.
+std::string spnav_socket_path(const std::string& given);
+
+/// The two sockets of a daemon, listening. Their files are removed by remove(), if they are still
+/// ours.
+struct SpnavSockets {
+  std::string path;
+  UniqueFd programs;
+  UniqueFd bridge;
+  ino_t programs_file = 0;
+  ino_t bridge_file = 0;
+
+  void remove() const noexcept;
+};
+
+/// Makes them: for their owner alone, at libspnav's own path for everybody. A left-over of a daemon
+/// that was killed is replaced. Nothing if a daemon serves the path already. Throws ConfigError: no
+/// such folder, no permission, another server or a file is there.
+std::optional<SpnavSockets> listen_spnav(const std::string& path);
+
+/// Those that were inherited as descriptors.
+SpnavSockets inherited_spnav(const std::string& path, int programs, int bridge);
+
+/// Connects to the daemon; -1 if there is none.
+UniqueFd connect_spnav_bridge(const std::string& path) noexcept;
+
+// The process that holds the spnav socket: one thread, one epoll loop, many programs, one bridge.
 
 struct SpnavDaemonOptions {
   std::optional<Duration> idle_end;  ///< ends after so long without bridge and programs
@@ -77,48 +140,9 @@ struct SpnavDaemonOptions {
 /// Programs get what the bridge shows: an event for every update off-centre, one for the return to
 /// zero, none at rest. When the bridge goes, or falls silent for longer than it said it would, they
 /// get zero and the release of every button, and stay connected.
-class SpnavDaemon {
- public:
-  /// `stop_fd` becomes readable when the daemon shall end; -1: never. Throws ConfigError if the
-  /// kernel has no epoll to give.
-  SpnavDaemon(SpnavSockets sockets, const SpnavDaemonOptions& options, int stop_fd);
-  SpnavDaemon(const SpnavDaemon&) = delete;
-  SpnavDaemon& operator=(const SpnavDaemon&) = delete;
-  /// Leaves programs at rest and takes the sockets away.
-  ~SpnavDaemon();
-
-  void run() noexcept;
-
- private:
-  void handle(const epoll_event& event) noexcept;
-  void accept_programs() noexcept;
-  void add_program(UniqueFd socket) noexcept;
-  void accept_bridge() noexcept;
-  void read_bridge() noexcept;
-  bool take(std::span<const std::uint8_t> message) noexcept;
-  void lose_bridge() noexcept;
-  void show(bool moved) noexcept;
-  void sweep() noexcept;
-  void turn_away() noexcept;
-  void watch(int fd, void* about, std::uint32_t events, int operation) noexcept;
-  void tell_bridge(const SpnavClient& client, bool connected) noexcept;
-  const SpnavDevice* device() const noexcept { return device_ ? &*device_ : nullptr; }
-  int patience_ms() const noexcept;
-  void check_time() noexcept;
-
-  SpnavSockets sockets_;
-  SpnavDaemonOptions options_;
-  int stop_fd_;
-  UniqueFd epoll_;
-  UniqueFd bridge_;
-  std::int32_t bridge_pid_ = 0;
-  std::optional<SpnavDevice> device_;  ///< what the bridge said that it is
-  SpnavState state_;
-  TimePoint valid_until_ = TimePoint::max();  ///< of state_
-  TimePoint idle_since_;
-  std::vector<std::unique_ptr<SpnavClient>> clients_;
-  UniqueFd spare_;  ///< given up to turn away who comes when no descriptor is left
-  bool stopped_ = false;
-};
+///
+/// Runs until `stop_fd` is readable (-1: never) or it has been idle for long; leaves programs at
+/// rest and takes the sockets away. Throws ConfigError if the kernel has no epoll to give.
+void run_spnav_daemon(SpnavSockets sockets, const SpnavDaemonOptions& options, int stop_fd);
 
 }  // namespace tagwrench

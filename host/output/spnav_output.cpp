@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
-#include "host/core/os/spawn_daemon.h"
+#include "host/core/os/child_process.h"
 #include "host/output/output.h"
 
 namespace tagwrench {
@@ -60,7 +60,7 @@ SpnavOutput::SpnavOutput(const SpnavOptions& options)
   for (int i = 0; i < kAttempts && !welcome_ && !other_bridge_; ++i) {
     if (reach_daemon()) await_greeting();
   }
-  if (other_bridge_) throw ConfigError(refusal());
+  if (other_bridge_) throw ConfigError(failure());
   if (!welcome_) {
     throw ConfigError(fmt::format(
         "spnav socket {}: its daemon does not answer; `tagwrench spnav --socket {}` in another "
@@ -148,9 +148,7 @@ bool SpnavOutput::restart_daemon(TimePoint now) noexcept {
   }
 }
 
-std::string SpnavOutput::failure() const { return refusal(); }
-
-std::string SpnavOutput::refusal() const {
+std::string SpnavOutput::failure() const {
   const std::int32_t pid = other_bridge_.value_or(0);
   return fmt::format(
       "spnav socket {}: another bridge{} feeds it already; end that one, or choose another path, "

@@ -1,5 +1,5 @@
 // The spnav socket without spacenavd and without a kernel device: for machines that have no uhid,
-// sandboxes and remote desktops. It is held by a daemon process (spnav_link.h), which this starts
+// sandboxes and remote desktops. It is held by a daemon process (spnav_daemon.h), which this starts
 // if there is none, and which stays when the bridge ends.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/output/output.h"
-#include "host/output/spnav_link.h"
+#include "host/output/spnav_daemon.h"
 
 namespace tagwrench {
 
@@ -60,7 +60,6 @@ class SpnavOutput : public Output {
   std::string_view lost_daemon() noexcept;
   std::string_view take(const SpnavGreeting& greeting) noexcept;
   std::string_view take(const SpnavProgram& program) noexcept;
-  std::string refusal() const;
   std::uint32_t valid_ms(TimePoint now) noexcept;
 
   SpnavOptions options_;

@@ -134,20 +134,21 @@ std::span<const std::uint8_t> SpnavDialogue::answer_device(int request, const Sp
       return reply_text(path);
     case kAxes:
       request_[1] = 6;
-      return reply(0);
+      break;
     case kButtons:
       request_[1] = kSpnavButtons;
-      return reply(0);
+      break;
     case kUsbId:
       request_[1] = device.vendor;
       request_[2] = device.product;
-      return reply(0);
+      break;
     case kDeviceType:
       request_[1] = device_type(device);
-      return reply(0);
+      break;
     default:
       return reply(kFailed);
   }
+  return reply(0);
 }
 
 std::span<const std::uint8_t> SpnavDialogue::reply(std::int32_t status) noexcept {

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "host/output/line_outputs.h"
 #include "host/output/output.h"
-#include "host/output/text_sink.h"
 
 namespace tagwrench {
 

@@ -4,6 +4,7 @@
 #include <netdb.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstring>
@@ -93,22 +94,12 @@ SendStatus UdpOutput::put(const UdpDatagram& datagram) noexcept {
   if (error_ != 0) return SendStatus::failed;
   if (::send(socket_.get(), datagram.data(), datagram.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0)
     return SendStatus::ok;
-  switch (errno) {
-    case ECONNREFUSED:  // of an earlier one, which nobody took
-      return SendStatus::ok;
-    case EAGAIN:
-    case ENOBUFS:
-    case ENOMEM:
-    case EINTR:
-    case ENETDOWN:
-    case ENETUNREACH:
-    case EHOSTDOWN:
-    case EHOSTUNREACH:
-      return SendStatus::skipped;
-    default:
-      error_ = errno;
-      return SendStatus::failed;
-  }
+  if (errno == ECONNREFUSED) return SendStatus::ok;  // of an earlier one, which nobody took
+  constexpr std::array kPassing = {EAGAIN,   ENOBUFS,     ENOMEM,    EINTR,
+                                   ENETDOWN, ENETUNREACH, EHOSTDOWN, EHOSTUNREACH};
+  if (std::ranges::find(kPassing, errno) != kPassing.end()) return SendStatus::skipped;
+  error_ = errno;
+  return SendStatus::failed;
 }
 
 std::string UdpOutput::failure() const {

@@ -20,7 +20,8 @@ enum class Keep : std::uint8_t {
   none,
 };
 
-std::string_view name(Keep keep);
+constexpr std::array<std::string_view, 3> kKeepNames = {"raw", "region", "none"};
+constexpr std::string_view name(Keep keep) { return kKeepNames[static_cast<std::size_t>(keep)]; }
 
 /// What a recording says of itself.
 struct Head {
@@ -70,8 +71,13 @@ enum class EventKind : std::uint8_t {
   lost,
 };
 
-/// As the database writes it.
-std::string_view name(EventKind kind);
+/// As the database writes them.
+constexpr std::array<std::string_view, 10> kEventNames = {
+    "note", "missing", "disconnected", "reconnected", "board",
+    "led",  "clock",   "button",       "mark",        "lost"};
+constexpr std::string_view name(EventKind kind) {
+  return kEventNames[static_cast<std::size_t>(kind)];
+}
 
 /// Values of a mark.
 inline constexpr int kMarkWithdrawn = -1;

@@ -12,9 +12,62 @@
 
 #include "host/core/config_error.h"
 #include "host/recording/database.h"
-#include "host/recording/sink.h"
 
 namespace tagwrench::record {
+
+ByteRing::ByteRing(std::size_t capacity)
+    : storage_(std::max(capacity, 2 * kAlignment) / kAlignment * kAlignment + kAlignment) {
+  const auto address = reinterpret_cast<std::uintptr_t>(storage_.data());
+  memory_ = storage_.data() + (kAlignment - address % kAlignment) % kAlignment;
+  capacity_ = storage_.size() - kAlignment;
+}
+
+std::byte* ByteRing::reserve(std::size_t bytes, std::size_t spare) noexcept {
+  const std::uint64_t written = written_.load(std::memory_order_relaxed);
+  const std::uint64_t used = written - read_.load(std::memory_order_acquire);
+  const std::size_t need = room_for(bytes);
+  const std::size_t to_end = capacity_ - written % capacity_;
+  const std::size_t skipped = need > to_end ? to_end : 0;
+  if (bytes > capacity_ || used + skipped + need + spare > capacity_) return nullptr;
+  if (skipped > 0) new (&header(written)) Header{kSkip, skipped};
+  new (&header(written + skipped)) Header{bytes, need};
+  reserved_ = written + skipped + need;
+  return memory_ + (written + skipped) % capacity_ + kAlignment;
+}
+
+void ByteRing::publish() noexcept { written_.store(reserved_, std::memory_order_release); }
+
+void ByteRing::wait_for_room() const noexcept {
+  const std::uint64_t read = read_.load(std::memory_order_acquire);
+  if (read != written_.load(std::memory_order_relaxed)) read_.wait(read);
+}
+
+bool ByteRing::could_hold(std::size_t bytes, std::size_t spare) const noexcept {
+  return bytes < capacity_ / 2 && spare < capacity_ / 2 && 2 * room_for(bytes) + spare <= capacity_;
+}
+
+std::span<std::byte> ByteRing::front() noexcept {
+  std::uint64_t read = read_.load(std::memory_order_relaxed);
+  if (read == written_.load(std::memory_order_acquire)) return {};
+  if (header(read).bytes == kSkip) {
+    read += header(read).room;
+    read_.store(read, std::memory_order_release);
+  }
+  return {memory_ + read % capacity_ + kAlignment, header(read).bytes};
+}
+
+void ByteRing::pop() noexcept {
+  const std::uint64_t read = read_.load(std::memory_order_relaxed);
+  read_.store(read + header(read).room, std::memory_order_release);
+  read_.notify_one();
+}
+
+double ByteRing::fill() const noexcept {
+  const std::uint64_t used =
+      written_.load(std::memory_order_acquire) - read_.load(std::memory_order_acquire);
+  return static_cast<double>(used) / static_cast<double>(capacity_);
+}
+
 namespace {
 
 using std::chrono::milliseconds;
@@ -54,12 +107,6 @@ ByteRing taken_ring(const WriterOptions& options, const Head& head) try {
 std::unique_ptr<Sink> new_sink(const WriterOptions& options, const Head& head) {
   std::signal(SIGXFSZ, SIG_IGN);
   return std::make_unique<Sink>(options.path, head);
-}
-
-std::uint64_t size_of(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  return error ? 0 : size;
 }
 
 }  // namespace
@@ -132,8 +179,9 @@ auto RecordingWriter::put(std::size_t extra, std::size_t spare) noexcept -> Fill
 }
 
 template <class Row>
-void RecordingWriter::put_row(ItemKind kind, std::int64_t id, const Row& row) noexcept {
-  Filled<Row>* item = put<Row>(0, 0);
+void RecordingWriter::put_row(ItemKind kind, std::int64_t id, const Row& row,
+                              std::string_view text) noexcept {
+  Filled<Row>* item = put<Row>(text.size(), 0);
   if (item == nullptr) {
     lost_others_.fetch_add(1, std::memory_order_relaxed);
     return;
@@ -141,6 +189,7 @@ void RecordingWriter::put_row(ItemKind kind, std::int64_t id, const Row& row) no
   item->kind = kind;
   item->id = id;
   item->row = row;
+  std::ranges::copy(text, item->bytes());
   ring_.publish();
 }
 
@@ -204,17 +253,7 @@ void RecordingWriter::reference(const ReferenceRecord& reading) noexcept {
 
 void RecordingWriter::event(EventKind kind, TimePoint time, std::string_view text,
                             std::int64_t value, int step) noexcept {
-  text = text.substr(0, kMaxText);
-  Filled<EventRow>* item = put<EventRow>(text.size(), 0);
-  if (item == nullptr) {
-    lost_others_.fetch_add(1, std::memory_order_relaxed);
-    return;
-  }
-  item->kind = ItemKind::event;
-  item->id = ++id_;
-  item->row = {kind, time, step, value};
-  std::copy(text.begin(), text.end(), item->bytes());
-  ring_.publish();
+  put_row(ItemKind::event, ++id_, EventRow{kind, time, step, value}, text.substr(0, kMaxText));
 }
 
 void RecordingWriter::mark(int step, bool begin, TimePoint time, int zero) noexcept {
@@ -234,15 +273,13 @@ void RecordingWriter::tell_losses(TimePoint time) noexcept {
 }
 
 WriterState RecordingWriter::state() const noexcept {
-  WriterState state;
-  state.frames = frames_;
-  state.lost_frames = lost_frames_;
-  state.lost_others = lost_others_;
-  state.bytes = bytes_;
-  state.disk_free = disk_free_;
-  state.fill = ring_.fill();
-  state.failed = failed_.load(std::memory_order_acquire);
-  return state;
+  return {.frames = frames_,
+          .lost_frames = lost_frames_,
+          .lost_others = lost_others_,
+          .bytes = bytes_,
+          .disk_free = disk_free_,
+          .fill = ring_.fill(),
+          .failed = failed_.load(std::memory_order_acquire)};
 }
 
 std::string RecordingWriter::failure() const {

@@ -9,14 +9,33 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "host/core/axis_names.h"
 #include "host/core/config_error.h"
 #include "host/core/json/json_text.h"
-#include "host/sensor/calibration_format.h"
+#include "host/core/os/atomic_file.h"
 
 namespace tagwrench {
 namespace {
 
 using nlohmann::json;
+
+constexpr const char* kCalibrationFormat = "tagwrench-calibration-1";
+
+constexpr std::array<std::pair<const char*, double AxisFit::*>, 7> kAxisNumbers{
+    {{"coverage", &AxisFit::coverage},
+     {"gain_sigma", &AxisFit::gain_sigma},
+     {"largest", &AxisFit::largest},
+     {"held_out_rmse", &AxisFit::held_out_rmse},
+     {"held_out_r2", &AxisFit::held_out_r2},
+     {"error_constant", &AxisFit::error_constant},
+     {"error_proportional", &AxisFit::error_proportional}}};
+
+constexpr std::array<std::pair<const char*, std::string CalibrationRecord::*>, 5> kRecordTexts{
+    {{"date", &CalibrationRecord::date},
+     {"software", &CalibrationRecord::software},
+     {"plan", &CalibrationRecord::plan},
+     {"reference", &CalibrationRecord::reference},
+     {"notes", &CalibrationRecord::notes}}};
 
 constexpr std::uintmax_t kMaxFile = 16 << 20;  // a quadratic model has 0.4 MB
 constexpr double kMax = 1e12;                  // of any number, SI ...
@@ -85,6 +104,12 @@ class CalibrationReader {
 
   Vector6 vector6(const json& list, const std::string& key) const {
     return Vector6(numbers(list, key, 6).data());
+  }
+
+  Vector6 non_negative6(const json& list, const std::string& key) const {
+    const Vector6 out = vector6(list, key);
+    if ((out.array() < 0).any()) fail(fmt::format("\"{}\" must not be negative", key));
+    return out;
   }
 
   Matrix6 matrix6(const std::string& key) const {
@@ -184,8 +209,7 @@ FeatureSpec read_features(const CalibrationReader& file, const json& node) {
     if (features.time_constant <= 0) file.fail("\"time_constant_s\" must be greater than 0");
   }
   if (features.kind == FeatureKind::hysteresis) {
-    features.play = file.vector6(file.at(node, "play"), "play");
-    if ((features.play.array() < 0).any()) file.fail("\"play\" must not be negative");
+    features.play = file.non_negative6(file.at(node, "play"), "play");
   }
   return features;
 }
@@ -235,10 +259,8 @@ void read_model(const CalibrationReader& file, WrenchModel& model) {
   }
   if (file.has("error")) {
     const json& error = file.at("error");
-    model.error_at_full_load = file.vector6(file.at(error, "at_full_load"), "at_full_load");
+    model.error_at_full_load = file.non_negative6(file.at(error, "at_full_load"), "at_full_load");
     model.full_load = file.vector6(file.at(error, "full_load"), "full_load");
-    if ((model.error_at_full_load.array() < 0).any())
-      file.fail("\"at_full_load\" must not be negative");
     if ((model.full_load.array() <= 0).any()) file.fail("\"full_load\" must be greater than 0");
   }
 }
@@ -246,14 +268,12 @@ void read_model(const CalibrationReader& file, WrenchModel& model) {
 AxisFit read_axis(const CalibrationReader& file, const json& node) {
   AxisFit axis;
   const std::string state = file.text(file.at(node, "state"), "state");
-  bool known = false;
-  for (const AxisState each :
-       {AxisState::calibrated, AxisState::spring_model, AxisState::not_determined}) {
-    if (state != name(each)) continue;
-    axis.state = each;
-    known = true;
-  }
-  if (!known) file.fail(fmt::format("\"state\" of an axis is \"{}\"", state));
+  constexpr std::array kStates = {AxisState::calibrated, AxisState::spring_model,
+                                  AxisState::not_determined};
+  const auto* known = std::find_if(kStates.begin(), kStates.end(),
+                                   [&](AxisState each) { return state == name(each); });
+  if (known == kStates.end()) file.fail(fmt::format("\"state\" of an axis is \"{}\"", state));
+  axis.state = *known;
   axis.reason = file.text(file.at(node, "reason"), "reason");
   for (const auto& [key, member] : kAxisNumbers)
     axis.*member = file.number(file.at(node, key), key);
@@ -293,8 +313,7 @@ CalibrationRecord read_record(const CalibrationReader& file) {
   }
   if (file.has("inside_95")) {
     const std::vector<double> inside = file.numbers(file.at("inside_95"), "inside_95", 6);
-    record.inside_95.emplace();
-    std::copy(inside.begin(), inside.end(), record.inside_95->begin());
+    std::copy(inside.begin(), inside.end(), record.inside_95.emplace().begin());
   }
   record.missing = file.texts("missing");
   record.warnings = file.texts("warnings");
@@ -304,6 +323,65 @@ CalibrationRecord read_record(const CalibrationReader& file) {
     for (const json& trial : tried) record.trials.push_back(read_trial(file, trial));
   }
   return record;
+}
+
+using nlohmann::ordered_json;
+
+ordered_json list(const Eigen::VectorXd& values) {
+  return std::vector<double>(values.begin(), values.end());
+}
+
+ordered_json rows(const Eigen::MatrixXd& matrix, bool lower_triangle = false) {
+  ordered_json out = ordered_json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+    out.push_back(list(matrix.row(i).head(lower_triangle ? i + 1 : matrix.cols()).transpose()));
+  return out;
+}
+
+ordered_json sensor_json(const SensorIdentity& sensor) {
+  ordered_json out{{"family", sensor.family},
+                   {"tag_ids", sensor.tag_ids},
+                   {"tag_size_mm", sensor.tag_size_mm},
+                   {"image_px", sensor.image_px}};
+  if (sensor.lens_px) out["lens_px"] = *sensor.lens_px;
+  if (!sensor.target_sha256.empty()) out["target_sha256"] = sensor.target_sha256;
+  return out;
+}
+
+ordered_json features_json(const FeatureSpec& features) {
+  ordered_json out{{"kind", std::string(name(features.kind))}};
+  if (features.kind == FeatureKind::creep) out["time_constant_s"] = features.time_constant;
+  if (features.kind == FeatureKind::hysteresis) out["play"] = list(features.play);
+  return out;
+}
+
+ordered_json axis_json(const char* axis_name, const AxisFit& axis) {
+  ordered_json out{{"name", axis_name}, {"state", name(axis.state)}, {"reason", axis.reason}};
+  for (const auto& [key, member] : kAxisNumbers) out[key] = axis.*member;
+  return out;
+}
+
+void add_record(const CalibrationRecord& record, ordered_json& out) {
+  for (const auto& [key, member] : kRecordTexts) {
+    if (!(record.*member).empty()) out[key] = record.*member;
+  }
+  if (!record.data_sha256.empty())
+    out["data"] = {{"file", record.data_file}, {"sha256", record.data_sha256}};
+  if (record.lag) out["lag_s"] = {{"value", record.lag->value}, {"sigma", record.lag->sigma}};
+  if (record.axis) {
+    for (std::size_t i = 0; i < 6; ++i)
+      out["axes"].push_back(axis_json(kWrenchAxes[i], (*record.axis)[i]));
+  }
+  if (record.inside_95) out["inside_95"] = *record.inside_95;
+  if (record.axis) out["missing"] = record.missing;
+  if (!record.warnings.empty()) out["warnings"] = record.warnings;
+  for (const ModelTrial& trial : record.trials) {
+    ordered_json tried = features_json(trial.features);
+    tried["score"] = trial.score;
+    tried["score_sigma"] = trial.score_sigma;
+    tried["adopted"] = trial.adopted;
+    out["tried"].push_back(std::move(tried));
+  }
 }
 
 }  // namespace
@@ -317,26 +395,9 @@ Calibration read_calibration(const std::filesystem::path& path) {
   return out;
 }
 
-std::string completed_axes(const std::filesystem::path& path) {
-  const CalibrationReader file(path);
-  std::string out;
-  if (!file.has("axes")) return out;
-  const json& axes = file.at("axes");
-  for (std::size_t i = 0; axes.is_array() && i < std::min<std::size_t>(6, axes.size()); ++i) {
-    if (file.has(axes[i], "state") && axes[i]["state"] != name(AxisState::calibrated))
-      out += (out.empty() ? "" : " ") + std::string(kWrenchAxes[i]);
-  }
-  return out;
-}
-
-std::string calibration_date(const std::filesystem::path& path) {
-  const CalibrationReader file(path);
-  return file.has("date") ? file.text(file.at("date"), "date") : std::string();
-}
-
-void load_calibration(const std::string& path, const CameraModel& camera,
-                      const TargetDescription& target, const ReferenceOptions& rest,
-                      WrenchModel& model) {
+CalibrationFacts load_calibration(const std::string& path, const CameraModel& camera,
+                                  const TargetDescription& target, const ReferenceOptions& rest,
+                                  WrenchModel& model) {
   const CalibrationReader file(path);
   const std::string differs = difference(read_sensor(file), identity_of(camera, target, rest));
   if (!differs.empty()) {
@@ -350,6 +411,37 @@ void load_calibration(const std::string& path, const CameraModel& camera,
   read.wrench_origin = model.wrench_origin;
   read.camera_R_wrench_frame = model.camera_R_wrench_frame;
   model = read;
+
+  CalibrationFacts facts;
+  if (file.has("date")) facts.date = file.text(file.at("date"), "date");
+  if (!file.has("axes")) return facts;
+  const json& axes = file.at("axes");
+  for (std::size_t i = 0; axes.is_array() && i < std::min<std::size_t>(6, axes.size()); ++i) {
+    if (file.has(axes[i], "state") && axes[i]["state"] != name(AxisState::calibrated))
+      facts.completed_axes +=
+          (facts.completed_axes.empty() ? "" : " ") + std::string(kWrenchAxes[i]);
+  }
+  return facts;
+}
+
+void save_calibration(const std::filesystem::path& path, const Calibration& calibration) {
+  const WrenchModel& model = calibration.model;
+  ordered_json out{{"format", kCalibrationFormat},
+                   {"sensor", sensor_json(calibration.sensor)},
+                   {"K", rows(model.K)},
+                   {"B", list(model.B)},
+                   {"range", list(model.range)},
+                   {"covariance", rows(model.model_covariance)},
+                   {"model", features_json(model.features)}};
+  out["model"]["extra"] = rows(model.extra.transpose());
+  if (model.parameter_covariance.size() > 0) {
+    out["parameter_covariance"] = rows(model.parameter_covariance, true);
+    out["error"] = {{"at_full_load", list(model.error_at_full_load)},
+                    {"full_load", list(model.full_load)}};
+  }
+  add_record(calibration.record, out);
+  // Texts of people may hold anything; what is no UTF-8 is replaced.
+  write_atomically(path, dump_json(out, 1) + "\n");
 }
 
 }  // namespace tagwrench

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "host/sensor/sensor_identity.h"
+#include "host/sensor/measured_files.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/target.h"
 #include "host/wrench/estimate.h"
@@ -68,20 +68,20 @@ struct Calibration {
 /// Throws ConfigError if it cannot be read or is not such a file.
 Calibration read_calibration(const std::filesystem::path& path);
 
-/// Axes that it leaves to the spring model, "Fx Mz"; empty: none, or it does not tell. Throws
-/// ConfigError if it cannot be read.
-std::string completed_axes(const std::filesystem::path& path);
-
-/// When it was made; empty: it does not tell. Throws ConfigError if it cannot be read.
-std::string calibration_date(const std::filesystem::path& path);
-
 /// Replaces the file as a whole or not at all. Throws std::runtime_error.
 void save_calibration(const std::filesystem::path& path, const Calibration& calibration);
 
+/// What people are told of a calibration that is in force.
+struct CalibrationFacts {
+  std::string completed_axes;  ///< that it leaves to the spring model, "Fx Mz"; empty: none, or it
+                               ///< does not tell
+  std::string date;            ///< when it was made; empty: it does not tell
+};
+
 /// Reads the model's numbers into `model`; leaves the tool transform alone. Throws ConfigError as
 /// read_calibration, and if it was made for another sensor or another target, saying which.
-void load_calibration(const std::string& path, const CameraModel& camera,
-                      const TargetDescription& target, const ReferenceOptions& rest,
-                      WrenchModel& model);
+CalibrationFacts load_calibration(const std::string& path, const CameraModel& camera,
+                                  const TargetDescription& target, const ReferenceOptions& rest,
+                                  WrenchModel& model);
 
 }  // namespace tagwrench

@@ -108,4 +108,49 @@ void write_measured_target(const std::filesystem::path& folder, TargetFile targe
 /// Renames the file to NAME.before, if it is there.
 void set_aside(const std::filesystem::path& file);
 
+// What the sensor looks like at rest, as a picture file: 16-bit grey PNG, 256 counts for each grey
+// level, the size of the camera's frames, under any name. The number of frames that it averages is
+// sensor.yaml's rest.frames.
+
+inline constexpr float kReferenceCountsPerLevel = 256.0F;
+
+/// Leaves `frames` at zero. Throws ConfigError, one line with path and remedy: no such file, no
+/// PNG, damaged, not 16-bit grey, not of the camera's size.
+ReferenceImage load_reference_image(const std::filesystem::path& path, const CameraModel& camera);
+
+/// The bytes of the file. Throws std::invalid_argument for an image whose size and levels do not
+/// agree.
+std::string encode_reference_image(const ReferenceImage& image);
+
+// Which sensor a calibration was made with: camera, target, and how the target looks at rest.
+
+struct SensorIdentity {
+  std::string family;
+  std::vector<int> tag_ids;
+  double tag_size_mm = 0;
+  std::array<int, 2> image_px{};
+  // Absent in calibrations of older versions:
+  std::optional<std::array<double, 4>> lens_px;  ///< fx fy cx cy
+  std::string target_sha256;  ///< of all that `tagwrench calibrate target` finds; empty: absent
+};
+
+/// target_sha256 is taken over a text of fixed form, one line each: family, tag size, ids and,
+/// where they are known, places of the tags (um and urad) and rest pose; then the picture at rest,
+/// 16 bits a pixel.
+SensorIdentity identity_of(const CameraModel& camera, const TargetDescription& target,
+                           const ReferenceOptions& rest);
+
+/// What differs, for people: "its tag_ids is [5,3], sensor.yaml has [5,2]"; empty if nothing does.
+/// What one of them does not know does not differ.
+std::string difference(const SensorIdentity& its, const SensorIdentity& ours);
+
+/// One name for all of it: equal for data of one sensor, camera and target unchanged.
+std::string sha256_of(const SensorIdentity& identity);
+
+/// Of what the camera shows: size, lens, mirroring; not of its timing.
+std::string sha256_of(const CameraModel& camera);
+
+/// Of stiffness and offset, to six digits.
+std::string sha256_of(const WrenchModel& model);
+
 }  // namespace tagwrench

@@ -5,18 +5,17 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
+#include "host/core/config_error.h"
 #include "host/core/yaml/yaml_reader.h"
-#include "host/sensor/appearance_file.h"
 #include "host/sensor/calibration_file.h"
-#include "host/sensor/lens_check.h"
-#include "host/sensor/measured.h"
+#include "host/sensor/geometry_keys.h"
 #include "host/sensor/measured_files.h"
-#include "host/sensor/pose_keys.h"
+#include "host/tracker/rotation.h"
 #include "host/wrench/estimate.h"
-#include "host/wrench/spring_model.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -25,6 +24,133 @@ namespace {
 constexpr double kMm = 1e-3;
 constexpr double kMinTag_mm = 0.01;
 constexpr double kMaxTag_mm = 10'000;
+
+namespace fs = std::filesystem;
+
+std::string shown(const char* file) { return fmt::format("{}/{}", kMeasuredFolder, file); }
+
+[[noreturn]] void refuse(const fs::path& file, const std::string& why, const char* remedy) {
+  throw ConfigError(fmt::format("{}: {}; {}, or remove the file", file.string(), why, remedy));
+}
+
+/// camera_info speaks of the image as the camera delivers it, we of what it is turned back to.
+CameraModel turned_back(CameraModel camera) {
+  camera.cx_px = camera.width_px - 1 - camera.cx_px;
+  camera.distortion[3] = -camera.distortion[3];
+  return camera;
+}
+
+std::string ids_of(const TargetDescription& target) {
+  std::vector<int> ids;
+  for (const Tag& tag : target.tags) ids.push_back(tag.id);
+  std::sort(ids.begin(), ids.end());
+  std::string out;
+  for (const int id : ids) out += fmt::format("{}{}", out.empty() ? "" : ",", id);
+  return out;
+}
+
+std::string described(const TargetDescription& target) {
+  return fmt::format("tags {} of {}, {:.6g} mm", ids_of(target), name(target.family),
+                     target.tag_size * 1e3);
+}
+
+/// What of measured/ is put over what sensor.yaml says, and whether it may be. All throw
+/// ConfigError that names the file, what does not fit and the remedy.
+struct Measured {
+  fs::path sensor;  ///< path of sensor.yaml, or what stands for it
+  fs::path folder;  ///< empty: nothing was measured
+  WrenchCalibration use = WrenchCalibration::use;
+
+  bool has_target() const {
+    return use < WrenchCalibration::without_target && is_measured(folder, kMeasuredTarget);
+  }
+
+  bool has_wrench() const {
+    return use < WrenchCalibration::without_target && is_measured(folder, kMeasuredWrench);
+  }
+
+  // In this order: each is held against those before it.
+
+  void take_camera(SensorConfig& to) const {
+    if (use >= WrenchCalibration::without_camera || !is_measured(folder, kMeasuredCamera)) return;
+    const fs::path path = folder / kMeasuredCamera;
+    const CameraFile file = read_camera_file(path);
+    check_owner(path, file.stamp, sensor);
+    CameraModel camera = file.camera;
+    if (camera.width_px != to.camera.width_px || camera.height_px != to.camera.height_px) {
+      refuse(path,
+             fmt::format("is of {}x{} pixels, but sensor.yaml's camera is {}x{}", camera.width_px,
+                         camera.height_px, to.camera.width_px, to.camera.height_px),
+             "run `tagwrench calibrate camera` at that size");
+    }
+    camera.mirrored = file.mirrored.value_or(to.camera.mirrored);
+    if (camera.mirrored) camera = turned_back(camera);
+    camera.readout = to.camera.readout;
+    to.camera = camera;
+    to.camera_calibrated.reset();
+    if (file.views > 0)
+      to.camera_calibrated = CameraRecord{file.stamp.date, file.views, file.rms_px};
+    to.camera_from = {shown(kMeasuredCamera), file.stamp.date};
+  }
+
+  void take_target(SensorConfig& to) const {
+    if (!has_target()) return;
+    constexpr const char* kRemedy = "run `tagwrench calibrate target`";
+    const fs::path path = folder / kMeasuredTarget;
+    const TargetFile file = read_target_file(path);
+    check_owner(path, file.stamp, sensor);
+    if (described(file.target) != described(to.target)) {
+      refuse(path,
+             fmt::format("is of {}, but sensor.yaml has {}", described(file.target),
+                         described(to.target)),
+             kRemedy);
+    }
+    if (file.camera_sha256 != sha256_of(to.camera)) {
+      refuse(path,
+             fmt::format("was found with another camera than the one of {}", to.camera_from.file),
+             kRemedy);
+    }
+    for (Tag& tag : to.target.tags) {
+      const auto its = std::find_if(file.target.tags.begin(), file.target.tags.end(),
+                                    [&](const Tag& other) { return other.id == tag.id; });
+      if (its != file.target.tags.end()) tag = *its;
+    }
+    to.rest.camera_T_platform = file.rest;
+    to.rest.appearance.reset();
+    if (file.picture) {
+      to.rest.appearance = read_measured_picture(folder, *file.picture, to.camera);
+      to.rest.frames = file.picture->frames;
+    }
+    if (file.readout) to.camera.readout = *file.readout;
+    to.target_from = {shown(kMeasuredTarget), file.stamp.date};
+  }
+
+  /// Its path alone.
+  void name_wrench(SensorConfig& to) const {
+    if (!has_wrench()) return;
+    to.calibration = (folder / kMeasuredWrench).string();
+    to.wrench_from.file = shown(kMeasuredWrench);
+  }
+
+  void take_zero(SensorConfig& to) const {
+    if (use >= WrenchCalibration::ignore || !is_measured(folder, kMeasuredZero)) return;
+    const fs::path path = folder / kMeasuredZero;
+    const ZeroFile file = read_zero_file(path);
+    check_owner(path, file.stamp, sensor);
+    const bool same_sensor =
+        file.sensor_sha256 == sha256_of(identity_of(to.camera, to.target, to.rest));
+    if (!same_sensor || file.wrench_sha256 != sha256_of(to.wrench)) {
+      if (use == WrenchCalibration::zero_that_fits) return;
+      refuse(path,
+             same_sensor ? "was found with another calibration in newtons"
+                         : "was found with another camera or target",
+             "run `tagwrench zero`");
+    }
+    to.zero.set = file.zero;
+    to.zero.date = file.stamp.date;
+    to.zero_from = {shown(kMeasuredZero), file.stamp.date};
+  }
+};
 
 /// {date: YYYY-MM-DD, views: N, rms_px: x}
 CameraRecord read_camera_record(YamlReader node) {
@@ -55,12 +181,7 @@ CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record, do
   camera.cy_px = node.within("cy", -kFarthestCentre_px, kFarthestCentre_px);
   const std::vector<double> distortion = node.numbers_or("distortion", std::vector<double>(5, 0.0));
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
-  if (const auto at = fold(camera)) {
-    node.fail("distortion",
-              fmt::format("folds the image at pixel ({:.0f}, {:.0f}), which no lens does; run "
-                          "`tagwrench calibrate camera`, or leave it out",
-                          at->x(), at->y()));
-  }
+  check_no_fold(node, "distortion", camera, "leave it out");
   camera.mirrored = node.boolean_or("mirrored", false);
   camera.readout = read_ms(node, "readout_ms", 200, "all rows at once") * 1e-3;
   latency = read_ms(node, "latency_ms", 500, "not known") * 1e-3;
@@ -71,22 +192,16 @@ CameraModel read_camera(YamlReader node, std::optional<CameraRecord>& record, do
 
 TargetDescription read_target(YamlReader node) {
   TargetDescription target;
-  std::vector<std::string_view> families;
-  for (int i = 0; i < kTagFamilies; ++i) families.push_back(name(static_cast<TagFamily>(i)));
-  target.family = static_cast<TagFamily>(node.one_of("family", families));
+  target.family = read_family(node);
   target.tag_size = node.within("tag_size_mm", kMinTag_mm, kMaxTag_mm) * kMm;
   if (node.has("border_mm")) target.border = node.within("border_mm", 0, kMaxTag_mm) * kMm;
   target.tags.clear();
   for (YamlReader& entry : node.children("tags")) {
-    Tag tag;
-    tag.id = entry.integer("id", 0, id_count(target.family) - 1);
+    const Tag tag = read_tag(entry, target.family);
     for (const Tag& other : target.tags) {
       if (other.id == tag.id)
         entry.fail("id", fmt::format("tag {} is listed twice; every tag needs its own id", tag.id));
     }
-    tag.platform_T_tag = optional_pose(entry);
-    tag.sigma = optional_pose_sigma(entry, tag.platform_T_tag.has_value());
-    entry.finish();
     target.tags.push_back(tag);
   }
   if (target.tags.size() > static_cast<std::size_t>(kMaxTags))
@@ -154,12 +269,8 @@ Vector6 force_and_torque(YamlReader& node, const std::string& force_key,
 ZeroConfig read_zero(YamlReader& node) {
   constexpr double kPercent = 0.01;
   ZeroConfig zero;
-  if (node.has("zero_n") != node.has("zero_nm")) {
-    node.fail(node.has("zero_n") ? "zero_n" : "zero_nm",
-              "zero_n and zero_nm belong together; give both or neither, or run `tagwrench zero`");
-  }
-  zero.set << vector3(node.numbers_or("zero_n", {0, 0, 0})),
-      vector3(node.numbers_or("zero_nm", {0, 0, 0}));
+  if (both_or_neither(node, "zero_n", "zero_nm", ", or run `tagwrench zero`"))
+    zero.set << vector3(node.numbers("zero_n", 3)), vector3(node.numbers("zero_nm", 3));
   zero.date = optional_date(node, "zero_date");
   zero.follow = node.boolean_or("zero_tracking", zero.follow);
   if (node.has("zero_band_percent")) zero.band = node.within("zero_band_percent", 0, 10) * kPercent;
@@ -202,14 +313,15 @@ WrenchModel read_wrench(YamlReader node, SensorConfig& sensor, const Measured& m
   }
   measured.name_wrench(sensor);
   if (!sensor.calibration.empty() && measured.use < WrenchCalibration::ignore) {
-    load_calibration(sensor.calibration, sensor.camera, sensor.target, sensor.rest, model);
-    sensor.completed_axes = completed_axes(sensor.calibration);
-    sensor.wrench_from.date = calibration_date(sensor.calibration).substr(0, 10);
+    const CalibrationFacts facts =
+        load_calibration(sensor.calibration, sensor.camera, sensor.target, sensor.rest, model);
+    sensor.completed_axes = facts.completed_axes;
+    sensor.wrench_from.date = facts.date.substr(0, 10);
   }
   model.range = force_and_torque(node, "range_n", "range_nm", model.range);
   model.wrench_origin = vector3(node.numbers_or("origin_mm", {0, 0, 0})) * kMm;
   model.camera_R_wrench_frame =
-      rotation_of(vector3(node.numbers_or("frame_rotation_rad", {0, 0, 0})));
+      rotation_from_vector(vector3(node.numbers_or("frame_rotation_rad", {0, 0, 0})));
   sensor.zero = read_zero(node);
   sensor.zero_from.date = sensor.zero.date;
   if (node.has("reference")) sensor.reference = read_reference(node.child("reference"));
@@ -306,6 +418,10 @@ SensorConfig read_sensor(YamlReader root, const Measured& measured) {
   return sensor;
 }
 
+std::string line(const char* what, const std::string& file, const std::string& date) {
+  return fmt::format("{}: {}{}", what, file, date.empty() ? "" : ", of " + date);
+}
+
 }  // namespace
 
 SensorConfig load_sensor(const std::string& path, WrenchCalibration use) {
@@ -315,6 +431,30 @@ SensorConfig load_sensor(const std::string& path, WrenchCalibration use) {
 SensorConfig parse_sensor(const std::string& text, const std::string& name, WrenchCalibration use,
                           const std::filesystem::path& measured) {
   return read_sensor(YamlReader::from_text(text, name), {name, measured, use});
+}
+
+std::vector<std::string> in_force(const SensorConfig& sensor) {
+  std::vector<std::string> lines = {
+      line("camera", sensor.camera_from.file, sensor.camera_from.date)};
+  const bool placed = sensor.rest.camera_T_platform.has_value();
+  lines.push_back(placed ? line("target", sensor.target_from.file, sensor.target_from.date)
+                         : "target: sensor.yaml; its rest is learned at every start");
+  lines.push_back(sensor.calibration.empty()
+                      ? "wrench: sensor.yaml's springs"
+                      : line("wrench", sensor.wrench_from.file, sensor.wrench_from.date));
+  const bool zero = !sensor.zero.date.empty() || !sensor.zero.set.isZero();
+  lines.push_back(zero ? line("zero", sensor.zero_from.file, sensor.zero_from.date)
+                       : "zero: none is set");
+  return lines;
+}
+
+Profile default_profile(const SensorConfig& sensor) {
+  const Vector6 range = range_through(WrenchEstimator(sensor.wrench).tool(), sensor.wrench.range);
+  Profile profile;
+  profile.name = "default";
+  profile.shaping = sensor.shaping;
+  profile.gestures = gestures_for(range, sensor.shaping.hid_R_camera);
+  return profile;
 }
 
 }  // namespace tagwrench

@@ -6,17 +6,19 @@
 // sensor.yaml -> the plain structs that the rooms take. Every check and message is here.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "host/motion/profile_config.h"
 #include "host/motion/shaping.h"
-#include "host/sensor/reference_line.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/target.h"
 #include "host/wrench/estimate.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 
@@ -41,6 +43,14 @@ struct ZeroConfig {
   bool follow = true;
   double band = 0.02;        ///< of the range
   double rate = 0.5 / 3000;  ///< of the range a second
+};
+
+/// A load cell that stays on the sensor for good, and the line along which it acts.
+struct ReferenceLine {
+  int channel = 0;                                       ///< of the board
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();       ///< where it takes hold, platform frame, m
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< of the force on the platform when the
+                                                         ///< cell reads more than 0, camera axes
 };
 
 /// Which file tells something, for people.
@@ -88,5 +98,21 @@ SensorConfig parse_sensor(const std::string& text, const std::string& name,
 
 /// Lines for people: which file tells camera, target, wrench and zero, and of when.
 std::vector<std::string> in_force(const SensorConfig& sensor);
+
+/// The profile of a sensor for which nobody has chosen one: the sensor's own shaping and mounting,
+/// gestures scaled to its range, none of which does anything.
+Profile default_profile(const SensorConfig& sensor);
+
+/// Of the following of zero. `tool` is WrenchEstimator::tool() of this sensor; `may_follow`: false
+/// keeps the zero where it is set.
+inline ZeroOptions zero_options(const SensorConfig& sensor, const Matrix6& tool, bool may_follow) {
+  ZeroOptions options;
+  options.follow = may_follow && sensor.zero.follow;
+  options.range = range_through(tool, sensor.wrench.range);
+  options.set = tool * sensor.zero.set;
+  options.band = sensor.zero.band;
+  options.rate = sensor.zero.rate;
+  return options;
+}
 
 }  // namespace tagwrench

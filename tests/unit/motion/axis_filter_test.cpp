@@ -1,5 +1,3 @@
-#include "host/motion/axis_filter.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "host/motion/shaping.h"
 #include "tests/unit/motion/pushed.h"
 
 namespace tagwrench {

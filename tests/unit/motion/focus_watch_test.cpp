@@ -16,7 +16,7 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/motion/profile_manager.h"
-#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 
 namespace tagwrench {

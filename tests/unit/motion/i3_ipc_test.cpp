@@ -1,5 +1,3 @@
-#include "host/motion/i3_ipc.h"
-
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -10,8 +8,9 @@
 #include <cstring>
 
 #include "host/core/os/unique_fd.h"
+#include "host/motion/focus_watch.h"
 #include "host/motion/profile_manager.h"
-#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/unit/motion/profile_folder.h"
 
 namespace tagwrench {

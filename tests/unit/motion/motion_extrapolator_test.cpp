@@ -1,7 +1,5 @@
 // Motion between the frames of a slow camera: nearer to the truth than the newest frame, and never
 // beyond it.
-#include "host/motion/motion_extrapolator.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "host/motion/shaping.h"
 #include "tests/unit/motion/pushed.h"
 
 namespace tagwrench {

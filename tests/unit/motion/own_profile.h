@@ -4,7 +4,7 @@
 #include <string>
 
 #include "host/motion/profile_config.h"
-#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 
 namespace tagwrench::test {

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "host/core/config_error.h"
-#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 
 namespace tagwrench {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "host/motion/profile_files.h"
+#include "host/motion/profile_config.h"
 #include "tests/unit/motion/own_profile.h"
 
 namespace tagwrench {

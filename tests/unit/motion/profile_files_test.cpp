@@ -1,10 +1,9 @@
-#include "host/motion/profile_files.h"
-
 #include <gtest/gtest.h>
 #include <poll.h>
 
 #include "host/core/config_error.h"
-#include "host/sensor/default_profile.h"
+#include "host/motion/profile_config.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/unit/motion/profile_folder.h"
 
 namespace tagwrench {

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <future>
 
-#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/unit/motion/profile_folder.h"
 
 namespace tagwrench {

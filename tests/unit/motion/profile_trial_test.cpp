@@ -5,7 +5,7 @@
 #include <future>
 
 #include "host/motion/profile_manager.h"
-#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/unit/motion/profile_folder.h"
 
 namespace tagwrench {
@@ -16,7 +16,7 @@ class Trial : public test::ProfileFolder {
   Trial() {
     write("mine.yaml", "translation: 1\n");
     profiles_.emplace(ProfileFiles({path("mine.yaml"), "cad"}, default_profile(sensor_)),
-                      ControlSocket(path("control")), std::nullopt);
+                      ControlSocket(path("control")), nullptr);
   }
   std::string asks(ControlClient& client, const std::string& request) {
     auto answer = std::async(std::launch::async, [&] { return client.ask(request); });

@@ -1,10 +1,10 @@
-#include "host/motion/response_curve.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
+
+#include "host/motion/shaping.h"
 
 namespace tagwrench {
 namespace {

@@ -11,8 +11,7 @@
 #include <optional>
 
 #include "host/core/config_error.h"
-#include "host/output/joystick.h"
-#include "host/output/uhid_outputs.h"
+#include "host/output/hid_outputs.h"
 #include "samples.h"
 
 namespace tagwrench {

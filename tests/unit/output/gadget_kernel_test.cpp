@@ -1,6 +1,4 @@
 // Controllers and nodes, as a sysfs and a /dev in a folder show them.
-#include "host/output/gadget_kernel.h"
-
 #include <gtest/gtest.h>
 #include <sys/sysmacros.h>
 
@@ -9,6 +7,7 @@
 
 #include "gadget_rig.h"
 #include "host/core/config_error.h"
+#include "host/output/gadget_tree.h"
 
 namespace tagwrench {
 namespace {

@@ -17,7 +17,6 @@
 
 #include "gadget_rig.h"
 #include "host/core/config_error.h"
-#include "host/output/gadget_reports.h"
 #include "host/output/hid_report.h"
 #include "samples.h"
 
@@ -282,7 +281,7 @@ class SecondNode {
   }
   ~SecondNode() { ::unlink(address_.sun_path); }
 
-  GadgetDaemon::OpenNode opener() const {
+  OpenGadgetNode opener() const {
     return [address = address_] {
       OpenedNode node;
       node.path = "hidg1";
@@ -321,14 +320,13 @@ class SecondNode {
 /// A daemon in a thread, with a bridge by hand: what it opens by itself is no real node.
 class DaemonByHand {
  public:
-  DaemonByHand(const std::string& folder, OpenedNode node, GadgetDaemon::OpenNode open) {
+  DaemonByHand(const std::string& folder, OpenedNode node, OpenGadgetNode open) {
     int ends[2];
     EXPECT_EQ(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends), 0);
     bridge_.reset(ends[0]);
     thread_ = std::thread([link = ends[1], folder, node = std::move(node), open]() mutable {
-      GadgetDaemon(GadgetFace::spacemouse, UniqueFd(link), watch_nodes(folder), std::move(node),
-                   open)
-          .run();
+      run_gadget_daemon(GadgetFace::spacemouse, UniqueFd(link), watch_nodes(folder),
+                        std::move(node), open);
     });
   }
   ~DaemonByHand() {

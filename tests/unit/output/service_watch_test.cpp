@@ -1,6 +1,4 @@
 // systemd's side of sd_notify(3) is played by a socket of the test.
-#include "host/output/service_watch.h"
-
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -11,6 +9,7 @@
 #include <filesystem>
 #include <string>
 
+#include "host/output/watchdog.h"
 #include "tests/support/temporary_folder.h"
 
 namespace tagwrench {

@@ -21,7 +21,6 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/output/spnav_daemon.h"
-#include "host/output/spnav_link.h"
 #include "tests/support/temporary_folder.h"
 
 namespace tagwrench::test {
@@ -140,8 +139,9 @@ class DaemonThread {
     stopped_.reset(ends[1]);
     std::optional<SpnavSockets> sockets = listen_spnav(path);
     if (!sockets) throw std::runtime_error("a daemon is there already");
-    daemon_.emplace(std::move(*sockets), options, stopped_.get());
-    thread_ = std::thread([this] { daemon_->run(); });
+    thread_ = std::thread([options, stop = stopped_.get(), own = std::move(*sockets)]() mutable {
+      run_spnav_daemon(std::move(own), options, stop);
+    });
   }
   DaemonThread(const DaemonThread&) = delete;
   DaemonThread& operator=(const DaemonThread&) = delete;
@@ -150,7 +150,6 @@ class DaemonThread {
   void stop() {
     stop_.reset();
     wait();
-    daemon_.reset();
   }
   void wait() {
     if (thread_.joinable()) thread_.join();
@@ -159,7 +158,6 @@ class DaemonThread {
  private:
   UniqueFd stop_;
   UniqueFd stopped_;
-  std::optional<SpnavDaemon> daemon_;
   std::thread thread_;
 };
 

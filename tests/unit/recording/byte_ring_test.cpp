@@ -1,10 +1,10 @@
-#include "host/recording/byte_ring.h"
-
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <random>
 #include <thread>
+
+#include "host/recording/writer.h"
 
 namespace tagwrench::record {
 namespace {

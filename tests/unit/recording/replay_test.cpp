@@ -1,8 +1,8 @@
 // A recording as a source: what was decoded is decoded again, and nothing more.
 #include <poll.h>
 
+#include "host/source/frame_source.h"
 #include "host/source/recording.h"
-#include "host/source/region_source.h"
 #include "tests/unit/recording/recorded.h"
 
 namespace tagwrench::record::test {

@@ -1,5 +1,3 @@
-#include "host/sensor/appearance_file.h"
-
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -9,6 +7,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
+#include "host/sensor/measured_files.h"
 #include "host/sensor/sensor_config.h"
 #include "tests/support/temporary_folder.h"
 

@@ -10,7 +10,6 @@
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/sha256.h"
-#include "host/sensor/appearance_file.h"
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/sensor_config.h"
 #include "tests/support/temporary_folder.h"

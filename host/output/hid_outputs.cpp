@@ -1,16 +1,20 @@
-#include "host/output/uhid_device.h"
+#include "host/output/hid_outputs.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/uinput.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
+#include <utility>
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
+#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {
@@ -45,10 +49,41 @@ ssize_t write_event(const UniqueFd& uhid, const void* event, std::size_t size) {
   return uninterrupted([&] { return ::write(uhid.get(), event, size); });
 }
 
-UniqueFd open_uhid() {
-  UniqueFd fd(::open(UhidDevice::kPath, O_RDWR | O_CLOEXEC | O_NONBLOCK));
-  if (!fd) throw ConfigError(cannot_open_node(UhidDevice::kPath, "uhid", errno));
-  return fd;
+constexpr std::uint16_t k3dconnexion = 0x256f;
+constexpr std::uint16_t kLogitech = 0x046d;
+
+const UhidIdentity& checked(const UhidIdentity& identity) {
+  if (identity.vendor != kLogitech) return identity;
+  throw ConfigError(
+      "spacemouse id " + hex_id(identity.vendor, identity.product) +
+      ": the kernel's hid-logitech driver refuses virtual devices of this vendor; use "
+      "256f:c62e or an id of your own");
+}
+
+constexpr const char* kPath = "/dev/uinput";
+constexpr std::uint16_t kAxes[] = {ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ};
+
+// Six absolute axes without any key would be an accelerometer to udev and SDL; these codes mean
+// joystick to both.
+constexpr std::array<std::uint16_t, kJoystickButtons> kButtons = {
+    BTN_TRIGGER, BTN_THUMB, BTN_THUMB2, BTN_TOP, BTN_TOP2, BTN_PINKIE, BTN_BASE, BTN_BASE2};
+
+/// The driver's lock is interruptible.
+template <typename... Argument>
+bool order(int fd, unsigned long request, Argument... argument) {
+  return uninterrupted([&] { return ::ioctl(fd, request, argument...); }) == 0;
+}
+
+uinput_setup setup_of(const JoystickOptions& options) {
+  uinput_setup setup{};
+  if (options.name.empty() || options.name.size() >= sizeof setup.name ||
+      !printable(options.name)) {
+    throw ConfigError("joystick name: must be 1 to 79 printable bytes; change it");
+  }
+  std::memcpy(setup.name, options.name.data(), options.name.size());
+  // Games that look for a bus, vendor and product skip devices without them.
+  setup.id = {BUS_USB, options.vendor, options.product, 0x0100};
+  return setup;
 }
 
 }  // namespace
@@ -75,8 +110,11 @@ std::string cannot_open_node(const std::string& path, const char* module, int er
   }
 }
 
-UhidDevice::UhidDevice(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor)
-    : UhidDevice(open_uhid(), identity, descriptor) {}
+UniqueFd UhidDevice::open() {
+  UniqueFd fd(::open(kPath, O_RDWR | O_CLOEXEC | O_NONBLOCK));
+  if (!fd) throw ConfigError(cannot_open_node(kPath, "uhid", errno));
+  return fd;
+}
 
 UhidDevice::UhidDevice(UniqueFd uhid, const UhidIdentity& identity,
                        std::span<const std::uint8_t> descriptor,
@@ -228,6 +266,149 @@ WatchdogDevice UhidDevice::watchdog_device(
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(&destroy);
   device.destroy.assign(bytes, bytes + sizeof destroy);
   return device;
+}
+
+SpacemouseOutput::SpacemouseOutput(const SpacemouseOptions& options, UniqueFd uhid)
+    : device_(std::move(uhid), checked(options), spacemouse_descriptor()),
+      vendor_(options.vendor),
+      product_(options.product) {
+  device_.send(spacemouse_report({}));
+}
+
+SpacemouseOutput::~SpacemouseOutput() {
+  device_.send(spacemouse_report({}));
+  const SpacemouseButtonReport released = spacemouse_button_report(0);
+  if (last_buttons_ != released) device_.send(released);
+}
+
+SendStatus SpacemouseOutput::move(const Sample& sample) noexcept {
+  Counts6 wanted{};
+  std::uint32_t pressed = 0;
+  if (carries_numbers(shown_status(sample))) {
+    pressed = sample.buttons;
+    wanted = to_counts(sample.deflection, kSpacemouseLimit_counts);
+    if (vendor_ != k3dconnexion) wanted = to_spnav_order(wanted);
+  }
+  const Counts6 counts = dithered(wanted, last_);
+  const SendStatus status = device_.send(spacemouse_report(counts));
+  if (status == SendStatus::ok) last_ = counts;
+  const SpacemouseButtonReport buttons = spacemouse_button_report(pressed);
+  if (status != SendStatus::ok || buttons == last_buttons_) return status;
+  const SendStatus pressing = device_.send(buttons);
+  if (pressing == SendStatus::ok) last_buttons_ = buttons;
+  return pressing;
+}
+
+std::string_view SpacemouseOutput::service() noexcept {
+  const bool before = led_;
+  while (const auto report = device_.next_output()) {
+    if (report->size >= 2 && report->bytes[0] == kSpacemouseLedReportId) {
+      led_ = (report->bytes[1] & 1) != 0;
+    }
+  }
+  if (led_ == before) return {};
+  return led_ ? "spacemouse: LED on" : "spacemouse: LED off";
+}
+
+std::string SpacemouseOutput::spacenavd_advice() const {
+  if (vendor_ == k3dconnexion) return {};
+  return "spacenavd: add this line to /etc/spnavrc and restart it: device-id = " +
+         hex_id(vendor_, product_);
+}
+
+void SpacemouseOutput::add_to(std::vector<WatchdogDevice>& devices) const {
+  const SpacemouseReport rest = spacemouse_report({});
+  const SpacemouseButtonReport released = spacemouse_button_report(0);
+  devices.push_back(device_.watchdog_device({rest, released}));
+}
+
+WrenchHidOutput::WrenchHidOutput(const WrenchHidOptions& options, UniqueFd uhid)
+    : device_(std::move(uhid), options, wrench_descriptor()) {}
+
+WrenchHidOutput::~WrenchHidOutput() { device_.send(neutral_wrench_report()); }
+
+SendStatus WrenchHidOutput::send(const Sample& sample) noexcept {
+  return device_.send(wrench_report(sample));
+}
+
+std::string_view WrenchHidOutput::service() noexcept {
+  // No output report is declared: what comes is answered and dropped.
+  while (device_.next_output()) {
+  }
+  return {};
+}
+
+void WrenchHidOutput::add_to(std::vector<WatchdogDevice>& devices) const {
+  devices.push_back(device_.watchdog_device({neutral_wrench_report()}));
+}
+
+JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noexcept {
+  JoystickEvents events{};
+  for (std::size_t i = 0; i < 6; ++i) {
+    events[i].type = EV_ABS;
+    events[i].code = kAxes[i];
+    events[i].value = counts[i];
+  }
+  for (std::size_t i = 0; i < kJoystickButtons; ++i) {
+    events[6 + i].type = EV_KEY;
+    events[6 + i].code = kButtons[i];
+    events[6 + i].value = (pressed >> i) & 1U;
+  }
+  events.back().type = EV_SYN;
+  events.back().code = SYN_REPORT;
+  return events;
+}
+
+JoystickOutput::JoystickOutput(const JoystickOptions& options) {
+  uinput_setup setup = setup_of(options);
+  uinput_.reset(::open(kPath, O_WRONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!uinput_) throw ConfigError(cannot_open_node(kPath, "uinput", errno));
+  const int fd = uinput_.get();
+  bool good = order(fd, UI_SET_EVBIT, EV_KEY) && order(fd, UI_SET_EVBIT, EV_ABS);
+  for (const int button : kButtons) good = good && order(fd, UI_SET_KEYBIT, button);
+  for (const std::uint16_t axis : kAxes) {
+    uinput_abs_setup abs{};
+    abs.code = axis;
+    abs.absinfo.minimum = -kJoystickLimit_counts;
+    abs.absinfo.maximum = kJoystickLimit_counts;
+    good = good && order(fd, UI_ABS_SETUP, &abs);
+  }
+  good = good && order(fd, UI_DEV_SETUP, &setup) && order(fd, UI_DEV_CREATE);
+  if (!good) {
+    throw ConfigError(std::string(kPath) + ": the kernel refused " + options.name + ": " +
+                      std::strerror(errno) + "; it needs Linux 4.5 or later");
+  }
+}
+
+JoystickOutput::~JoystickOutput() {
+  JoystickOutput::move(Sample{});
+  order(uinput_.get(), UI_DEV_DESTROY);  // the watchdog's duplicate of the fd would keep it alive
+}
+
+SendStatus JoystickOutput::move(const Sample& sample) noexcept {
+  Counts6 counts{};
+  std::uint32_t pressed = 0;
+  if (carries_numbers(shown_status(sample))) {
+    pressed = sample.buttons;
+    counts = to_counts(sample.deflection, kJoystickLimit_counts);
+  }
+  const JoystickEvents events = joystick_events(counts, pressed);
+  const auto write = [&] { return ::write(uinput_.get(), events.data(), sizeof events); };
+  if (uninterrupted(write) >= 0) return SendStatus::ok;
+  if (errno == EAGAIN) return SendStatus::skipped;
+  error_ = errno;
+  return SendStatus::failed;
+}
+
+std::string JoystickOutput::failure() const {
+  return fmt::format("{}: the kernel no longer takes events: {}; start again", kPath,
+                     std::strerror(error_));
+}
+
+void JoystickOutput::add_to(std::vector<WatchdogDevice>& devices) const {
+  const JoystickEvents neutral = joystick_events({}, 0);
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(neutral.data());
+  devices.push_back({uinput_.get(), {{bytes, bytes + sizeof neutral}}, {}});
 }
 
 }  // namespace tagwrench

@@ -1,0 +1,204 @@
+// Virtual devices of this computer: a SpaceMouse and a sensor in newtons through /dev/uhid (Linux
+// Documentation/hid/uhid.rst), with evdev node, hidraw node and LED back-channel as real USB
+// devices have them; a joystick through /dev/uinput.
+#pragma once
+
+#include <linux/input.h>
+#include <linux/uhid.h>
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "host/core/os/unique_fd.h"
+#include "host/output/hid_report.h"
+#include "host/output/output.h"
+#include "host/output/watchdog.h"
+
+namespace tagwrench {
+
+struct UhidIdentity {
+  std::string name;    ///< HID_NAME, 1..127 bytes, printable
+  std::string serial;  ///< HID_UNIQ, at most 63 bytes; tells two devices of one kind apart
+  std::uint16_t vendor = 0;
+  std::uint16_t product = 0;
+};
+
+/// What a client sent to the device, report id first.
+struct HidOutputReport {
+  std::array<std::uint8_t, 64> bytes{};
+  std::size_t size = 0;
+};
+
+class UhidDevice {
+ public:
+  static constexpr const char* kPath = "/dev/uhid";
+  /// The kernel starts a device in milliseconds once its driver is loaded; the rest is patience
+  /// with a slow machine.
+  static constexpr std::chrono::milliseconds kStartTimeout{3000};
+
+  /// Opens /dev/uhid. Throws ConfigError: it is not there, no permission.
+  static UniqueFd open();
+
+  /// Creates the device on BUS_USB and waits until the kernel has started it. Throws ConfigError:
+  /// refused by the kernel, not started in time.
+  UhidDevice(UniqueFd uhid, const UhidIdentity& identity, std::span<const std::uint8_t> descriptor,
+             std::chrono::milliseconds start_timeout = kStartTimeout);
+
+  UhidDevice(UhidDevice&&) = default;
+  UhidDevice& operator=(UhidDevice&&) = delete;
+  /// Destroys the device; the watchdog's duplicate of the fd cannot keep it alive.
+  ~UhidDevice();
+
+  /// Sends one input report, report id first, at most 64 bytes. Never blocks, never queues.
+  SendStatus send(std::span<const std::uint8_t> report) noexcept;
+
+  /// Answers what the kernel asks and returns the next output report that a client has sent, if
+  /// there is one.
+  std::optional<HidOutputReport> next_output() noexcept;
+
+  /// Readable when next_output() has something to do.
+  int fd() const noexcept { return uhid_.get(); }
+
+  /// One line about the last failed send().
+  std::string failure() const;
+
+  /// For the watchdog: these input reports, then the device's end.
+  WatchdogDevice watchdog_device(
+      std::initializer_list<std::span<const std::uint8_t>> neutral) const;
+
+ private:
+  void create(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor);
+  void wait_for_start(const UhidIdentity& identity, std::chrono::milliseconds timeout);
+  bool read_event() noexcept;
+  void answer_get_report() noexcept;
+
+  UniqueFd uhid_;
+  std::string label_;  ///< of messages: "/dev/uhid: tagwrench SpaceMouse (256f:c62e)"
+  std::unique_ptr<uhid_event> event_;  ///< 4380 bytes, read again and again
+  HidOutputReport last_input_;         ///< what GET_REPORT is answered with
+  int error_ = 0;
+};
+
+/// "256f:c62e"
+std::string hex_id(std::uint16_t vendor, std::uint16_t product);
+
+/// What to say when the node at `path` (/dev/uhid, /dev/uinput) does not open: path, cause, remedy,
+/// in one line.
+std::string cannot_open_node(const std::string& path, const char* module, int error);
+
+// A virtual SpaceMouse: spacenavd, hidapi programs and browsers take it for a 3Dconnexion
+// SpaceMouse Wireless.
+
+/// SpaceMouse Wireless: one combined report, two buttons. 256f is 3Dconnexion's vendor id, which
+/// clients look for. With an own id the axes go out in spnav's order, because spacenavd passes them
+/// straight through; see spacenavd_advice().
+struct SpacemouseOptions : UhidIdentity {
+  SpacemouseOptions() : UhidIdentity{"tagwrench SpaceMouse", "tagwrench-0", 0x256f, 0xc62e} {}
+};
+
+/// Sends Sample::deflection as +-350 counts, and buttons when they change. Zero at rest is exact
+/// and sent with every move, so that a slow hidraw reader that lost reports still learns of the
+/// release. Off-centre every move makes an event (see dithered()). A status that carries no numbers
+/// is zeros at once.
+class SpacemouseOutput : public Output {
+ public:
+  /// Throws ConfigError: /dev/uhid is not usable, or vendor 046d, whose SpaceMouse ids the kernel
+  /// gives to hid-logitech, which takes real USB devices only.
+  explicit SpacemouseOutput(const SpacemouseOptions& options, UniqueFd uhid = UhidDevice::open());
+  ~SpacemouseOutput() override;
+
+  SendStatus move(const Sample& sample) noexcept override;
+  std::string failure() const override { return device_.failure(); }
+  int poll_fd() const noexcept override { return device_.fd(); }
+  std::string_view service() noexcept override;
+
+  /// What the client last asked of the LED.
+  bool led() const noexcept { return led_; }
+
+  /// What to add to /etc/spnavrc for an own id; empty where spacenavd finds the device by itself.
+  std::string spacenavd_advice() const;
+
+  void add_to(std::vector<WatchdogDevice>& devices) const;
+
+ private:
+  UhidDevice device_;
+  std::uint16_t vendor_;
+  std::uint16_t product_;
+  Counts6 last_{};
+  SpacemouseButtonReport last_buttons_ = spacemouse_button_report(0);
+  bool led_ = false;
+};
+
+// A virtual HID sensor that carries calibrated force and torque: any HID parser recovers N and N m
+// from the report descriptor, see hid_report.h for the layout.
+
+/// 1209 is pid.codes, the vendor id for open hardware. A placeholder until this product id is
+/// registered there.
+struct WrenchHidOptions : UhidIdentity {
+  WrenchHidOptions() : UhidIdentity{"tagwrench wrench sensor", "tagwrench-0", 0x1209, 0x7a6e} {}
+};
+
+/// One report a sample, always of full size, statuses without numbers included.
+class WrenchHidOutput : public Output {
+ public:
+  /// Throws ConfigError if /dev/uhid is not usable.
+  explicit WrenchHidOutput(const WrenchHidOptions& options, UniqueFd uhid = UhidDevice::open());
+  ~WrenchHidOutput() override;
+
+  SendStatus send(const Sample& sample) noexcept override;
+  std::string failure() const override { return device_.failure(); }
+  int poll_fd() const noexcept override { return device_.fd(); }
+  std::string_view service() noexcept override;
+
+  void add_to(std::vector<WatchdogDevice>& devices) const;
+
+ private:
+  UhidDevice device_;
+};
+
+// A six-axis joystick for games (SDL, Gamepad API) through /dev/uinput (Linux
+// Documentation/input/uinput.rst).
+
+inline constexpr int kJoystickLimit_counts = 32767;
+
+struct JoystickOptions {
+  /// pid.codes; a placeholder like the wrench sensor's. Games remember their bindings by this id.
+  std::uint16_t vendor = 0x1209;
+  std::uint16_t product = 0x7a6f;
+  std::string name = "tagwrench joystick";  ///< 1..79 bytes, printable
+};
+
+inline constexpr std::size_t kJoystickButtons = 8;
+
+/// ABS_X to ABS_RZ, the buttons (bit 0 of `pressed` is the first), and the SYN_REPORT that makes
+/// them one frame.
+using JoystickEvents = std::array<input_event, 6 + kJoystickButtons + 1>;
+JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noexcept;
+
+/// Sends Sample::deflection as +-32767, and the buttons. No dither: games read the state of an
+/// axis, not its events.
+class JoystickOutput : public Output {
+ public:
+  /// Throws ConfigError if /dev/uinput is not usable.
+  explicit JoystickOutput(const JoystickOptions& options);
+  ~JoystickOutput() override;
+
+  SendStatus move(const Sample& sample) noexcept override;
+  std::string failure() const override;
+
+  void add_to(std::vector<WatchdogDevice>& devices) const;
+
+ private:
+  UniqueFd uinput_;
+  int error_ = 0;
+};
+
+}  // namespace tagwrench
