@@ -2,14 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "host/core/os/unique_fd.h"
 #include "host/recording/records.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/frame_source.h"
+#include "host/source/simulator/bench.h"
 #include "host/tracker/tracker.h"
 
 namespace tagwrench {
@@ -63,5 +66,53 @@ Tracker make_tracker(const SensorConfig& sensor);
 
 /// Waits a while for a frame, the end of the source or a signal; says when a camera goes or comes.
 Next next_frame(FrameSource& source, const UniqueFd& stop, Frame& frame);
+
+// The sources, a row each. Help texts, completion, messages and every choice between sources are
+// made of the rows: a word is looked up once, by parse_source(), and nobody compares words after
+// that.
+
+struct SourceRow {
+  SourceKind kind;
+  const char* name;
+  const char* argument;       ///< "DIR": what comes behind the colon
+  bool stands_alone = false;  ///< without an argument, too
+  const char* help = "";      ///< one line; may be empty
+  bool own_time = false;      ///< its pictures are of another time than now
+  Input (*open)(const InputOptions& options, const std::string& argument);
+};
+
+/// In the order of the help text.
+std::span<const SourceRow> source_rows();
+
+/// SRC as it was said, and its row.
+struct SourceSpec {
+  const SourceRow* row;
+  std::string argument;
+
+  bool is(SourceKind kind) const { return row->kind == kind; }
+};
+
+/// Throws ConfigError, with the sources that there are.
+SourceSpec parse_source(const std::string& text);
+
+/// Of an option --source that takes all of them.
+std::string source_help();
+
+/// "sim | sim:SCENARIO.yaml | images:DIR": of an option --source that takes some of them.
+std::string source_forms(std::initializer_list<SourceKind> kinds);
+
+// A source with somebody at hand who does what is asked: a person before a camera, the simulated
+// one at the simulated sensor.
+
+/// The bench outlives the source, which asks it for the load.
+struct BenchInput {
+  std::unique_ptr<sim::Bench> bench{};  ///< null unless the source is the simulated sensor
+  TimePoint time_zero{};                ///< of the bench, on the frames' clock
+  Input input{};
+};
+
+/// As open_input(); but the simulated sensor is loaded by a bench, in place of its scenario's
+/// trajectory; with `fast` it runs on a virtual clock, else in real time.
+BenchInput open_at_bench(const InputOptions& options);
 
 }  // namespace tagwrench

@@ -4,16 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <utility>
 
 #include "host/app/run_input.h"
-#include "host/app/run_web.h"
 #include "host/core/config_error.h"
 #include "host/core/count_text.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/sensor/default_profile.h"
-#include "host/sensor/zero_options.h"
+#include "host/sensor/sensor_config.h"
+#include "host/source/v4l2_mode.h"
 
 namespace tagwrench {
 namespace {
@@ -63,7 +63,7 @@ bool is_lossless(const RunOptions& options, const Input& input) {
 ProfileManager profiles_of(const RunOptions& options, const SensorConfig& sensor,
                            std::optional<ControlSocket> control) {
   return ProfileManager(ProfileFiles(options.profiles, default_profile(sensor)), std::move(control),
-                        options.profiles.empty() ? std::nullopt : FocusWatch::open());
+                        options.profiles.empty() ? nullptr : FocusWatch::open());
 }
 
 /// Says how far the zero went, if it is far enough to be seen.
@@ -114,6 +114,29 @@ std::string summary(const RunReport& report, const SensorConfig& sensor) {
     }
   }
   return line;
+}
+
+/// What pages are told. `profiles`: they listen to requests.
+RunFacts run_facts(const RunOptions& options, std::span<const OutputSpec> outputs,
+                   const Input& input, bool board, bool profiles) {
+  RunFacts facts;
+  facts.name = options.name;
+  facts.format = input.source->format();
+  facts.sensor = input.sensor;
+  const bool is_file = input.sensor_text.empty() && !input.recorded;
+  if (is_file) facts.place.sensor = std::filesystem::absolute(input.sensor_name).string();
+  facts.place.source = input.spec;
+  facts.place.source_kind = input.kind;
+  facts.place.board = options.board;
+  facts.place.cells = options.cells;
+  facts.place.calibrated = !input.sensor.calibration.empty();
+  // What a job would cut off.
+  facts.place.kept = options.record || find_output(outputs, OutputKind::reference) != nullptr;
+  if (input.kind == SourceKind::camera) facts.camera_device = parse_v4l2_spec(input.argument).path;
+  facts.board = board;
+  facts.profiles = profiles;
+  if (!options.record) facts.head = recording_head(input, record::Keep::raw);
+  return facts;
 }
 
 /// Where the next run gets its pictures from, if there is one: from where this one does.

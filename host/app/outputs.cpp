@@ -14,12 +14,11 @@
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/output/gadget_output.h"
-#include "host/output/joystick.h"
+#include "host/output/hid_outputs.h"
 #include "host/output/line_outputs.h"
 #include "host/output/terminal.h"
 #include "host/output/udp.h"
-#include "host/output/uhid_outputs.h"
-#include "host/web/server/web_place.h"
+#include "host/web/server/web_options.h"
 
 namespace tagwrench {
 namespace {
@@ -105,7 +104,6 @@ bool is_place(Argument place) {
 constexpr std::array kRows = {
     OutputRow{.kind = OutputKind::people,
               .name = "terminal",
-              .argument = "",
               .help = "live view",
               .unasked = true,
               .open = open_terminal},
@@ -125,7 +123,6 @@ constexpr std::array kRows = {
               .open = open_file<CsvOutput>},
     OutputRow{.kind = OutputKind::device,
               .name = "spacemouse",
-              .argument = "",
               .help = "virtual 6-DOF puck for CAD programs",
               .hid = true,
               .unasked = true,
@@ -133,14 +130,12 @@ constexpr std::array kRows = {
               .open = open_spacemouse},
     OutputRow{.kind = OutputKind::device,
               .name = "wrench",
-              .argument = "",
               .help = "HID force-torque sensor in N and N m",
               .hid = true,
               .unasked = true,
               .open = open_wrench},
     OutputRow{.kind = OutputKind::device,
               .name = "joystick",
-              .argument = "",
               .help = "six-axis joystick for games",
               .hid = true,
               .unasked = true,

@@ -45,8 +45,8 @@ enum class OutputKind : std::uint8_t {
 struct OutputRow {
   OutputKind kind;
   const char* name;
-  const char* argument;  ///< "", ":FILE", "[:PATH]": what comes behind the name
-  const char* help;      ///< one line
+  const char* argument = "";  ///< ":FILE", "[:PATH]": what comes behind the name
+  const char* help;           ///< one line
   bool names_file = false;
   bool hid = false;           ///< a virtual device of this computer, known by the sensor's name
   bool unasked = false;       ///< made, where it can be, when nothing is asked for

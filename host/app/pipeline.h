@@ -9,16 +9,17 @@
 
 #include <poll.h>
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "host/app/frame_watch.h"
-#include "host/app/output_scheduler.h"
-#include "host/app/status_lines.h"
 #include "host/core/frame_log.h"
 #include "host/core/sleep_watch.h"
+#include "host/core/types.h"
 #include "host/motion/profile_manager.h"
 #include "host/output/output.h"
 #include "host/output/watchdog.h"
@@ -28,6 +29,82 @@
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
+
+// When the next frame is missing, and what is neutral then: the loop by itself, and should the loop
+// hang, the watchdog. Times are passed in.
+
+class FrameWatch {
+ public:
+  /// `period`: that the source announces. The watchdog is borrowed.
+  FrameWatch(Watchdog& watchdog, Duration period) noexcept;
+
+  void begin(TimePoint now) noexcept { last_arrival_ = now; }
+  /// The median of three intervals counts: one hiccup does not delay the next neutral, a camera
+  /// that slows down is believed.
+  void frame_came(TimePoint now, Duration period) noexcept;
+  /// When the frame after the last one is so late that it is missing.
+  TimePoint missing_at() const noexcept;
+
+  /// From here on the watchdog sends neutral, should the loop hang.
+  void arm() noexcept;
+  /// All is neutral.
+  void stand_down() noexcept { watchdog_.stand_down(); }
+
+ private:
+  Watchdog& watchdog_;
+  TimePoint last_arrival_{};
+  std::array<Duration, 3> intervals_;  ///< the last three between frames
+  Duration interval_;                  ///< to be expected, at least the announced period
+};
+
+// When input devices move: with every sample, or, where a profile asks for a steady rate, at that
+// rate between frames too. Times are passed in.
+
+class OutputScheduler {
+ public:
+  enum class Move : std::uint8_t {
+    none,         ///< the clock's turn comes later
+    with_sample,  ///< to what the sample says
+    on            ///< to where the motion is by now
+  };
+
+  /// A sample was made. `period` of the moves; zero: they have none. Without numbers devices move
+  /// at once, to neutral, and rest.
+  Move sample(bool numbers, Duration period, TimePoint now) noexcept;
+
+  /// Whether devices are to move on. The next time is one period later, and not earlier than now:
+  /// what a loop has slept through is not made up for.
+  bool due(TimePoint now, Duration period) noexcept;
+
+  /// When due() is asked next; never, while devices move with samples alone.
+  TimePoint next() const noexcept { return next_; }
+
+ private:
+  TimePoint next_ = TimePoint::max();
+};
+
+// What a run says to people: lines to the outputs that show them, else to the log; diagnostics once
+// each.
+
+class StatusLines {
+ public:
+  /// Borrowed.
+  explicit StatusLines(std::span<Output* const> outputs) noexcept : outputs_(outputs) {}
+
+  /// An empty line is none.
+  void say(std::string_view line) noexcept;
+  /// Why the target is not held. What was wrong is taken away once it is held.
+  void say_diagnostic(const Track& track) noexcept;
+
+  /// The last line that said why the target is not held.
+  const std::string& trouble() const noexcept { return trouble_; }
+
+ private:
+  std::span<Output* const> outputs_;
+  Diagnostic last_diagnostic_ = Diagnostic::none;
+  bool trouble_shown_ = false;  ///< since the target was last held
+  std::string trouble_;
+};
 
 struct RunLimits {
   std::optional<std::uint64_t> frames;
@@ -61,12 +138,11 @@ class Pipeline {
 
   /// Runs until a limit, the source's end, a stop or a failed output. Does not throw on account of
   /// the outside world.
-  RunReport run(const RunLimits& limits);
+  RunReport run(const RunLimits& limits) noexcept;
   /// While it runs, for its own thread.
   const RunReport& so_far() const noexcept { return report_; }
 
  private:
-  void step(Frame& frame) noexcept;
   void miss(std::optional<Duration> recorded_latency) noexcept;
   void change(ReadStatus status, std::optional<Duration> recorded_latency) noexcept;
   void wait(TimePoint until) noexcept;

@@ -1,24 +1,34 @@
 #include "host/app/run.h"
 
 #include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "host/app/input.h"
 #include "host/app/instrument.h"
 #include "host/app/run_input.h"
-#include "host/app/run_web.h"
-#include "host/app/sources.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
+#include "host/core/os/uninterrupted.h"
+#include "host/core/os/user_folders.h"
+#include "host/web/bridge/recording_folder.h"
+#include "host/web/server/web_options.h"
 
 namespace tagwrench {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// A board lives in real time.
 void check_board(const RunOptions& options, std::span<const OutputSpec> outputs) {
@@ -51,6 +61,60 @@ void check_name(const std::string& name) {
   if (!usable)
     throw ConfigError(
         fmt::format("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name));
+}
+
+/// In the browser of the desktop, where there is one; the shell leaves it to itself, and Ctrl-C in
+/// our terminal too.
+void open_in_browser(const std::string& url) {
+  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
+  std::string shell = "sh", option = "-c", command = "xdg-open \"$0\" >/dev/null 2>&1 </dev/null &",
+              address = url;
+  char* const arguments[] = {shell.data(), option.data(), command.data(), address.data(), nullptr};
+  posix_spawnattr_t own_session;
+  ::posix_spawnattr_init(&own_session);
+  ::posix_spawnattr_setflags(&own_session, POSIX_SPAWN_SETSID);
+  pid_t pid = 0;
+  if (::posix_spawn(&pid, "/bin/sh", nullptr, &own_session, arguments, environ) == 0)
+    uninterrupted([&] { return ::waitpid(pid, nullptr, 0); });
+  ::posix_spawnattr_destroy(&own_session);
+}
+
+/// Whether there are pages. Throws ConfigError where options are theirs, and they are not there.
+bool has_web(const RunOptions& options, std::span<const OutputSpec> outputs) {
+  if (find_output(outputs, OutputKind::pages) != nullptr || options.web.open) return true;
+  if (!options.web.token_file.empty())
+    throw ConfigError("--web-token: is for pages; add --output web:ADDRESS:PORT");
+  if (!options.web.recordings.empty())
+    throw ConfigError("--recordings: is for pages; add --output web");
+  return false;
+}
+
+/// Binds, serves, and says where.
+std::unique_ptr<WebBridge> open_web(const RunOptions& options, std::span<const OutputSpec> outputs,
+                                    const UniqueFd& stop) {
+  WebBridgeOptions web;
+  const OutputSpec* spec = find_output(outputs, OutputKind::pages);
+  web.server = parse_web("--output web", spec == nullptr ? "" : spec->argument);
+  web.server.pages = options.web.pages.empty() ? built_pages() : fs::path(options.web.pages);
+  bool token_made = false;
+  if (!options.web.token_file.empty()) {
+    const WebToken token = web_token(options.web.token_file);
+    web.server.token = token.text;
+    token_made = token.made;
+  }
+  web.recordings = options.web.recordings.empty() ? usual_recording_folder()
+                                                  : fs::absolute(options.web.recordings);
+  if (const std::string folder = config_folder(); !folder.empty())
+    web.own_profiles = fs::path(folder) / "profiles";
+  auto bridge = std::make_unique<WebBridge>(web, stop.get());
+  log_info(
+      fmt::format("pages: {}{}", token_made ? bridge->url_with_token() : bridge->url(),
+                  web.server.token.empty() || token_made
+                      ? ""
+                      : fmt::format("#token=... (the token is in {})", options.web.token_file)));
+  bridge->start();
+  if (options.web.open) open_in_browser(bridge->url_with_token());
+  return bridge;
 }
 
 /// What goes on while there is no run.

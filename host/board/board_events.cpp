@@ -1,10 +1,55 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <span>
+
 #include "host/board/board_session.h"
 #include "protocol/codec.h"
 
 namespace tagwrench::link {
 namespace {
+
+struct Name {
+  std::uint32_t value;
+  const char* text;
+};
+
+template <typename Value>
+constexpr Name named(Value value, const char* text) {
+  return {static_cast<std::uint32_t>(value), text};
+}
+
+constexpr Name kResetCauses[] = {
+    named(ResetCause::unknown, "unknown cause"), named(ResetCause::power_on, "power on"),
+    named(ResetCause::pin, "reset pin"), named(ResetCause::brown_out, "supply too low"),
+    named(ResetCause::watchdog, "watchdog")};
+
+constexpr Name kFaults[] = {
+    named(FaultCode::none, "none"),
+    named(FaultCode::host_silent, "host_silent"),
+    named(FaultCode::led_limited, "led_limited"),
+    named(FaultCode::cell_silent, "cell_silent"),
+    named(FaultCode::cell_stuck, "cell_stuck"),
+    named(FaultCode::supply_low, "supply_low"),
+};
+
+constexpr Name kResults[] = {
+    named(Result::ok, "ok"),
+    named(Result::unknown_kind, "it does not know this request"),
+    named(Result::malformed, "the request was malformed"),
+    named(Result::out_of_range, "a number is beyond its limits"),
+    named(Result::wrong_version, "other protocol version"),
+    named(Result::not_ready, "nothing is converted there; is the cell wired?"),
+    named(Result::already_set, "it has one already"),
+};
+
+constexpr Name kRequests[] = {named(Kind::set_id, "to take an id"), named(Kind::tare, "to tare"),
+                              named(Kind::time_request, "a time request")};
+
+const char* find(std::span<const Name> names, std::uint32_t value, const char* none = "?") {
+  const auto found = std::ranges::find(names, value, &Name::value);
+  return found == names.end() ? none : found->text;
+}
 
 std::string version(std::uint32_t packed) {
   return fmt::format("{}.{}", packed >> 8, packed & 0xFF);
@@ -33,74 +78,11 @@ std::string fault(const BoardEvent& news) {
   return fmt::format("board: fault {} on channel {}", news.value, news.other);
 }
 
-const char* request_name(std::uint32_t kind) {
-  switch (static_cast<Kind>(kind)) {
-    case Kind::set_id:
-      return "to take an id";
-    case Kind::tare:
-      return "to tare";
-    case Kind::time_request:
-      return "a time request";
-    default:
-      return "a request";
-  }
-}
-
 }  // namespace
 
-const char* reset_cause_name(std::uint32_t reset_cause) {
-  switch (static_cast<ResetCause>(reset_cause)) {
-    case ResetCause::unknown:
-      return "unknown cause";
-    case ResetCause::power_on:
-      return "power on";
-    case ResetCause::pin:
-      return "reset pin";
-    case ResetCause::brown_out:
-      return "supply too low";
-    case ResetCause::watchdog:
-      return "watchdog";
-  }
-  return "?";
-}
-
-const char* fault_name(std::uint32_t fault_code) {
-  switch (static_cast<FaultCode>(fault_code)) {
-    case FaultCode::none:
-      return "none";
-    case FaultCode::host_silent:
-      return "host_silent";
-    case FaultCode::led_limited:
-      return "led_limited";
-    case FaultCode::cell_silent:
-      return "cell_silent";
-    case FaultCode::cell_stuck:
-      return "cell_stuck";
-    case FaultCode::supply_low:
-      return "supply_low";
-  }
-  return "?";
-}
-
-const char* result_name(std::uint32_t result) {
-  switch (static_cast<Result>(result)) {
-    case Result::ok:
-      return "ok";
-    case Result::unknown_kind:
-      return "it does not know this request";
-    case Result::malformed:
-      return "the request was malformed";
-    case Result::out_of_range:
-      return "a number is beyond its limits";
-    case Result::wrong_version:
-      return "other protocol version";
-    case Result::not_ready:
-      return "nothing is converted there; is the cell wired?";
-    case Result::already_set:
-      return "it has one already";
-  }
-  return "?";
-}
+const char* reset_cause_name(std::uint32_t cause) { return find(kResetCauses, cause); }
+const char* fault_name(std::uint32_t code) { return find(kFaults, code); }
+const char* result_name(std::uint32_t result) { return find(kResults, result); }
 
 std::string text(const BoardEvent& news) {
   switch (news.kind) {
@@ -127,7 +109,7 @@ std::string text(const BoardEvent& news) {
       return fmt::format("board: refused this light: {}; `tagwrench board info` shows the limits",
                          result_name(news.value));
     case BoardEvent::Kind::request_refused:
-      return fmt::format("board: refused {}: {}", request_name(news.value),
+      return fmt::format("board: refused {}: {}", find(kRequests, news.value, "a request"),
                          result_name(news.other));
     case BoardEvent::Kind::other_host:
       return fmt::format("board: another program speaks to it too (session {:08x}); end it",

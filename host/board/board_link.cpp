@@ -113,7 +113,7 @@ void BoardLink::try_again(TimePoint now) noexcept {
       path_ = nodes.front();
     }
   } catch (...) {
-    return;  // out of memory: at the next try
+    return;  // sysfs changed while it was read: at the next try
   }
   if (!mark_.may_reopen(path_.c_str()) || serial_.open(path_.c_str(), baud_)) return;
   watch_serial();

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "host/board/board_session.h"
-#include "host/board/serial_places.h"
 #include "host/board/serial_port.h"
 #include "host/core/os/unique_fd.h"
 

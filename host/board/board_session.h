@@ -11,6 +11,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -156,7 +157,7 @@ class BoardSession {
   bool has_status() const noexcept { return has_status_; }
   const ClockSync& clock() const noexcept { return clock_; }
   ClockSync& clock() noexcept { return clock_; }
-  SessionCounters counters() const noexcept;
+  const SessionCounters& counters() const noexcept { return counters_; }
   /// Samples that nobody took before they were overwritten.
   std::uint64_t overwritten() const noexcept;
 
@@ -184,10 +185,6 @@ class BoardSession {
     std::uint8_t request_sequence = 0;
     bool waiting = false;
   };
-  struct SequenceWatch {
-    bool known = false;
-    std::uint16_t last = 0;
-  };
   /// A start of a period of the LED's in both clocks.
   struct LedStart {
     Led led{};  ///< what shines from then on
@@ -197,9 +194,7 @@ class BoardSession {
 
   void take_frame(TimePoint arrival, std::uint16_t wire_bytes) noexcept;
   void take_hello(const Hello& hello, TimePoint arrival) noexcept;
-  void take_capabilities(const Capabilities& capabilities) noexcept;
   void take_answer(const Answer& answer) noexcept;
-  void take_tare(const TareResult& result) noexcept;
   void take_status(const Status& status, TimePoint arrival) noexcept;
   void take_time_reply(const TimeReply& reply, TimePoint arrival,
                        std::uint16_t wire_bytes) noexcept;
@@ -207,12 +202,15 @@ class BoardSession {
   void take_adc(const AdcSample& sample, TimePoint arrival) noexcept;
   void take_button(const ButtonEvent& event, TimePoint arrival) noexcept;
   void take_fault(const Fault& fault, TimePoint arrival) noexcept;
-  void watch_frame_sequence(std::uint8_t sequence) noexcept;
   void restart_streams() noexcept;
   void greet_again(TimePoint now) noexcept;
-  void log_info(BoardEvent::Kind kind, std::uint32_t value = 0, std::uint32_t other = 0) noexcept;
+  void log_info(BoardEvent::Kind kind, std::uint32_t value = 0, std::uint32_t other = 0) noexcept {
+    news_.push({kind, value, other});
+  }
   HostTime host_time(std::uint32_t board_us, TimePoint arrival) const noexcept;
-  static std::uint16_t lost_between(SequenceWatch& watch, std::uint16_t sequence) noexcept;
+  /// Numbers that are missing; 0 for the first.
+  template <typename Sequence>
+  static std::uint16_t lost_between(std::optional<Sequence>& last, Sequence sequence) noexcept;
 
   template <class Message>
   std::uint8_t put(const Message& message) noexcept;
@@ -243,9 +241,9 @@ class BoardSession {
   std::uint32_t boot_id_ = 0;
   TimePoint last_frame_{};
   SessionCounters counters_;
-  SequenceWatch frame_sequence_;
-  std::array<SequenceWatch, kMaxCells> cell_sequence_;
-  std::array<SequenceWatch, 8> adc_sequence_;
+  std::optional<std::uint8_t> frame_sequence_;
+  std::array<std::optional<std::uint16_t>, kMaxCells> cell_sequence_;
+  std::array<std::optional<std::uint16_t>, 8> adc_sequence_;
 
   std::uint8_t* out_ = nullptr;
   std::size_t out_bytes_ = 0;

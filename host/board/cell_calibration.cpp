@@ -1,8 +1,6 @@
 #include "host/board/cell_calibration.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -12,11 +10,13 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 
 #include "host/core/config_error.h"
 #include "host/core/json/json_text.h"
-#include "host/core/os/config_folder.h"
+#include "host/core/os/atomic_file.h"
 #include "host/core/os/unique_fd.h"
+#include "host/core/os/user_folders.h"
 
 namespace tagwrench::link {
 namespace {
@@ -137,6 +137,23 @@ double number(const Source& source, const json& cell, const char* key) {
   return value;
 }
 
+struct Field {
+  const char* key;
+  double CellCalibration::*value;
+  bool sigma;   ///< or the residual: not negative
+  bool needed;  ///< files of earlier versions lack one
+};
+
+constexpr Field kFields[] = {
+    {"newtons_per_count", &CellCalibration::newtons_per_count, false, true},
+    {"newtons_per_count_sigma", &CellCalibration::newtons_per_count_sigma, true, true},
+    {"zero_counts", &CellCalibration::zero_counts, false, true},
+    {"zero_sigma_counts", &CellCalibration::zero_sigma_counts, true, true},
+    {"zero_scale_covariance_n", &CellCalibration::zero_scale_covariance_n, false, false},
+    {"noise_counts", &CellCalibration::noise_counts, true, true},
+    {"residual_n", &CellCalibration::residual_n, true, true},
+};
+
 void read_cell(const Source& source, const json& cell, CellCalibrations& out) {
   if (!cell.is_object()) refuse(source, "\"cells\" holds something that is no cell");
   const double channel = number(source, cell, "channel");
@@ -144,38 +161,13 @@ void read_cell(const Source& source, const json& cell, CellCalibrations& out) {
     refuse(source, fmt::format("channel {} does not exist", channel));
   CellCalibration& to = out[static_cast<std::size_t>(channel)];
   if (to.calibrated) refuse(source, fmt::format("channel {} is in it twice", channel));
-  to.newtons_per_count = number(source, cell, "newtons_per_count");
-  to.newtons_per_count_sigma = number(source, cell, "newtons_per_count_sigma");
-  to.zero_counts = number(source, cell, "zero_counts");
-  to.zero_sigma_counts = number(source, cell, "zero_sigma_counts");
-  to.noise_counts = number(source, cell, "noise_counts");
-  if (cell.contains("zero_scale_covariance_n"))
-    to.zero_scale_covariance_n = number(source, cell, "zero_scale_covariance_n");
-  to.residual_n = number(source, cell, "residual_n");
+  for (const Field& field : kFields)
+    if (field.needed || cell.contains(field.key)) to.*field.value = number(source, cell, field.key);
   if (to.newtons_per_count == 0) refuse(source, "\"newtons_per_count\" is 0");
-  if (to.newtons_per_count_sigma < 0 || to.zero_sigma_counts < 0 || to.noise_counts < 0 ||
-      to.residual_n < 0)
-    refuse(source, "a standard deviation or the residual is negative");
+  for (const Field& field : kFields)
+    if (field.sigma && to.*field.value < 0)
+      refuse(source, "a standard deviation or the residual is negative");
   to.calibrated = true;
-}
-
-[[noreturn]] void not_written(const std::string& path, int error) {
-  throw ConfigError(fmt::format("{}: cannot be written: {}; give another file with --cells", path,
-                                std::strerror(error)));
-}
-
-void write_whole(const std::string& path, const std::string& text) {
-  const std::string beside = fmt::format("{}.{}", path, ::getpid());
-  UniqueFd fd(::open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
-  if (!fd) not_written(path, errno);
-  errno = ENOSPC;
-  const bool written =
-      ::write(fd.get(), text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-      ::fsync(fd.get()) == 0 && ::rename(beside.c_str(), path.c_str()) == 0;
-  if (written) return;
-  const int error = errno;
-  ::unlink(beside.c_str());
-  not_written(path, error);
 }
 
 }  // namespace
@@ -235,20 +227,20 @@ void save_cells(const std::string& path, const std::string& board_id,
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const CellCalibration& cell = cells[i];
     if (!cell.calibrated) continue;
-    list.push_back({{"channel", i},
-                    {"newtons_per_count", cell.newtons_per_count},
-                    {"newtons_per_count_sigma", cell.newtons_per_count_sigma},
-                    {"zero_counts", cell.zero_counts},
-                    {"zero_sigma_counts", cell.zero_sigma_counts},
-                    {"zero_scale_covariance_n", cell.zero_scale_covariance_n},
-                    {"noise_counts", cell.noise_counts},
-                    {"residual_n", cell.residual_n}});
+    json& entry = list.emplace_back(json{{"channel", i}});
+    for (const Field& field : kFields) entry[field.key] = cell.*field.value;
   }
   std::error_code error;
   const fs::path folder = fs::path(path).parent_path();
   if (!folder.empty()) fs::create_directories(folder, error);
-  write_whole(
-      path, dump_json(json({{"format", kFormat}, {"board", board_id}, {"cells", list}}), 2) + "\n");
+  try {
+    write_atomically(
+        path,
+        dump_json(json({{"format", kFormat}, {"board", board_id}, {"cells", list}}), 2) + "\n");
+  } catch (const std::runtime_error&) {
+    throw ConfigError(fmt::format("{}: cannot be written: {}; give another file with --cells", path,
+                                  std::strerror(errno)));
+  }
 }
 
 }  // namespace tagwrench::link

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 
 namespace tagwrench::link {
 namespace {
@@ -52,17 +53,10 @@ double SampleHistory::noise() const noexcept {
 }
 
 std::size_t SampleHistory::first_after(TimePoint time) const noexcept {
-  std::size_t low = 0;
-  std::size_t high = samples_.size();
-  while (low < high) {
-    const std::size_t middle = (low + high) / 2;
-    if (samples_[middle].time <= time) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low;
+  const auto places = std::views::iota(0U, static_cast<unsigned>(samples_.size()));
+  const auto after = std::ranges::upper_bound(
+      places, time, {}, [this](unsigned place) { return samples_[place].time; });
+  return static_cast<std::size_t>(after - places.begin());
 }
 
 /// Mean size of the second differences on either side of the interval that ends at `right`.

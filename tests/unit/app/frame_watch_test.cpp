@@ -1,6 +1,6 @@
-#include "host/app/frame_watch.h"
-
 #include <gtest/gtest.h>
+
+#include "host/app/pipeline.h"
 
 namespace tagwrench::test {
 namespace {

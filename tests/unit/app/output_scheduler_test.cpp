@@ -1,6 +1,6 @@
-#include "host/app/output_scheduler.h"
-
 #include <gtest/gtest.h>
+
+#include "host/app/pipeline.h"
 
 namespace tagwrench::test {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <set>
 
+#include "host/app/input.h"
 #include "host/app/outputs.h"
-#include "host/app/sources.h"
 #include "host/core/config_error.h"
 
 namespace tagwrench::test {

@@ -1,7 +1,7 @@
-#include "host/app/status_lines.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "host/app/pipeline.h"
 
 namespace tagwrench::test {
 namespace {

@@ -1,9 +1,8 @@
-#include "host/board/optoforce_sensor.h"
-
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
+#include "host/board/optoforce.h"
 #include "host/core/config_error.h"
 #include "optoforce_frames.h"
 #include "pty.h"

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "host/board/serial_places.h"
 #include "host/core/config_error.h"
 #include "pty.h"
 #include "tests/support/temporary_folder.h"

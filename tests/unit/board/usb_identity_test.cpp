@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "host/board/serial_places.h"
+#include "host/board/serial_port.h"
 #include "host/core/config_error.h"
 #include "tests/support/temporary_folder.h"
 
