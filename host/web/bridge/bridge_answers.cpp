@@ -6,9 +6,13 @@
 #include <ctime>
 #include <map>
 
-#include "host/calibration/wrench/plan_config.h"
-#include "host/web/bridge/profile_saving.h"
-#include "host/web/bridge/web_bridge_impl.h"
+#include "host/calibration/wrench/plan.h"
+#include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
+#include "host/core/yaml/yaml_edit.h"
+#include "host/motion/profile_config.h"
+#include "host/sensor/sensor_config.h"
+#include "host/web/bridge/web_bridge.h"
 
 namespace tagwrench {
 namespace {
@@ -18,33 +22,21 @@ using nlohmann::json;
 constexpr std::size_t kMaxWaiting = 64;  // requests to the desk
 constexpr const char* kNoRun = "the sensor does not run at the moment; try again when it does";
 
-/// One line of plain text; empty where it may be left out and is.
-std::string line_of(const PageRequest& request, const char* key, bool needed = true) {
-  const auto found = request.arguments.find(key);
-  if (found == request.arguments.end() && !needed) return {};
-  if (found == request.arguments.end() || !found->is_string())
-    throw RequestRefused(fmt::format("{}: is missing, or no text", key));
-  const auto& text = found->get_ref<const std::string&>();
-  for (const char c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-      throw RequestRefused(fmt::format("{}: must be one line of plain text", key));
-  }
-  return text;
-}
-
-double number_of(const PageRequest& request, const char* key, double least, double most) {
-  const auto found = request.arguments.find(key);
-  const double number =
-      found != request.arguments.end() && found->is_number() ? found->get<double>() : std::nan("");
-  if (number >= least && number <= most) return number;
-  throw RequestRefused(fmt::format("{}: must be a number from {:g} to {:g}", key, least, most));
-}
-
 std::string text_of(const PageRequest& request, const char* key) {
   const auto found = request.arguments.find(key);
   if (found == request.arguments.end() || !found->is_string())
     throw RequestRefused(fmt::format("{}: is missing, or no text", key));
   return found->get<std::string>();
+}
+
+/// One line of plain text; empty where it may be left out and is.
+std::string line_of(const PageRequest& request, const char* key, bool needed = true) {
+  if (!needed && !request.arguments.contains(key)) return {};
+  return checked_line(key, text_of(request, key));
+}
+
+double number_of(const PageRequest& request, const char* key, double least, double most) {
+  return checked_number(key, request.arguments.value(key, json()), least, most);
 }
 
 record::Keep keep_of(const std::string& word) {
@@ -55,48 +47,114 @@ record::Keep keep_of(const std::string& word) {
   throw RequestRefused("keep: must be raw, region or none");
 }
 
+// A profile as a page has changed it, written where it came from: comments and all else in that
+// file stay.
+
+namespace fs = std::filesystem;
+
+/// What a profile that has no file is made from.
+std::string text_of_ready(const std::string& name) {
+  for (const ReadyProfile& ready : ready_profiles()) {
+    if (ready.name == name) return ready.text;
+  }
+  return "name: " + name + "\n";
+}
+
+/// Whatever their names are.
+bool same_profile(Profile a, const Profile& b) {
+  a.name = b.name;
+  return profile_text(a) == profile_text(b);
+}
+
+/// `before` with what `text` says instead; `text` itself if it says more than can be put in there.
+std::string merged(const std::string& before, const std::string& file, const std::string& text,
+                   const SensorConfig& sensor) {
+  const Profile defaults = default_profile(sensor);
+  try {
+    const Profile was = parse_profile(before, file, defaults);
+    const Profile wanted = parse_profile(text, "text", defaults);
+    const std::string changed = with_changes(before, file, was, wanted);
+    return same_profile(parse_profile(changed, file, defaults), wanted) ? changed : text;
+  } catch (const ConfigError& e) {
+    throw RequestRefused(e.what());
+  }
+}
+
+struct SavedProfile {
+  std::filesystem::path file;
+  bool is_new = false;  ///< the sensor does not read it by itself
+};
+
+/// `file` is where the desk has the profile from, empty if it is a ready-made one or the sensor's
+/// own: then `name` says what becomes of it, NAME.yaml in the folder `own`, which must not be there
+/// yet. Throws RequestRefused: a fault in the text, or a name that cannot be; ConfigError and
+/// std::runtime_error: it cannot be written.
+SavedProfile write_profile(const std::string& of, const std::string& name, const std::string& text,
+                           const std::string& file, const fs::path& own,
+                           const SensorConfig& sensor) {
+  if (!file.empty()) {
+    write_atomically(file, merged(read_text(file), file, text, sensor));
+    return {file, false};
+  }
+  check_recording_name(name);
+  std::error_code error;
+  fs::create_directories(own, error);
+  const fs::path target = own / (name + ".yaml");
+  if (error)
+    throw ConfigError(fmt::format("{}: cannot be made: {}", own.string(), error.message()));
+  if (fs::exists(fs::symlink_status(target, error))) {
+    throw RequestRefused(fmt::format("name: {} is there already; choose another", target.string()));
+  }
+  const std::string changed = merged(text_of_ready(of), target.string(), text, sensor);
+  write_atomically(target, with_value(changed, {"name"}, "\"" + name + "\"", target.string()));
+  return {target, true};
+}
+
 }  // namespace
 
-WebBridge::Impl::Answer WebBridge::Impl::answer_to(std::string_view what) {
-  static const std::map<std::string_view, Answer> answers = {
-      {"zero", &Impl::zero},
-      {"profile", &Impl::choose_profile},
-      {"next_profile", &Impl::next_profile},
-      {"show", &Impl::show_profile},
-      {"try", &Impl::try_profile},
-      {"keep", &Impl::keep_profile},
-      {"revert", &Impl::revert_profile},
-      {"save_profile", &Impl::save_profile},
-      {"record_start", &Impl::start_recording},
-      {"record_stop", &Impl::stop_recording},
-      {"recordings", &Impl::list_recordings},
-      {"camera_set", &Impl::set_camera},
-      {"led", &Impl::set_led},
-      {"tare", &Impl::tare},
-      {"job_start", &Impl::start_job},
-      {"job_key", &Impl::press_key},
-      {"job_close", &Impl::close_job},
-      {"plans", &Impl::list_plans},
-      {"retry", &Impl::retry},
-  };
-  const auto found = answers.find(what);
-  return found == answers.end() ? nullptr : found->second;
-}
-
 /// What is thrown is the answer.
-void WebBridge::Impl::handle(PageRequest request) {
+void WebBridge::handle(PageRequest request) {
+  static const std::map<std::string_view, Answer> answers = {
+      {"zero", &WebBridge::zero},
+      {"profile", &WebBridge::choose_profile},
+      {"next_profile", &WebBridge::next_profile},
+      {"show", &WebBridge::show_profile},
+      {"try", &WebBridge::try_profile},
+      {"keep", &WebBridge::keep_profile},
+      {"revert", &WebBridge::revert_profile},
+      {"save_profile", &WebBridge::save_profile},
+      {"record_start", &WebBridge::start_recording},
+      {"record_stop", &WebBridge::stop_recording},
+      {"recordings", &WebBridge::list_recordings},
+      {"camera_set", &WebBridge::set_camera},
+      {"led", &WebBridge::set_led},
+      {"tare", &WebBridge::tare},
+      {"job_start", &WebBridge::start_job},
+      {"job_key", &WebBridge::press_key},
+      {"job_close", &WebBridge::close_job},
+      {"plans", &WebBridge::list_plans},
+      {"retry", &WebBridge::retry},
+  };
   if (!jobs_) throw RequestRefused("the bridge is about to end; nothing was done");
-  const Answer does = answer_to(request.what);
-  if (does == nullptr)
+  const auto found = answers.find(request.what);
+  if (found == answers.end())
     throw RequestRefused("ask: this bridge does not know that request; reload the page");
-  (this->*does)(request);
+  (this->*found->second)(request);
 }
 
-void WebBridge::Impl::answer(const PageRequest& request, bool ok, std::string text, json data) {
+/// `work` in the run's loop, with null where there is none; then `then` here, with its result.
+template <typename Work, typename Then>
+void WebBridge::in_loop(Work work, Then then) {
+  control_.request([this, work, then](WebOutput* run) {
+    server_.post([then, result = work(run)] { then(result); });
+  });
+}
+
+void WebBridge::answer(const PageRequest& request, bool ok, std::string text, json data) {
   server_.answer(request.page, request.id, ok, std::move(text), std::move(data));
 }
 
-ControlLink& WebBridge::Impl::profiles() {
+ControlLink& WebBridge::profiles() {
   if (!running_) throw RequestRefused(kNoRun);
   if (profiles_ && profiles_->waiting() >= kMaxWaiting)
     throw RequestRefused("too many requests wait for an answer; send fewer");
@@ -105,8 +163,8 @@ ControlLink& WebBridge::Impl::profiles() {
       "another bridge of this name answers them; stop it, or give this one another --name");
 }
 
-void WebBridge::Impl::ask_control(const PageRequest& request, std::string text,
-                                  std::function<void(ControlAnswer)> then) {
+void WebBridge::ask_control(const PageRequest& request, std::string text,
+                            std::function<void(ControlAnswer)> then) {
   if (text.size() > ControlSocket::kMaxRequest)
     throw RequestRefused(fmt::format("text: is longer than {} bytes", ControlSocket::kMaxRequest));
   profiles().ask(std::move(text), [this, request, then = std::move(then)](ControlAnswer said) {
@@ -115,18 +173,18 @@ void WebBridge::Impl::ask_control(const PageRequest& request, std::string text,
   });
 }
 
-void WebBridge::Impl::zero(const PageRequest& request) { ask_control(request, "zero"); }
+void WebBridge::zero(const PageRequest& request) { ask_control(request, "zero"); }
 
-void WebBridge::Impl::choose_profile(const PageRequest& request) {
+void WebBridge::choose_profile(const PageRequest& request) {
   ask_control(request, "profile " + line_of(request, "name"),
               [this](const ControlAnswer&) { read_profile(); });
 }
 
-void WebBridge::Impl::next_profile(const PageRequest& request) {
+void WebBridge::next_profile(const PageRequest& request) {
   ask_control(request, "next", [this](const ControlAnswer&) { read_profile(); });
 }
 
-void WebBridge::Impl::show_profile(const PageRequest& request) {
+void WebBridge::show_profile(const PageRequest& request) {
   profiles().ask("show " + line_of(request, "name", false),
                  [this, request](const ControlAnswer& shown) {
                    const std::size_t line_end = shown.text.find('\n');
@@ -137,7 +195,7 @@ void WebBridge::Impl::show_profile(const PageRequest& request) {
                  });
 }
 
-void WebBridge::Impl::try_profile(const PageRequest& request) {
+void WebBridge::try_profile(const PageRequest& request) {
   const std::string name = line_of(request, "name");
   const std::string text = text_of(request, "text");
   const std::optional<Trial>& first = trial_ ? trial_ : trying_;
@@ -159,7 +217,7 @@ void WebBridge::Impl::try_profile(const PageRequest& request) {
   ++trying_->unanswered;
 }
 
-void WebBridge::Impl::keep_profile(const PageRequest& request) {
+void WebBridge::keep_profile(const PageRequest& request) {
   ask_control(request, "keep", [this](const ControlAnswer& said) {
     if (!said.ok) return;
     trial_.reset();
@@ -167,14 +225,14 @@ void WebBridge::Impl::keep_profile(const PageRequest& request) {
   });
 }
 
-void WebBridge::Impl::revert_profile(const PageRequest& request) {
+void WebBridge::revert_profile(const PageRequest& request) {
   ask_control(request, "revert", [this](const ControlAnswer&) {
     trial_.reset();
     read_profile();
   });
 }
 
-void WebBridge::Impl::save_profile(const PageRequest& request) {
+void WebBridge::save_profile(const PageRequest& request) {
   const std::string of = line_of(request, "name");
   const std::string text = text_of(request, "text");
   const std::string given = line_of(request, "as", false);
@@ -183,8 +241,7 @@ void WebBridge::Impl::save_profile(const PageRequest& request) {
     if (!shown.ok) return answer(request, false, shown.text);
     const std::string file = shown.text.substr(0, shown.text.find('\n'));
     try {
-      const SavedProfile saved =
-          tagwrench::save_profile(of, name, text, file, own_profiles_, facts_->sensor);
+      const SavedProfile saved = write_profile(of, name, text, file, own_profiles_, facts_->sensor);
       answer(request, true,
              saved.is_new ? fmt::format("saved; from the next start on: tagwrench run --profile {}",
                                         saved.file.string())
@@ -202,7 +259,7 @@ void WebBridge::Impl::save_profile(const PageRequest& request) {
   });
 }
 
-void WebBridge::Impl::start_recording(const PageRequest& request) {
+void WebBridge::start_recording(const PageRequest& request) {
   const std::string name = line_of(request, "name");
   const record::Keep keep = keep_of(line_of(request, "keep", false));
   if (!running_) throw RequestRefused(kNoRun);
@@ -214,41 +271,43 @@ void WebBridge::Impl::start_recording(const PageRequest& request) {
   head.keep = keep;
   head.created = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
   recording_ = std::make_unique<RunRecording>(recordings_.new_file(name), head);
-  control_.request([this, request, keep, started = recording_.get()](WebOutput* run) {
-    if (run != nullptr) {
-      run->source().narrow(keep == record::Keep::region);
-      run->record(started);
-    }
-    server_.post([this, request, on = run != nullptr] {
-      if (!on) return answer(request, false, kNoRun);
-      answer(request, true, recording_ ? recording_->name() : "ended already");
-      send_state();
-    });
-  });
+  in_loop(
+      [keep, started = recording_.get()](WebOutput* run) {
+        if (run != nullptr) run->record(started, keep == record::Keep::region);
+        return run != nullptr;
+      },
+      [this, request](bool on) {
+        if (!on) return answer(request, false, kNoRun);
+        answer(request, true, recording_ ? recording_->name() : "ended already");
+        send_state();
+      });
 }
 
-void WebBridge::Impl::stop_recording(const PageRequest& request) {
+void WebBridge::stop_recording(const PageRequest& request) {
   if (!recording_ || ending_recording_) throw RequestRefused("recording: none runs");
   ending_recording_ = true;
-  control_.request([this, request](WebOutput* run) {
-    if (run != nullptr) {
-      run->record(nullptr);
-      run->source().narrow(false);
-    }
-    server_.post([this, request] {
-      if (!recording_) return answer(request, true, "ended with its run");
-      end_recording([this, request](const RunRecording::Ending& ending) {
-        answer(request, ending.whole, ending.line);
-      });
+  take_recording([this, request] {
+    if (!recording_) return answer(request, true, "ended with its run");
+    end_recording([this, request](const RunRecording::Ending& ending) {
+      answer(request, ending.whole, ending.line);
     });
   });
 }
 
-void WebBridge::Impl::list_recordings(const PageRequest& request) {
+void WebBridge::take_recording(std::function<void()> then) {
+  in_loop(
+      [](WebOutput* run) {
+        if (run != nullptr) run->record(nullptr, false);
+        return run != nullptr;
+      },
+      [then](bool) { then(); });
+}
+
+void WebBridge::list_recordings(const PageRequest& request) {
   answer(request, true, recordings_.path().string(), recordings_.list());
 }
 
-void WebBridge::Impl::set_camera(const PageRequest& request) {
+void WebBridge::set_camera(const PageRequest& request) {
   const auto id = static_cast<std::uint32_t>(number_of(request, "control", 0, 4294967295.0));
   const auto value =
       static_cast<std::int64_t>(number_of(request, "value", -2147483648.0, 2147483647.0));
@@ -258,54 +317,52 @@ void WebBridge::Impl::set_camera(const PageRequest& request) {
     if (setting.id != id || !setting.writable) continue;
     const std::int32_t wanted = nearest(setting, value);
     // What the run keeps fixed it must know, or it would put the old value back.
-    return control_.request([this, request, id, wanted](WebOutput* run) {
-      const bool kept = run != nullptr && run->source().change_setting(id, wanted);
-      server_.post([this, request, id, wanted, kept] {
-        const bool done = kept || (camera_ && camera_->set(id, wanted));
-        answer(request, done, done ? fmt::format("{}", wanted) : "the camera refuses");
-        look_around();
-        send_state();
-      });
-    });
+    return in_loop(
+        [id, wanted](WebOutput* run) {
+          return run != nullptr && run->source().change_setting(id, wanted);
+        },
+        [this, request, id, wanted](bool kept) {
+          const bool done = kept || (camera_ && camera_->set(id, wanted));
+          answer(request, done, done ? fmt::format("{}", wanted) : "the camera refuses");
+          look_around();
+          send_state();
+        });
   }
   throw RequestRefused("control: this camera has no such setting, or it cannot be changed now");
 }
 
-void WebBridge::Impl::set_led(const PageRequest& request) {
+void WebBridge::set_led(const PageRequest& request) {
   const auto level = request.arguments.find("level");
   const bool settled = level != request.arguments.end() && *level == "auto";
   const double part = settled ? 0 : number_of(request, "level", 0, 1);
-  control_.request([this, request, settled, part](WebOutput* run) {
-    BoardControl* board = run == nullptr ? nullptr : run->board();
-    if (board != nullptr) {
-      if (settled) {
-        board->set_led_as_settled();
-      } else {
-        board->set_led(part);
-      }
-    }
-    server_.post([this, request, done = board != nullptr] {
-      answer(request, done, done ? "set" : "led: this run has no board; start with --board");
-    });
-  });
+  in_loop(
+      [settled, part](WebOutput* run) {
+        BoardControl* board = run == nullptr ? nullptr : run->board();
+        if (board != nullptr && settled) board->set_led_as_settled();
+        if (board != nullptr && !settled) board->set_led(part);
+        return board != nullptr;
+      },
+      [this, request](bool done) {
+        answer(request, done, done ? "set" : "led: this run has no board; start with --board");
+      });
 }
 
-void WebBridge::Impl::tare(const PageRequest& request) {
+void WebBridge::tare(const PageRequest& request) {
   const auto channel = static_cast<std::size_t>(number_of(request, "channel", 0, 3));
-  control_.request([this, request, channel](WebOutput* run) {
-    BoardControl* board = run == nullptr ? nullptr : run->board();
-    const bool there = board != nullptr;
-    const bool done = there && board->tare(channel);
-    server_.post([this, request, there, done] {
-      answer(request, done,
-             done    ? "is tared while it rests; that holds until this run ends"
-             : there ? "tare: that load cell is not calibrated, or has not spoken"
-                     : "tare: this run has no board; start with --board");
-    });
-  });
+  in_loop(
+      [channel](WebOutput* run) -> std::pair<bool, const char*> {
+        BoardControl* board = run == nullptr ? nullptr : run->board();
+        if (board == nullptr) return {false, "tare: this run has no board; start with --board"};
+        return board->tare(channel)
+                   ? std::pair{true, "is tared while it rests; that holds until this run ends"}
+                   : std::pair{false, "tare: that load cell is not calibrated, or has not spoken"};
+      },
+      [this, request](std::pair<bool, const char*> said) {
+        answer(request, said.first, said.second);
+      });
 }
 
-void WebBridge::Impl::start_job(const PageRequest& request) {
+void WebBridge::start_job(const PageRequest& request) {
   const std::string verb = line_of(request, "verb");
   if (!facts_) throw RequestRefused(kNoRun);
   const auto options = request.arguments.find("options");
@@ -317,17 +374,17 @@ void WebBridge::Impl::start_job(const PageRequest& request) {
   answer(request, true, "begun");
 }
 
-void WebBridge::Impl::press_key(const PageRequest& request) {
+void WebBridge::press_key(const PageRequest& request) {
   jobs_->press(line_of(request, "key"));
   answer(request, true, "pressed");
 }
 
-void WebBridge::Impl::close_job(const PageRequest& request) {
+void WebBridge::close_job(const PageRequest& request) {
   jobs_->close();
   answer(request, true, "closed");
 }
 
-void WebBridge::Impl::list_plans(const PageRequest& request) {
+void WebBridge::list_plans(const PageRequest& request) {
   json plans = json::array();
   for (const ReadyPlan& ready : ready_plans()) {
     const WrenchPlan plan = parse_plan(ready.text, ready.name);
@@ -339,7 +396,7 @@ void WebBridge::Impl::list_plans(const PageRequest& request) {
   answer(request, true, {}, std::move(plans));
 }
 
-void WebBridge::Impl::retry(const PageRequest& request) {
+void WebBridge::retry(const PageRequest& request) {
   if (running_) throw RequestRefused("retry: the sensor runs");
   if (jobs_->holds_camera()) throw RequestRefused("retry: a job has the camera; stop it first");
   if (!camera_free_) throw RequestRefused("retry: the sensor is being set up already");

@@ -8,12 +8,16 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <system_error>
+
+#include "host/calibration/light/control.h"
+#include "host/tracker/picture_quality.h"
 
 namespace tagwrench {
 namespace {
@@ -32,6 +36,55 @@ bool shown(const v4l2_queryctrl& control) {
   const bool number = control.type == V4L2_CTRL_TYPE_INTEGER ||
                       control.type == V4L2_CTRL_TYPE_BOOLEAN || control.type == V4L2_CTRL_TYPE_MENU;
   return number && (control.flags & V4L2_CTRL_FLAG_DISABLED) == 0;
+}
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kOurName = "tagwrench";
+constexpr const char* kWatchdog = "tw-watchdog";  // holds every device, and reads none
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  return text;
+}
+
+/// Entries of a folder; none where it cannot be read.
+std::vector<fs::path> entries(const fs::path& folder) {
+  std::error_code error;
+  std::vector<fs::path> found;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+    found.push_back(it->path());
+  return found;
+}
+
+/// Device node -> how it is read.
+std::map<std::string, std::string> our_nodes(const std::string& serial,
+                                             const KernelFolders& folders) {
+  std::map<std::string, std::string> nodes;
+  for (const fs::path& entry : entries(folders.hidraw)) {
+    const std::string events = text_of(entry / "device/uevent") + "\n";
+    if (events.find("HID_UNIQ=" + serial + "\n") != std::string::npos)
+      nodes["/dev/" + entry.filename().string()] = "hidraw";
+  }
+  for (const fs::path& entry : entries(folders.input)) {
+    const std::string name = entry.filename().string();
+    const bool of_events = name.starts_with("event");
+    if (!of_events && !name.starts_with("js")) continue;
+    const bool ours = text_of(entry / "device/uniq") == serial ||
+                      text_of(entry / "device/name").starts_with(kOurName);
+    if (ours) nodes["/dev/input/" + name] = "evdev";
+  }
+  return nodes;
+}
+
+constexpr Duration kMeasureEvery = std::chrono::milliseconds(450);
+
+Square square_of(const TagCorners& tag) {
+  Square square;
+  for (std::size_t i = 0; i < square.size(); ++i) square[i] = {tag.px[2 * i], tag.px[2 * i + 1]};
+  return square;
 }
 
 }  // namespace
@@ -92,51 +145,6 @@ std::int32_t nearest(const CameraSetting& setting, std::int64_t value) {
   return static_cast<std::int32_t>(std::min(low + steps * step, low + (high - low) / step * step));
 }
 
-namespace {
-
-namespace fs = std::filesystem;
-
-constexpr std::string_view kOurName = "tagwrench";
-constexpr const char* kWatchdog = "tw-watchdog";  // holds every device, and reads none
-
-std::string text_of(const fs::path& file) {
-  std::ifstream in(file);
-  std::string text{std::istreambuf_iterator<char>(in), {}};
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  return text;
-}
-
-/// Entries of a folder; none where it cannot be read.
-std::vector<fs::path> entries(const fs::path& folder) {
-  std::error_code error;
-  std::vector<fs::path> found;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
-    found.push_back(it->path());
-  return found;
-}
-
-/// Device node -> how it is read.
-std::map<std::string, std::string> our_nodes(const std::string& serial,
-                                             const KernelFolders& folders) {
-  std::map<std::string, std::string> nodes;
-  for (const fs::path& entry : entries(folders.hidraw)) {
-    const std::string events = text_of(entry / "device/uevent") + "\n";
-    if (events.find("HID_UNIQ=" + serial + "\n") != std::string::npos)
-      nodes["/dev/" + entry.filename().string()] = "hidraw";
-  }
-  for (const fs::path& entry : entries(folders.input)) {
-    const std::string name = entry.filename().string();
-    const bool of_events = name.starts_with("event");
-    if (!of_events && !name.starts_with("js")) continue;
-    const bool ours = text_of(entry / "device/uniq") == serial ||
-                      text_of(entry / "device/name").starts_with(kOurName);
-    if (ours) nodes["/dev/input/" + name] = "evdev";
-  }
-  return nodes;
-}
-
-}  // namespace
-
 std::vector<DeviceReader> device_readers(const std::string& serial, const KernelFolders& folders) {
   const std::map<std::string, std::string> nodes = our_nodes(serial, folders);
   std::vector<DeviceReader> readers;
@@ -160,6 +168,47 @@ std::vector<DeviceReader> device_readers(const std::string& serial, const Kernel
   });
   readers.erase(std::unique(readers.begin(), readers.end()), readers.end());
   return readers;
+}
+
+PictureFigures::PictureFigures(const CameraModel& camera, const TargetDescription& target)
+    : patterns_(camera, target), mirrored_(camera.mirrored) {
+  for (const Tag& tag : target.tags) edges_.push_back({tag.id, 0});
+}
+
+void PictureFigures::look(const ImageView& picture, std::span<const TagCorners> corners) {
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (now - last_ < kMeasureEvery) return;
+  last_ = now;
+  measure_edges(picture, corners);
+  std::vector<FoundTag> tags;
+  for (const TagCorners& tag : corners) {
+    FoundTag& found = tags.emplace_back();
+    found.corners_px = square_of(tag);
+    if (!mirrored_) continue;
+    for (Eigen::Vector2d& corner : found.corners_px) corner.x() = picture.width - 1 - corner.x();
+  }
+  const LightReading light = read_light(picture, mirrored_, tags);
+  nlohmann::json widths = nlohmann::json::array();
+  for (const Edges& edges : edges_) {
+    if (edges.px > 0) widths.push_back({{"id", edges.id}, {"px", edges.px}});
+  }
+  figures_ = {{"white", light.white_counts},
+              {"black", picture_quality(picture).dark_counts},
+              {"clipped_part", light.clipped_fraction},
+              {"edges_px", std::move(widths)}};
+}
+
+/// One tag after the other: a fit takes as long as a frame.
+void PictureFigures::measure_edges(const ImageView& picture, std::span<const TagCorners> corners) {
+  if (edges_.empty()) return;
+  const std::size_t index = next_++ % edges_.size();
+  Edges& edges = edges_[index];
+  edges.px = 0;
+  for (const TagCorners& tag : corners) {
+    if (tag.id != edges.id) continue;
+    if (const auto width = edge_width(picture, patterns_.patterns()[index], square_of(tag)))
+      edges.px = width->blur_px;
+  }
 }
 
 }  // namespace tagwrench

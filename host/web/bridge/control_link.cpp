@@ -5,8 +5,6 @@
 #include <sys/un.h>
 
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/local/datagram_protocol.hpp>
 #include <boost/asio/post.hpp>
 #include <cerrno>
 #include <cstring>
@@ -32,12 +30,8 @@ ControlAnswer control_answer(std::string_view bytes) {
   return {false, std::string(bytes)};
 }
 
-struct ControlLink::Socket {
-  Protocol::socket asio;
-};
-
 ControlLink::ControlLink(boost::asio::io_context& context, std::string path)
-    : path_(std::move(path)), socket_(new Socket{Protocol::socket(context)}), patience_(context) {
+    : path_(std::move(path)), socket_(context), patience_(context) {
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const sa_family_t family = AF_UNIX;  // alone, it asks for a name of the kernel's choice
   sockaddr own{};
@@ -45,11 +39,9 @@ ControlLink::ControlLink(boost::asio::io_context& context, std::string path)
   if (fd < 0 || ::bind(fd, &own, sizeof family) != 0)
     throw ConfigError(std::string("web: no socket to be had: ") + std::strerror(errno) +
                       "; end other programs");
-  socket_->asio.assign(Protocol(), fd);
-  socket_->asio.non_blocking(true);
+  socket_.assign(Protocol(), fd);
+  socket_.non_blocking(true);
 }
-
-ControlLink::~ControlLink() = default;
 
 void ControlLink::ask(std::string request, Done done) {
   requests_.push_back({std::move(request), std::move(done)});
@@ -63,23 +55,21 @@ void ControlLink::send() {
   };
   boost::system::error_code error;
   for (std::size_t stale = 1; stale > 0 && !error;)  // answers that came too late
-    stale = socket_->asio.receive(boost::asio::buffer(answer_), 0, error);
-  socket_->asio.send_to(boost::asio::buffer(requests_.front().text), Protocol::endpoint(path_), 0,
-                        error);
+    stale = socket_.receive(boost::asio::buffer(answer_), 0, error);
+  socket_.send_to(boost::asio::buffer(requests_.front().text), Protocol::endpoint(path_), 0, error);
   if (error) {
-    boost::asio::post(socket_->asio.get_executor(), [this, still] {
+    boost::asio::post(socket_.get_executor(), [this, still] {
       if (still()) finish({false, kNobody});
     });
     return;
   }
-  socket_->asio.async_receive(boost::asio::buffer(answer_),
-                              [this, still](boost::system::error_code failed, std::size_t size) {
-                                if (!failed && still())
-                                  finish(control_answer({answer_.data(), size}));
-                              });
+  socket_.async_receive(boost::asio::buffer(answer_),
+                        [this, still](boost::system::error_code failed, std::size_t size) {
+                          if (!failed && still()) finish(control_answer({answer_.data(), size}));
+                        });
   patience_.after(kPatience, [this, still] {
     if (!still()) return;
-    socket_->asio.cancel();
+    socket_.cancel();
     finish({false, kNobody});
   });
 }

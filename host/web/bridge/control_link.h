@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/local/datagram_protocol.hpp>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -13,10 +15,6 @@
 
 #include "host/motion/control_socket.h"
 #include "host/web/server/server_timer.h"
-
-namespace boost::asio {
-class io_context;
-}
 
 namespace tagwrench {
 
@@ -36,7 +34,6 @@ class ControlLink {
   /// `path` of the desk's socket, where somebody may or may not listen. Throws ConfigError if the
   /// system has no more descriptors.
   ControlLink(boost::asio::io_context& context, std::string path);
-  ~ControlLink();
 
   /// `done` is called exactly once, later; one request after the other.
   void ask(std::string request, Done done);
@@ -52,8 +49,7 @@ class ControlLink {
   void finish(ControlAnswer answer);
 
   std::string path_;
-  struct Socket;
-  std::unique_ptr<Socket> socket_;
+  boost::asio::local::datagram_protocol::socket socket_;
   ServerTimer patience_;
   std::deque<Request> requests_;
   std::array<char, ControlSocket::kMaxAnswer> answer_{};

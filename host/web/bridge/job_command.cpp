@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/calibration/print/board_spec.h"
-#include "host/calibration/wrench/plan_config.h"
+#include "host/calibration/wrench/plan.h"
 #include "host/core/config_error.h"
 
 namespace tagwrench {
@@ -100,22 +100,13 @@ class JobOptions {
         value->is_string() && value->get_ref<const std::string&>().size() <= kMaxText;
     if (!usable)
       throw RequestRefused(fmt::format("{}: must be a text of at most {} bytes", key, kMaxText));
-    const auto& text = value->get_ref<const std::string&>();
-    if (std::any_of(text.begin(), text.end(),
-                    [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
-      throw RequestRefused(fmt::format("{}: must be one line of plain text", key));
-    return text;
+    return checked_line(key, value->get<std::string>());
   }
   bool flag(const char* key) {
     const json* value = find(key);
     if (value != nullptr && !value->is_boolean())
       throw RequestRefused(fmt::format("{}: must be true or false", key));
     return value != nullptr && value->get<bool>();
-  }
-  static double number(const char* key, const json& value, double least, double most) {
-    const double number = value.is_number() ? value.get<double>() : std::nan("");
-    if (number >= least && number <= most) return number;
-    throw RequestRefused(fmt::format("{}: must be a number from {:g} to {:g}", key, least, most));
   }
   /// Refuses what nobody asked for.
   void done() const {
@@ -144,7 +135,7 @@ void add_camera(JobOptions& options, std::vector<std::string>& arguments) {
 void add_target(JobOptions& options, std::vector<std::string>& arguments) {
   if (const json* seconds = options.find("seconds")) {
     arguments.push_back(
-        fmt::format("--seconds={:g}", JobOptions::number("seconds", *seconds, 1, kMaxSeconds)));
+        fmt::format("--seconds={:g}", checked_number("seconds", *seconds, 1, kMaxSeconds)));
   }
 }
 
@@ -189,16 +180,28 @@ void add_check(JobOptions& options, std::vector<std::string>& arguments) {
   if (mass == nullptr && at == nullptr) return;
   if (mass == nullptr || at == nullptr || !at->is_array() || at->size() != 3)
     throw RequestRefused("mass_g, at: give both, the place as three numbers in mm");
-  arguments.push_back(fmt::format("--mass-g={:g}", JobOptions::number("mass_g", *mass, 0.1, 1e5)));
+  arguments.push_back(fmt::format("--mass-g={:g}", checked_number("mass_g", *mass, 0.1, 1e5)));
   std::string place;
   for (const json& mm : *at) {
     place += fmt::format("{}{:g}", place.empty() ? "" : ",",
-                         JobOptions::number("at", mm, -kFarthest_mm, kFarthest_mm));
+                         checked_number("at", mm, -kFarthest_mm, kFarthest_mm));
   }
   arguments.push_back("--at=" + place);
 }
 
 }  // namespace
+
+std::string checked_line(const char* key, std::string text) {
+  if (std::ranges::none_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+    return text;
+  throw RequestRefused(fmt::format("{}: must be one line of plain text", key));
+}
+
+double checked_number(const char* key, const json& value, double least, double most) {
+  const double number = value.is_number() ? value.get<double>() : std::nan("");
+  if (number >= least && number <= most) return number;
+  throw RequestRefused(fmt::format("{}: must be a number from {:g} to {:g}", key, least, most));
+}
 
 JobCommand job_command(std::string_view verb, const json& wished, const JobPlace& place) {
   const JobVerb& of = verb_named(verb);

@@ -18,6 +18,10 @@ class RequestRefused : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Both throw RequestRefused, naming the key.
+std::string checked_line(const char* key, std::string text);
+double checked_number(const char* key, const nlohmann::json& value, double least, double most);
+
 /// What the bridge works with, which a job gets too.
 struct JobPlace {
   std::string sensor;  ///< path of sensor.yaml; empty: the sensor has none

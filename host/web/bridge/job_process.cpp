@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
-#include "host/core/os/close_files.h"
+#include "host/core/os/child_process.h"
 #include "host/core/os/termination.h"
 #include "host/core/os/unique_fd.h"
 

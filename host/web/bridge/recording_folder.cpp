@@ -51,12 +51,15 @@ bool is_recording_name(std::string_view name) {
          });
 }
 
+void check_recording_name(std::string_view name) {
+  if (is_recording_name(name)) return;
+  throw RequestRefused(
+      "name: must be 1 to 64 letters, digits, -, _ and ., beginning with a letter or digit; "
+      "choose another");
+}
+
 fs::path RecordingFolder::new_file(std::string_view name) const {
-  if (!is_recording_name(name)) {
-    throw RequestRefused(
-        "name: must be 1 to 64 letters, digits, -, _ and ., beginning with a letter or digit; "
-        "choose another");
-  }
+  check_recording_name(name);
   if (folder_.empty()) {
     throw ConfigError(
         "recordings: neither XDG_DATA_HOME nor HOME says where; name a folder with --recordings");
@@ -133,18 +136,14 @@ nlohmann::json RunRecording::progress() const {
 }
 
 RunRecording::Ending RunRecording::finish() noexcept {
-  try {
-    const std::string trouble = writer().finish();
-    const record::WriterState state = writer().state();
-    if (!trouble.empty()) return {false, trouble};
-    std::string line = fmt::format("{}: {} frames, {:.3g} MB", file_.string(), state.frames,
-                                   1e-6 * static_cast<double>(state.bytes));
-    if (state.lost_frames > 0)
-      line += fmt::format("; the disk was too slow for {} of them", state.lost_frames);
-    return {true, line};
-  } catch (const std::exception&) {
-    return {false, {}};  // out of memory: unsaid
-  }
+  const std::string trouble = writer().finish();
+  const record::WriterState state = writer().state();
+  if (!trouble.empty()) return {false, trouble};
+  std::string line = fmt::format("{}: {} frames, {:.3g} MB", file_.string(), state.frames,
+                                 1e-6 * static_cast<double>(state.bytes));
+  if (state.lost_frames > 0)
+    line += fmt::format("; the disk was too slow for {} of them", state.lost_frames);
+  return {true, line};
 }
 
 }  // namespace tagwrench

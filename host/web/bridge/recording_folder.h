@@ -38,6 +38,8 @@ class RecordingFolder {
 
 /// 1 to 64 letters, digits, '-', '_' and '.', the first none of the last three.
 bool is_recording_name(std::string_view name);
+/// Throws RequestRefused.
+void check_recording_name(std::string_view name);
 
 // A recording that a page began and a page ends, while the sensor runs. The file is that of
 // `tagwrench record`.

@@ -5,13 +5,15 @@
 #include <algorithm>
 #include <exception>
 #include <future>
+#include <sstream>
 #include <utility>
 
+#include "host/core/axis_names.h"
 #include "host/core/log.h"
 #include "host/motion/control_socket.h"
-#include "host/tracker/diagnostic_text.h"
-#include "host/web/bridge/web_bridge_impl.h"
-#include "host/web/server/picture_message.h"
+#include "host/tracker/tracker.h"
+#include "host/web/server/live_feed.h"
+#include "host/wrench/zero.h"
 
 namespace tagwrench {
 namespace {
@@ -23,9 +25,63 @@ constexpr unsigned kTicksBetweenLooks = 4;  // at cameras and programs
 constexpr unsigned kTicksBetweenTrials = 2;
 constexpr std::string_view kProfileNews = "profile";
 
+/// Full scale per axis, as samples have it: what the calibration vouches for, else what the
+/// sensor's shaping takes for full.
+Vector6 shown_range(const SensorConfig& sensor) {
+  const WrenchEstimator wrench(sensor.wrench);
+  Vector6 range = range_through(wrench.tool(), sensor.wrench.range);
+  for (int i = 0; i < 6; ++i) {
+    if (!(range[i] > 0 && range[i] < kUnknownRange)) range[i] = 1.5 * sensor.shaping.full_scale[i];
+  }
+  return range;
+}
+
+/// The message, with the folder of recordings. Throws ConfigError if the calibration cannot be
+/// read.
+json hello_of(const RunFacts& facts, const std::string& recordings) {
+  const SensorConfig& sensor = facts.sensor;
+  json calibrated = nullptr;
+  json from_springs = json::array();
+  if (!sensor.calibration.empty() && !sensor.wrench_from.date.empty())
+    calibrated = sensor.wrench_from.date;
+  std::istringstream completed(sensor.completed_axes);
+  for (std::string axis; completed >> axis;) from_springs.push_back(axis);
+  if (sensor.calibration.empty()) {
+    for (const char* axis : kWrenchAxes) from_springs.push_back(axis);
+  }
+  const Vector6 range = shown_range(sensor);
+  json mounting = json::array();  // row by row
+  for (int i = 0; i < 9; ++i) mounting.push_back(sensor.shaping.hid_R_camera(i / 3, i % 3));
+  json cells = json::array();
+  for (int i = 0; facts.board && i < 4; ++i) cells.push_back(i);
+  return {{"type", "hello"},
+          {"protocol", 1},
+          {"version", TAGWRENCH_VERSION},
+          {"name", facts.name},
+          {"source", facts.format.description},
+          {"sensor", facts.place.sensor.empty() ? "built in" : facts.place.sensor},
+          {"camera",
+           {{"width", facts.format.width},
+            {"height", facts.format.height},
+            {"mirrored", sensor.camera.mirrored}}},
+          {"range_n", {range[0], range[1], range[2]}},
+          {"range_nm", {range[3], range[4], range[5]}},
+          {"hid_R_camera", mounting},
+          {"calibrated", calibrated},
+          {"axes_from_springs", from_springs},
+          {"folder", recordings},
+          {"can",
+           {{"camera_settings", !facts.camera_device.empty()},
+            {"led", facts.board},
+            {"cells", cells},
+            {"profiles", facts.profiles},
+            {"record", facts.head.has_value()},
+            {"jobs", possible_jobs(facts.place)}}}};
+}
+
 }  // namespace
 
-WebBridge::Impl::Impl(const WebBridgeOptions& options, int stop)
+WebBridge::WebBridge(const WebBridgeOptions& options, int stop)
     : own_profiles_(options.own_profiles),
       recordings_(options.recordings),
       server_(options.server),
@@ -47,7 +103,7 @@ WebBridge::Impl::Impl(const WebBridgeOptions& options, int stop)
   });
 }
 
-WebBridge::Impl::~Impl() {
+WebBridge::~WebBridge() {
   if (started_) {
     in_server([this] {  // all that belongs to its thread
       ticker_.reset();
@@ -59,7 +115,7 @@ WebBridge::Impl::~Impl() {
   if (ender_.joinable()) ender_.join();
 }
 
-void WebBridge::Impl::start() {
+void WebBridge::start() {
   server_.start(*this);
   started_ = true;
   in_server([this] {
@@ -68,7 +124,7 @@ void WebBridge::Impl::start() {
   });
 }
 
-void WebBridge::Impl::in_server(std::function<void()> work) {
+void WebBridge::in_server(std::function<void()> work) {
   std::promise<void> done;
   server_.post([&] {
     try {
@@ -81,8 +137,7 @@ void WebBridge::Impl::in_server(std::function<void()> work) {
   done.get_future().get();
 }
 
-std::unique_ptr<WebOutput> WebBridge::Impl::begin_run(const RunFacts& facts,
-                                                      WebOutput::Parts parts) {
+std::unique_ptr<WebOutput> WebBridge::begin_run(const RunFacts& facts, WebOutput::Parts parts) {
   const json hello = hello_of(facts, recordings_.path().string());
   // Before anybody knows of the run: what is wished of it from then on waits for its loop.
   clear_event(resume_);
@@ -125,7 +180,7 @@ std::unique_ptr<WebOutput> WebBridge::Impl::begin_run(const RunFacts& facts,
   return std::make_unique<WebOutput>(std::move(parts));
 }
 
-void WebBridge::Impl::end_run() {
+void WebBridge::end_run() {
   control_.close();
   in_server([this] {
     running_ = false;
@@ -135,7 +190,7 @@ void WebBridge::Impl::end_run() {
   });
 }
 
-bool WebBridge::Impl::wait_to_resume(Beside beside) {
+bool WebBridge::wait_to_resume(Beside beside) {
   std::vector<pollfd> fds = {{resume_.get(), POLLIN, 0}, {stop_, POLLIN, 0}};
   for (const Output* output : beside) fds.push_back({output->poll_fd(), POLLIN, 0});
   while (true) {
@@ -150,7 +205,7 @@ bool WebBridge::Impl::wait_to_resume(Beside beside) {
   }
 }
 
-bool WebBridge::Impl::lend_camera(Beside beside) {
+bool WebBridge::lend_camera(Beside beside) {
   clear_event(resume_);
   in_server([this] {
     camera_free_ = true;
@@ -160,7 +215,7 @@ bool WebBridge::Impl::lend_camera(Beside beside) {
   return wait_to_resume(beside);
 }
 
-bool WebBridge::Impl::wait_after(const std::string& failure, Beside beside) {
+bool WebBridge::wait_after(const std::string& failure, Beside beside) {
   control_.close();
   clear_event(resume_);
   in_server([&] {
@@ -175,26 +230,26 @@ bool WebBridge::Impl::wait_after(const std::string& failure, Beside beside) {
   return wait_to_resume(beside);
 }
 
-void WebBridge::Impl::give_back_camera() {
+void WebBridge::give_back_camera() {
   camera_free_ = false;
   raise_event(resume_);
 }
 
-void WebBridge::Impl::page_came(std::uint64_t page) {
+void WebBridge::page_came(std::uint64_t page) {
   pages_.insert(page);
   if (!jobs_) return;  // about to end
   server_.send(page, state());
   look_around();
 }
 
-void WebBridge::Impl::page_gone(std::uint64_t page) {
+void WebBridge::page_gone(std::uint64_t page) {
   pages_.erase(page);
   if (!trial_ || trial_->page != page) return;
   trial_.reset();
   if (profiles_) profiles_->ask("revert", [this](const ControlAnswer&) { read_profile(); });
 }
 
-void WebBridge::Impl::heard(std::string line, std::vector<std::string> programs) {
+void WebBridge::heard(std::string line, std::vector<std::string> programs) {
   const bool changed = programs != programs_;
   programs_ = std::move(programs);
   if (!line.empty()) say(line);
@@ -202,11 +257,11 @@ void WebBridge::Impl::heard(std::string line, std::vector<std::string> programs)
   if (changed) send_state();
 }
 
-void WebBridge::Impl::say(const std::string& line) {
+void WebBridge::say(const std::string& line) {
   server_.send_all({{"type", "say"}, {"line", line}});
 }
 
-void WebBridge::Impl::show(const JobPicture& picture) {
+void WebBridge::show(const JobPicture& picture) {
   const json header = {{"seq", 0},
                        {"t_ns", 0},
                        {"width", picture.width},
@@ -217,7 +272,7 @@ void WebBridge::Impl::show(const JobPicture& picture) {
 }
 
 /// What the desk has in force, as pages see it.
-void WebBridge::Impl::read_profile() {
+void WebBridge::read_profile() {
   if (!profiles_) return;
   profiles_->ask("status", [this](const ControlAnswer& status) {
     constexpr std::string_view kHead = "profile ";
@@ -243,7 +298,7 @@ void WebBridge::Impl::read_profile() {
 }
 
 /// A trial lasts as long as who tries goes on asking.
-void WebBridge::Impl::keep_trial() {
+void WebBridge::keep_trial() {
   if (!trial_ || !profiles_) return;
   profiles_->ask("live", [this](const ControlAnswer& live) {
     if (!trial_ || (live.ok && live.text.ends_with(" 1"))) return;
@@ -252,7 +307,7 @@ void WebBridge::Impl::keep_trial() {
   });
 }
 
-void WebBridge::Impl::end_recording(std::function<void(RunRecording::Ending)> then) {
+void WebBridge::end_recording(std::function<void(RunRecording::Ending)> then) {
   ending_recording_ = true;
   if (ender_.joinable()) ender_.join();
   ender_ = std::thread([this, then = std::move(then),
@@ -271,20 +326,14 @@ void WebBridge::Impl::end_recording(std::function<void(RunRecording::Ending)> th
   send_state();
 }
 
-void WebBridge::Impl::tick() {
+void WebBridge::tick() {
   ticker_->after(kTick, [this] { tick(); });
   const std::uint64_t samples = server_.feed().written();
   fresh_ = samples != std::exchange(seen_, samples);
   ++ticks_;
   if (recording_ && recording_->failed() && !ending_recording_) {
-    control_.request([this](WebOutput* run) {
-      if (run != nullptr) {
-        run->record(nullptr);
-        run->source().narrow(false);
-      }
-      server_.post([this] {
-        if (recording_) end_recording([](const RunRecording::Ending&) {});
-      });
+    take_recording([this] {
+      if (recording_) end_recording([](const RunRecording::Ending&) {});
     });
   }
   if (ticks_ % kTicksBetweenTrials == 0) keep_trial();
@@ -293,17 +342,17 @@ void WebBridge::Impl::tick() {
   send_state();
 }
 
-void WebBridge::Impl::look_around() {
+void WebBridge::look_around() {
   if (!facts_ || server_.pages() == 0) return;
   readers_ = device_readers("tagwrench-" + facts_->name);
   if (camera_ && running_) controls_ = settings_json(camera_->all());
 }
 
-void WebBridge::Impl::send_state() {
+void WebBridge::send_state() {
   if (jobs_ && server_.pages() > 0) server_.send_all(state());
 }
 
-std::string WebBridge::Impl::words(const SeenNow& seen, bool fresh) const {
+std::string WebBridge::words(const SeenNow& seen, bool fresh) const {
   if (!failure_.empty()) return failure_;
   if (!running_ && jobs_->holds_camera()) return "the camera is lent to what is being done";
   if (!running_) return "the sensor is being set up";
@@ -325,14 +374,14 @@ std::string WebBridge::Impl::words(const SeenNow& seen, bool fresh) const {
   return {};
 }
 
-json WebBridge::Impl::image() const {
+json WebBridge::image() const {
   if (!figures_ || !figures_->figures().is_object()) return nullptr;
   json image = figures_->figures();
   image["residual_part"] = views_.seen.get().residual_fraction;
   return image;
 }
 
-json WebBridge::Impl::state() const {
+json WebBridge::state() const {
   const LiveFigures figures = server_.figures();
   const SeenNow seen = views_.seen.get();
   json clients = json::array();
@@ -372,27 +421,6 @@ json WebBridge::Impl::state() const {
           {"board", board},
           {"camera_controls", running_ ? controls_ : json::array()},
           {"job", jobs_->to_json()}};
-}
-
-WebBridge::WebBridge(const WebBridgeOptions& options, int stop)
-    : impl_(std::make_unique<Impl>(options, stop)) {}
-
-WebBridge::~WebBridge() = default;
-
-void WebBridge::start() { impl_->start(); }
-std::string WebBridge::url() const { return impl_->url(); }
-std::string WebBridge::url_with_token() const { return impl_->url_with_token(); }
-
-std::unique_ptr<WebOutput> WebBridge::begin_run(const RunFacts& facts, WebOutput::Parts parts) {
-  return impl_->begin_run(facts, std::move(parts));
-}
-
-int WebBridge::end_fd() const noexcept { return impl_->end_fd(); }
-void WebBridge::end_run() { impl_->end_run(); }
-bool WebBridge::lend_camera(Beside beside) { return impl_->lend_camera(beside); }
-
-bool WebBridge::wait_after(const std::string& failure, Beside beside) {
-  return impl_->wait_after(failure, beside);
 }
 
 }  // namespace tagwrench

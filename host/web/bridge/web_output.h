@@ -11,17 +11,92 @@
 #include <vector>
 
 #include "host/core/frame_log.h"
+#include "host/core/os/unique_fd.h"
 #include "host/output/output.h"
 #include "host/output/spnav_output.h"
-#include "host/source/region_source.h"
+#include "host/source/frame_source.h"
 #include "host/tracker/tracker.h"
-#include "host/web/bridge/board_control.h"
 #include "host/web/bridge/recording_folder.h"
-#include "host/web/bridge/run_control.h"
 #include "host/web/server/live_feed.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
+
+class WebOutput;
+
+// The board beside a run, as far as a page may touch it. In the loop's thread.
+
+struct BoardReading {
+  struct Cell {
+    bool known = false;  ///< calibrated, and it has spoken
+    double newtons = 0;
+    double sigma_n = 0;
+  };
+  double led = 0;          ///< 0..1
+  double exposure_us = 0;  ///< 0: not known
+  std::array<Cell, 4> cells{};
+};
+
+class BoardControl {
+ public:
+  BoardControl() = default;
+  BoardControl(const BoardControl&) = delete;
+  BoardControl& operator=(const BoardControl&) = delete;
+  virtual ~BoardControl() = default;
+
+  virtual BoardReading reading() const noexcept = 0;
+  /// 0..1, what the LED may have for ever at most.
+  virtual void set_led(double level) noexcept = 0;
+  /// The level that was found when the light was set.
+  virtual void set_led_as_settled() noexcept = 0;
+  /// From now on this cell reads nothing, until the run ends. False: it is not calibrated.
+  virtual bool tare(std::size_t channel) noexcept = 0;
+};
+
+// Between the server's thread and the loop of a run: requests that must happen in the loop, and the
+// request that it give the camera away.
+
+class RunControl {
+ public:
+  /// In the loop's thread; or in that of close(), with nothing, when the run is over.
+  using Request = std::function<void(WebOutput*)>;
+
+  /// `stop` becomes readable when a signal has come. Throws ConfigError if the system has no more
+  /// descriptors.
+  explicit RunControl(int stop);
+
+  /// Readable once a signal has come or the camera is wanted: the run shall end.
+  int end_fd() const noexcept { return end_.get(); }
+  /// Readable when run_requests() has something to do.
+  int requests_fd() const noexcept { return requests_ready_.get(); }
+
+  // Any thread.
+  void request(Request request);
+  /// Of the run that there is, or else of the next one.
+  void want_camera() noexcept;
+  /// That request is fulfilled.
+  void camera_given() noexcept;
+
+  // The loop's thread, and that which builds runs.
+  void open();
+  void run_requests(WebOutput& output) noexcept;
+  void close() noexcept;
+
+ private:
+  std::vector<Request> take() noexcept;
+
+  UniqueFd camera_wanted_;
+  UniqueFd requests_ready_;
+  UniqueFd end_;
+  std::mutex mutex_;
+  bool open_ = false;
+  std::vector<Request> requests_;
+};
+
+/// An event that is counted; throws ConfigError if the system has no more descriptors.
+UniqueFd make_event();
+void raise_event(const UniqueFd& event) noexcept;
+void clear_event(const UniqueFd& event) noexcept;
 
 // The newest value of something, from one thread that must not wait to another that may.
 
@@ -94,8 +169,11 @@ class WebOutput final : public Output, public FrameLog {
   void follow_skipped(const std::uint64_t& skipped) noexcept { skipped_ = &skipped; }
 
   // The loop's thread.
-  /// Null: none any more. Borrowed.
-  void record(RunRecording* recording) noexcept { recording_ = recording; }
+  /// Null: none any more. Borrowed. `narrow`: the part around the tags alone.
+  void record(RunRecording* recording, bool narrow) noexcept {
+    parts_.source->narrow(narrow);
+    recording_ = recording;
+  }
   RegionSource& source() noexcept { return *parts_.source; }
   BoardControl* board() noexcept { return parts_.board; }
 

@@ -1,9 +1,19 @@
 #include "host/web/server/live_feed.h"
 
+#include <fmt/format.h>
+#include <turbojpeg.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <nlohmann/json.hpp>
 #include <vector>
+
+#include "host/core/json/json_text.h"
+#include "host/output/line_outputs.h"
+#include "host/output/output.h"
+#include "host/source/decode.h"
 
 namespace tagwrench {
 namespace {
@@ -38,6 +48,56 @@ void copy_part(const LoggedFrame& logged, LivePicture& picture) noexcept {
     std::memcpy(picture.bytes.get() + picture.size, image.pixels + offset, width);
     picture.size += width;
   }
+}
+
+/// JSON has no other numbers.
+double finite(double value) { return std::isfinite(value) ? value : 0; }
+
+void append_six(std::string& text, std::string_view key, const Vector6& six) {
+  fmt::format_to(std::back_inserter(text), R"(,"{}":[{},{},{},{},{},{}])", key, finite(six[0]),
+                 finite(six[1]), finite(six[2]), finite(six[3]), finite(six[4]), finite(six[5]));
+}
+
+using nlohmann::json;
+
+constexpr std::uint8_t kUnknownGrey = 128;
+
+struct JpegEnd {
+  void operator()(unsigned char* bytes) const noexcept { tjFree(bytes); }
+};
+
+/// One pixel is the mean of `factor` by `factor`.
+void shrink(const ImageView& image, int factor, std::vector<std::uint8_t>& out, int width,
+            int height) {
+  out.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  std::vector<unsigned> sums(static_cast<std::size_t>(width));
+  const auto area = static_cast<unsigned>(factor * factor);
+  for (int row = 0; row < height; ++row) {
+    std::fill(sums.begin(), sums.end(), area / 2);
+    for (int part = 0; part < factor; ++part) {
+      const std::uint8_t* pixel =
+          image.pixels + static_cast<std::ptrdiff_t>(row * factor + part) * image.stride;
+      for (unsigned& sum : sums)
+        for (int column = 0; column < factor; ++column) sum += *pixel++;
+    }
+    std::uint8_t* target = out.data() + static_cast<std::ptrdiff_t>(row) * width;
+    for (const unsigned sum : sums) *target++ = static_cast<std::uint8_t>(sum / area);
+  }
+}
+
+json header_of(const LivePicture& picture) {
+  json tags = json::array();
+  for (std::size_t i = 0; i < picture.tag_count; ++i) {
+    json corners = json::array();
+    for (const double px : picture.tags[i].px) corners.push_back(std::round(px * 10) / 10);
+    tags.push_back({{"id", picture.tags[i].id}, {"px", std::move(corners)}});
+  }
+  return {{"seq", picture.sequence},
+          {"t_ns", Duration(picture.capture_time.time_since_epoch()).count()},
+          {"width", picture.width},
+          {"height", picture.height},
+          {"tags", std::move(tags)},
+          {"status", name(picture.status)}};
 }
 
 }  // namespace
@@ -181,16 +241,130 @@ LiveFigures LiveWindow::figures(TimePoint now) const {
   };
   out.latency_median_us = quantile(0.5);
   out.latency_p99_us = quantile(0.99);
-  double sum = 0;
-  double squares = 0;
-  for (const double step : intervals_us) sum += step;
-  if (sum <= 0) return out;
-  const auto steps = static_cast<double>(intervals_us.size());
-  const double mean = sum / steps;
-  for (const double step : intervals_us) squares += (step - mean) * (step - mean);
-  out.rate_hz = 1e6 / mean;
-  out.jitter_us = std::llround(std::sqrt(squares / steps));
+  const Eigen::Map<const Eigen::ArrayXd> steps(intervals_us.data(),
+                                               static_cast<Eigen::Index>(intervals_us.size()));
+  if (steps.sum() <= 0) return out;
+  out.rate_hz = 1e6 / steps.mean();
+  out.jitter_us = std::llround(std::sqrt((steps - steps.mean()).square().mean()));
   return out;
+}
+
+std::string sample_text(const LiveSample& live) {
+  LineBuffer buffer;
+  const std::string_view line = json_line(buffer, live.sample);
+  std::string text(line.substr(0, line.rfind('}')));
+  const bool numbers = carries_numbers(shown_status(live.sample));
+  append_six(text, "zero", live.sample.zero);
+  append_six(text, "motion", numbers ? live.sample.deflection : Vector6::Zero());
+  fmt::format_to(std::back_inserter(text),
+                 R"(,"zero_state":"{}","buttons":{},"residual_px":{:.4g},"tags_held":{}}})",
+                 name(live.sample.zero_state), live.sample.buttons, finite(live.residual_px),
+                 live.tags_held);
+  return text;
+}
+
+void SampleStream::pull() {
+  const std::uint64_t written = feed_.written();
+  if (written - next_ > LiveFeed::kKept) next_ = written - LiveFeed::kKept;
+  for (; next_ < written; ++next_) {
+    const std::optional<LiveSample> live = feed_.read(next_);
+    if (!live) continue;  // overwritten meanwhile
+    window_.add(live->sample.output_time, latency_us(live->sample));
+    frames_ = live->frames;
+    dropped_ = live->dropped;
+    entries_.push_back({next_, sample_text(*live)});
+    if (entries_.size() > kMax) entries_.pop_front();
+    made_ = nullptr;
+  }
+}
+
+void SampleStream::skip() {
+  next_ = feed_.written();
+  entries_.clear();
+  window_.clear();
+  made_ = nullptr;
+}
+
+Text SampleStream::message(std::uint64_t from) {
+  if (from >= next_ || entries_.empty()) return nullptr;
+  if (made_ != nullptr && made_from_ == from) return made_;
+  const auto first = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const Entry& entry) { return entry.position >= from; });
+  if (first == entries_.end()) return nullptr;
+  std::string text = R"({"type":"samples","samples":[)";
+  for (auto entry = first; entry != entries_.end(); ++entry) {
+    if (entry != first) text += ',';
+    text += entry->text;
+  }
+  const auto sent = static_cast<std::uint64_t>(std::distance(first, entries_.end()));
+  fmt::format_to(std::back_inserter(text), R"(],"lost":{}}})", next_ - from - sent);
+  made_ = std::make_shared<const std::string>(std::move(text));
+  made_from_ = from;
+  return made_;
+}
+
+LiveFigures SampleStream::figures(TimePoint now) const {
+  LiveFigures out = window_.figures(now);
+  out.frames = frames_;
+  out.dropped = dropped_;
+  return out;
+}
+
+PictureMaker::PictureMaker() : compressor_(tjInitCompress()) {}
+
+void PictureMaker::CompressorEnd::operator()(void* handle) const noexcept { tjDestroy(handle); }
+
+std::optional<ImageView> PictureMaker::decode(const LivePicture& picture) {
+  const int width = picture.width;
+  const int height = picture.height;
+  if (picture.part.empty()) {
+    if (!decoder_ || width_ != width || height_ != height)
+      decoder_ = std::make_unique<RawDecoder>(width, height);
+    width_ = width;
+    height_ = height;
+    Frame frame;
+    const RawFrame raw{picture.fourcc, {picture.bytes.get(), picture.size}, picture.stride};
+    if (!decoder_->decode(raw, {}, frame)) return {};
+    return frame.image;
+  }
+  const Region& part = picture.part;
+  whole_.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), kUnknownGrey);
+  for (int row = 0; row < part.height; ++row) {
+    const auto* from = picture.bytes.get() + static_cast<std::ptrdiff_t>(row) * picture.stride;
+    std::copy_n(from, part.width,
+                whole_.data() + static_cast<std::ptrdiff_t>(part.y + row) * width + part.x);
+  }
+  return ImageView{whole_.data(), width, height, width};
+}
+
+Picture PictureMaker::message(const LivePicture& picture, const ImageView& whole) {
+  const int factor = (whole.width + kWidest - 1) / kWidest;
+  ImageView shown = whole;
+  if (factor > 1) {
+    const int width = whole.width / factor;
+    const int height = whole.height / factor;
+    shrink(whole, factor, small_, width, height);
+    shown = {small_.data(), width, height, width};
+  }
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  const int failed =
+      tjCompress2(compressor_.get(), shown.pixels, shown.width, shown.stride, shown.height,
+                  TJPF_GRAY, &bytes, &size, TJSAMP_GRAY, kQuality, TJFLAG_FASTDCT);
+  const std::unique_ptr<unsigned char, JpegEnd> jpeg(bytes);
+  if (failed != 0) return nullptr;
+  return picture_message(header_of(picture), {jpeg.get(), size});
+}
+
+Picture picture_message(const json& header, std::span<const std::uint8_t> jpeg) {
+  const std::string text = dump_json(header);
+  std::vector<std::uint8_t> message;
+  message.reserve(4 + text.size() + jpeg.size());
+  for (int shift = 0; shift < 32; shift += 8)
+    message.push_back(static_cast<std::uint8_t>(text.size() >> shift & 0xffU));
+  message.insert(message.end(), text.begin(), text.end());
+  message.insert(message.end(), jpeg.begin(), jpeg.end());
+  return std::make_shared<const std::vector<std::uint8_t>>(std::move(message));
 }
 
 }  // namespace tagwrench

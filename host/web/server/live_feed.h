@@ -8,13 +8,21 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "host/core/frame_log.h"
 #include "host/core/types.h"
+#include "host/source/decode.h"
 
 namespace tagwrench {
+
+/// Messages, shared by the pages that get them.
+using Text = std::shared_ptr<const std::string>;
+using Picture = std::shared_ptr<const std::vector<std::uint8_t>>;
 
 /// A sample, and what the tracker said beside it. Copied word by word.
 struct LiveSample {
@@ -114,6 +122,75 @@ class LiveWindow {
     std::int64_t latency_us;
   };
   std::deque<Entry> entries_;
+};
+
+// The last samples as text, for pages that are at different places of the stream.
+
+/// As the contract has it, and what pages show beside it. One object.
+std::string sample_text(const LiveSample& live);
+
+class SampleStream {
+ public:
+  static constexpr std::size_t kMax = 64;  ///< in a message
+
+  explicit SampleStream(const LiveFeed& feed) : feed_(feed) {}
+
+  /// Takes what is new.
+  void pull();
+  /// Forgets what has come: nobody has looked.
+  void skip();
+
+  std::uint64_t end() const noexcept { return next_; }
+  /// All from this position on, but at most the last kMax; the others count as lost. Null: there
+  /// is nothing new.
+  Text message(std::uint64_t from);
+  LiveFigures figures(TimePoint now) const;
+
+ private:
+  const LiveFeed& feed_;
+  std::uint64_t next_ = 0;  ///< position in the feed
+  struct Entry {
+    std::uint64_t position;
+    std::string text;
+  };
+  std::deque<Entry> entries_;
+  LiveWindow window_;
+  std::uint64_t frames_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::uint64_t made_from_ = 0;  ///< of `made_`, which pages at the same place share
+  Text made_;
+};
+
+// A picture for pages: a header in JSON, and a small JPEG.
+
+/// The header's length (4 bytes, little-endian), the header, the JPEG.
+Picture picture_message(const nlohmann::json& header, std::span<const std::uint8_t> jpeg);
+
+/// Makes pictures of the feed what pages show. Keeps its buffers.
+class PictureMaker {
+ public:
+  static constexpr int kWidest = 640;
+  static constexpr int kQuality = 70;
+
+  PictureMaker();
+
+  /// All of the picture, grey where it is not known; valid until the next call. Nothing: the bytes
+  /// are damaged.
+  std::optional<ImageView> decode(const LivePicture& picture);
+  /// Of the whole picture, made smaller if it is wider than kWidest; its coordinates in the header
+  /// are the whole picture's. Null: it cannot be compressed.
+  Picture message(const LivePicture& picture, const ImageView& whole);
+
+ private:
+  struct CompressorEnd {
+    void operator()(void* handle) const noexcept;
+  };
+  std::unique_ptr<void, CompressorEnd> compressor_;
+  std::unique_ptr<RawDecoder> decoder_;
+  int width_ = 0;  ///< of what the decoder decodes
+  int height_ = 0;
+  std::vector<std::uint8_t> whole_;
+  std::vector<std::uint8_t> small_;
 };
 
 }  // namespace tagwrench

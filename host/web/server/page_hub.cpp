@@ -1,21 +1,25 @@
 #include "host/web/server/page_hub.h"
 
-#include <nlohmann/json.hpp>
-#include <utility>
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/websocket.hpp>
 
 #include "host/core/json/json_text.h"
-#include "host/web/server/page_message.h"
 
 namespace tagwrench {
 namespace {
 
+namespace asio = boost::asio;
+namespace websocket = boost::beast::websocket;
+using boost::beast::error_code;
 using nlohmann::json;
 
-// Of RFC 6455, section 7.4.1.
-constexpr std::uint16_t kGoingAway = 1001;
-constexpr std::uint16_t kPolicyError = 1008;
+constexpr int kSendBuffer = 128 * 1024;  // the kernel's; what waits longer is replaced, not queued
 
-std::shared_ptr<const std::string> shared_text(const json& message) {
+TimePoint page_clock() { return std::chrono::steady_clock::now(); }
+
+Text shared_text(const json& message) {
   return std::make_shared<const std::string>(dump_json(message));
 }
 
@@ -23,25 +27,253 @@ std::string message_type(const json& message) { return message.value("type", std
 
 }  // namespace
 
+bool Outbox::keep(Text text) {
+  if (kept_.size() == kMaxKept) return false;
+  kept_.push_back(std::move(text));
+  return true;
+}
+
+void Outbox::replace(std::string_view type, Text text) {
+  const auto same = std::find_if(latest_.begin(), latest_.end(),
+                                 [&](const auto& waiting) { return waiting.first == type; });
+  if (same != latest_.end())
+    same->second = std::move(text);
+  else if (latest_.size() < kMaxTypes)
+    latest_.emplace_back(type, std::move(text));
+}
+
+Text Outbox::next_text() {
+  Text text;
+  if (!kept_.empty()) {
+    text = std::move(kept_.front());
+    kept_.pop_front();
+  } else if (!latest_.empty()) {
+    text = std::move(latest_.front().second);
+    latest_.pop_front();
+  }
+  return text;
+}
+
+/// One page: its WebSocket, what it is still to be sent, and what it may send.
+class PageHub::Page : public std::enable_shared_from_this<Page> {
+ public:
+  Page(asio::ip::tcp::socket socket, HttpRequest request, std::uint64_t page, PageHub& hub);
+
+  void open();
+  /// Goes out in its turn, or the page is closed: it has not read for long.
+  void keep(Text text);
+  void replace(std::string_view type, Text text);
+  void show(Picture picture);
+  /// There may be new ones.
+  void samples_due();
+  void check(TimePoint now);
+  void close(std::uint16_t code, std::string_view reason);
+  bool was_open() const noexcept { return open_; }
+
+  const std::uint64_t id;
+  std::uint64_t next_sample = 0;  ///< position of the first that it has not seen
+  bool wants_pictures = false;
+
+ private:
+  bool is_open() const noexcept { return open_ && !closing_; }
+  void read();
+  void take(const error_code& error);
+  void pump();
+  void write(std::shared_ptr<const void> owner, const void* bytes, std::size_t size, bool text);
+  void ping();
+  void finished(const error_code& error);
+  void drop() noexcept;
+  void end();
+
+  websocket::stream<asio::ip::tcp::socket, false> stream_;
+  PageHub& hub_;
+  HttpRequest request_;
+  boost::beast::flat_buffer incoming_{kMaxRequest + 1};
+  Outbox outbox_;
+  MessageRate<kMaxRequestsPerSecond> rate_;
+  bool open_ = false;
+  bool closing_ = false;
+  bool ended_ = false;
+  bool busy_ = false;  ///< writing
+  bool ping_due_ = false;
+  bool samples_due_ = false;
+  TimePoint busy_since_{};
+  TimePoint heard_{};
+  TimePoint pinged_{};
+};
+
+PageHub::Page::Page(asio::ip::tcp::socket socket, HttpRequest request, std::uint64_t page,
+                    PageHub& hub)
+    : id(page), stream_(std::move(socket)), hub_(hub), request_(std::move(request)) {
+  error_code ignored;
+  stream_.next_layer().set_option(asio::ip::tcp::no_delay(true), ignored);
+  stream_.next_layer().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
+  stream_.read_message_max(kMaxRequest);
+  stream_.auto_fragment(false);
+  stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+    response.set(boost::beast::http::field::server, "tagwrench");
+    if (response.result() == boost::beast::http::status::switching_protocols)
+      response.set(boost::beast::http::field::sec_websocket_protocol,
+                   boost::beast::string_view(RequestGuard::kProtocol.data(),
+                                             RequestGuard::kProtocol.size()));
+  }));
+}
+
+void PageHub::Page::open() {
+  heard_ = pinged_ = page_clock();
+  stream_.control_callback([this](websocket::frame_type, boost::beast::string_view) {
+    heard_ = page_clock();
+    if (!rate_.count(heard_)) drop();
+  });
+  stream_.async_accept(request_, [self = shared_from_this()](const error_code& error) {
+    if (error || self->ended_) return self->end();
+    self->open_ = true;
+    self->heard_ = page_clock();
+    self->hub_.opened(*self);
+    self->read();
+    self->pump();
+  });
+}
+
+void PageHub::Page::read() {
+  stream_.async_read(incoming_,
+                     [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
+                       self->take(error);
+                     });
+}
+
+void PageHub::Page::take(const error_code& error) {
+  if (error == websocket::error::message_too_big) hub_.on_misbehaviour(Refusal::flood);
+  if (error) return end();
+  heard_ = page_clock();
+  if (!is_open()) return read();  // until its good-bye comes
+  if (!rate_.count(heard_)) {
+    hub_.on_misbehaviour(Refusal::flood);
+    close(websocket::close_code::policy_error, "more than 40 messages a second");
+  } else if (!stream_.got_text()) {
+    close(websocket::close_code::unknown_data, "text only");
+  } else {
+    const auto bytes = incoming_.cdata();
+    hub_.said(*this, {static_cast<const char*>(bytes.data()), bytes.size()});
+  }
+  incoming_.consume(incoming_.size());
+  read();
+}
+
+void PageHub::Page::keep(Text text) {
+  if (!is_open()) return;
+  if (!outbox_.keep(std::move(text)))
+    return close(websocket::close_code::try_again_later, "too slow");
+  pump();
+}
+
+void PageHub::Page::replace(std::string_view type, Text text) {
+  if (!is_open()) return;
+  outbox_.replace(type, std::move(text));
+  pump();
+}
+
+void PageHub::Page::show(Picture picture) {
+  if (!is_open() || !wants_pictures) return;
+  outbox_.replace_picture(std::move(picture));
+  pump();
+}
+
+void PageHub::Page::samples_due() {
+  samples_due_ = true;
+  pump();
+}
+
+void PageHub::Page::check(TimePoint now) {
+  const bool deaf = now - heard_ > hub_.patience_.silence;
+  const bool stuck = busy_ && now - busy_since_ > hub_.patience_.unread;
+  const bool stays = closing_ && now - pinged_ > kGoodBye;
+  if (deaf || stuck || stays) return drop();
+  if (!is_open() || now - pinged_ < hub_.patience_.ping) return;
+  pinged_ = now;
+  ping_due_ = true;
+  pump();
+}
+
+void PageHub::Page::pump() {
+  if (busy_ || !is_open()) return;
+  if (ping_due_) return ping();
+  if (auto text = outbox_.next_text()) return write(text, text->data(), text->size(), true);
+  if (std::exchange(samples_due_, false))
+    if (auto text = hub_.stream_.message(std::exchange(next_sample, hub_.stream_.end())))
+      return write(text, text->data(), text->size(), true);
+  if (auto picture = outbox_.next_picture())
+    write(picture, picture->data(), picture->size(), false);
+}
+
+void PageHub::Page::write(std::shared_ptr<const void> owner, const void* bytes, std::size_t size,
+                          bool text) {
+  busy_ = true;
+  busy_since_ = page_clock();
+  stream_.text(text);
+  stream_.async_write(
+      asio::buffer(bytes, size),
+      [self = shared_from_this(), owner = std::move(owner)](
+          const error_code& error, std::size_t /*sent*/) { self->finished(error); });
+}
+
+void PageHub::Page::ping() {
+  ping_due_ = false;
+  busy_ = true;
+  busy_since_ = page_clock();
+  stream_.async_ping(
+      {}, [self = shared_from_this()](const error_code& error) { self->finished(error); });
+}
+
+void PageHub::Page::finished(const error_code& error) {
+  busy_ = false;
+  if (error) return end();
+  pump();
+}
+
+void PageHub::Page::close(std::uint16_t code, std::string_view reason) {
+  if (closing_ || ended_) return;
+  if (!open_) return drop();
+  closing_ = true;
+  pinged_ = page_clock();
+  const websocket::close_reason why(static_cast<websocket::close_code>(code),
+                                    boost::beast::string_view(reason.data(), reason.size()));
+  stream_.async_close(why, [self = shared_from_this()](const error_code&) { self->end(); });
+}
+
+void PageHub::Page::drop() noexcept {
+  error_code ignored;
+  stream_.next_layer().close(ignored);  // whatever waits for it ends with an error
+}
+
+void PageHub::Page::end() {
+  if (std::exchange(ended_, true)) return;
+  closing_ = true;
+  drop();
+  hub_.gone(id);
+}
+
 PageHub::PageHub(boost::asio::io_context& context, const WebPatience& patience)
     : timer_(context), patience_(patience) {}
+
+PageHub::~PageHub() = default;
 
 /// A page may go while it is told: what is iterated is a copy.
 template <typename Work>
 void PageHub::each(Work work) {
-  std::vector<std::shared_ptr<PageSocket>> all;
+  std::vector<std::shared_ptr<Page>> all;
   for (const auto& [id, page] : pages_) all.push_back(page);
   for (const auto& page : all) work(*page);
 }
 
-void PageHub::add(PageUpgrade&& request) {
+void PageHub::add(asio::ip::tcp::socket socket, HttpRequest request) {
   const std::uint64_t id = next_page_++;
-  const auto page = PageSocket::make(std::move(request), id, *this, patience_);
+  const auto page = std::make_shared<Page>(std::move(socket), std::move(request), id, *this);
   pages_.emplace(id, page);
   page->open();
 }
 
-void PageHub::opened(PageSocket& page) {
+void PageHub::opened(Page& page) {
   if (!ticking_) {
     stream_.skip();
     tick();
@@ -49,7 +281,7 @@ void PageHub::opened(PageSocket& page) {
   page.next_sample = stream_.end();
   if (hello_ != nullptr) page.keep(hello_);
   want_pictures();
-  if (handler_ != nullptr) handler_->page_came(page.id());
+  if (handler_ != nullptr) handler_->page_came(page.id);
 }
 
 void PageHub::gone(std::uint64_t page) {
@@ -61,37 +293,28 @@ void PageHub::gone(std::uint64_t page) {
   if (was_open && handler_ != nullptr) handler_->page_gone(page);
 }
 
-void PageHub::said(PageSocket& page, std::string_view text) {
+void PageHub::said(Page& page, std::string_view text) {
   PageMessage message = parse_page_message(text);
   if (!message.id) {
-    misbehaved(Refusal::nonsense);
-    return page.close(kPolicyError, message.fault);
+    on_misbehaviour(Refusal::nonsense);
+    return page.close(websocket::close_code::policy_error, message.fault);
   }
   if (!message.fault.empty())
-    return answer(page.id(), *message.id, false, std::string(message.fault));
+    return answer(page.id, *message.id, false, std::string(message.fault));
   if (message.what != "pictures") return pass_on(page, std::move(message));
   const auto on = message.arguments.find("on");
   const bool valid = on != message.arguments.end() && on->is_boolean();
   if (valid) page.wants_pictures = on->get<bool>();
   want_pictures();
-  answer(page.id(), *message.id, valid, valid ? "" : "pictures: \"on\" is true or false");
+  answer(page.id, *message.id, valid, valid ? "" : "pictures: \"on\" is true or false");
 }
 
-void PageHub::pass_on(PageSocket& page, PageMessage message) {
+void PageHub::pass_on(Page& page, PageMessage message) {
   try {
-    handler_->handle(
-        {page.id(), *message.id, std::move(message.what), std::move(message.arguments)});
+    handler_->handle({page.id, *message.id, std::move(message.what), std::move(message.arguments)});
   } catch (const std::exception& error) {
-    answer(page.id(), *message.id, false, error.what());
+    answer(page.id, *message.id, false, error.what());
   }
-}
-
-void PageHub::misbehaved(Refusal refusal) {
-  if (on_misbehaviour) on_misbehaviour(refusal);
-}
-
-std::shared_ptr<const std::string> PageHub::samples(PageSocket& page) {
-  return stream_.message(std::exchange(page.next_sample, stream_.end()));
 }
 
 void PageHub::tick() {
@@ -100,7 +323,7 @@ void PageHub::tick() {
   timer_.after(kTick, [this] { tick(); });
   stream_.pull();
   take_picture();
-  each([](PageSocket& page) { page.samples_due(); });
+  each([](Page& page) { page.samples_due(); });
 }
 
 void PageHub::take_picture() {
@@ -109,7 +332,7 @@ void PageHub::take_picture() {
   const std::optional<ImageView> whole = maker_.decode(*picture);
   if (whole && watcher_) watcher_(*whole);
   if (whole && pictures_wanted_)
-    if (auto message = maker_.message(*picture, *whole)) send_picture(std::move(message));
+    if (auto message = maker_.message(*picture, *whole)) send_picture(message);
   feed_.release(picture);
 }
 
@@ -122,22 +345,18 @@ void PageHub::want_pictures() {
 }
 
 void PageHub::check(TimePoint now) {
-  each([now](PageSocket& page) { page.check(now); });
+  each([now](Page& page) { page.check(now); });
 }
 
 void PageHub::close_all() {
-  each([](PageSocket& page) { page.close(kGoingAway, "the program ends"); });
+  each([](Page& page) { page.close(websocket::close_code::going_away, "the program ends"); });
 }
 
-void PageHub::deliver(PageSocket& page, std::string_view type, const Text& text) {
+void PageHub::deliver(Page& page, std::string_view type, const Text& text) {
   if (type == "say" || type == "answer")
     page.keep(text);
   else
     page.replace(type, text);
-}
-
-void PageHub::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text) {
-  answer(page, id, ok, std::move(text), nullptr);
 }
 
 void PageHub::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text,
@@ -150,7 +369,7 @@ void PageHub::answer(std::uint64_t page, std::int64_t id, bool ok, std::string t
 void PageHub::send(std::uint64_t page, const json& message) {
   const auto found = pages_.find(page);
   if (found == pages_.end()) return;
-  const std::shared_ptr<PageSocket> kept = found->second;
+  const std::shared_ptr<Page> kept = found->second;
   deliver(*kept, message_type(message), shared_text(message));
 }
 
@@ -158,16 +377,16 @@ void PageHub::send_all(const json& message) {
   if (pages_.empty()) return;
   const Text text = shared_text(message);
   const std::string type = message_type(message);
-  each([&](PageSocket& page) { deliver(page, type, text); });
+  each([&](Page& page) { deliver(page, type, text); });
 }
 
-void PageHub::send_picture(std::shared_ptr<const std::vector<std::uint8_t>> message) {
-  each([&](PageSocket& page) { page.show(message); });
+void PageHub::send_picture(const Picture& message) {
+  each([&](Page& page) { page.show(message); });
 }
 
 void PageHub::set_hello(const json& hello) {
   hello_ = shared_text(hello);
-  each([&](PageSocket& page) { page.replace("hello", hello_); });
+  each([&](Page& page) { page.replace("hello", hello_); });
 }
 
 void PageHub::watch_pictures(std::function<void(const ImageView&)> watcher) {

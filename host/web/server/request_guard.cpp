@@ -1,7 +1,14 @@
 #include "host/web/server/request_guard.h"
 
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <strings.h>
+#include <sys/stat.h>
+
 #include <algorithm>
-#include <array>
+#include <charconv>
+
+#include "host/core/json/json_text.h"
 
 namespace tagwrench {
 namespace {
@@ -13,31 +20,20 @@ bool is_alphanumeric(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 }
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
 bool same_letters(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](char x, char y) { return lower(x) == lower(y); });
+  return a.size() == b.size() && ::strncasecmp(a.data(), b.data(), a.size()) == 0;
 }
 
-bool is_digits(std::string_view text, std::size_t most) {
+bool is_port(std::string_view port) {
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  return !text.empty() && text.size() <= most && std::all_of(text.begin(), text.end(), is_digit);
+  return !port.empty() && port.size() <= 5 && std::all_of(port.begin(), port.end(), is_digit);
 }
-
-bool is_port(std::string_view port) { return is_digits(port, 5); }
 
 /// 127.0.0.0/8 as browsers spell it: four numbers up to 255, without zeros before them.
 bool is_loopback_number(std::string_view name) {
-  if (!name.starts_with("127.")) return false;
-  for (int dots = 3;; --dots) {
-    const std::size_t end = std::min(name.find('.'), name.size());
-    const std::string_view number = name.substr(0, end);
-    const bool is_byte = is_digits(number, 3) && (number.size() < 3 || number <= "255");
-    if (!is_byte || (number.size() > 1 && number.front() == '0')) return false;
-    if (end == name.size()) return dots == 0;
-    name.remove_prefix(end + 1);
-  }
+  in_addr address{};
+  return ::inet_pton(AF_INET, std::string(name).c_str(), &address) == 1 &&
+         ntohl(address.s_addr) >> 24 == 127;
 }
 
 /// "name", "name:port", "[number]" and "[number]:port" without the port; empty: none of these.
@@ -73,6 +69,63 @@ int base64url_value(char c) {
   if (c >= '0' && c <= '9') return c - '0' + 52;
   if (c == '-') return 62;
   return c == '_' ? 63 : -1;
+}
+
+constexpr std::size_t kMaxTarget = 1024;
+constexpr std::size_t kDeepestFolder = 8;
+
+/// Once: what is still an escape then is no character of a name.
+std::optional<std::string> unescaped(std::string_view text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '%') {
+      out += text[i];
+      continue;
+    }
+    const std::string_view digits = text.substr(i + 1, 2);
+    const char* const end = digits.data() + digits.size();
+    unsigned char byte = 0;
+    if (digits.size() < 2 || std::from_chars(digits.data(), end, byte, 16).ptr != end) return {};
+    out += static_cast<char>(byte);
+    i += 2;
+  }
+  return out;
+}
+
+using nlohmann::json;
+
+constexpr std::int64_t kMaxId = std::int64_t{1} << 53;  // a page's numbers are doubles
+constexpr std::size_t kMaxWord = 32;
+
+/// Before it is parsed: what it is nested into is freed and copied by recursion.
+std::size_t deepest(std::string_view text) {
+  std::size_t depth = 0;
+  std::size_t most = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (quoted && c == '\\') ++i;
+    if (c == '"') quoted = !quoted;
+    if (quoted) continue;
+    if (c == '{' || c == '[') most = std::max(most, ++depth);
+    if ((c == '}' || c == ']') && depth > 0) --depth;
+  }
+  return most;
+}
+
+std::optional<std::int64_t> id_of(const json& message) {
+  const auto id = message.find("id");
+  if (id == message.end() || !id->is_number_integer()) return {};
+  if (id->is_number_unsigned() && id->get<std::uint64_t>() > std::uint64_t{kMaxId}) return {};
+  const auto value = id->get<std::int64_t>();
+  if (value < 0 || value > kMaxId) return {};
+  return value;
+}
+
+bool is_word(std::string_view word) {
+  return !word.empty() && word.size() <= kMaxWord &&
+         std::all_of(word.begin(), word.end(),
+                     [](char c) { return (c >= 'a' && c <= 'z') || c == '_'; });
 }
 
 }  // namespace
@@ -175,6 +228,78 @@ Refusal RequestGuard::socket(const WebRequest& request) const {
   if (!token_.empty() && !is_token(protocol_token(request.protocols).value_or(""), token_))
     return Refusal::token;
   return Refusal::none;
+}
+
+std::string SitePath::text() const {
+  std::string out;
+  for (const std::string& name : names) out += '/' + name;
+  return folder || out.empty() ? out + '/' : out;
+}
+
+bool is_file_name(std::string_view name) noexcept {
+  constexpr std::string_view kMarks = "-_.~@+";
+  const auto fits = [&](char c) {
+    return is_alphanumeric(c) || kMarks.find(c) != std::string_view::npos;
+  };
+  return !name.empty() && name.size() <= 255 && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), fits);
+}
+
+std::optional<SitePath> parse_target(std::string_view target) {
+  if (target.empty() || target.front() != '/' || target.size() > kMaxTarget) return {};
+  std::string_view left = target.substr(1, std::min(target.find('?'), target.size()) - 1);
+  SitePath path;
+  path.folder = left.empty() || left.back() == '/';
+  while (!left.empty()) {
+    const std::size_t end = std::min(left.find('/'), left.size());
+    std::optional<std::string> name = unescaped(left.substr(0, end));
+    if (!name || !is_file_name(*name) || path.names.size() == kDeepestFolder) return {};
+    path.names.push_back(*std::move(name));
+    left.remove_prefix(std::min(end + 1, left.size()));
+  }
+  return path;
+}
+
+std::optional<OpenedFile> open_confined(const std::filesystem::path& folder,
+                                        const std::vector<std::string>& names) {
+  constexpr int kSafely = O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
+  UniqueFd at(::open(folder.c_str(), O_RDONLY | O_CLOEXEC | O_DIRECTORY));
+  for (const std::string& name : names) {
+    if (!at || !is_file_name(name)) return {};
+    at.reset(::openat(at.get(), name.c_str(), kSafely));
+  }
+  struct stat facts {};
+  if (!at || ::fstat(at.get(), &facts) != 0 || !S_ISREG(facts.st_mode)) return {};
+  return OpenedFile{std::move(at), static_cast<std::uint64_t>(facts.st_size),
+                    facts.st_mtim.tv_sec * std::int64_t{1'000'000'000} + facts.st_mtim.tv_nsec};
+}
+
+PageMessage parse_page_message(std::string_view text) {
+  PageMessage out;
+  if (deepest(text) > PageMessage::kDeepest) {
+    out.fault = "nested too deeply";
+    return out;
+  }
+  json message = parse_json(text);
+  if (!message.is_object()) {
+    out.fault = "not a JSON object";
+    return out;
+  }
+  out.id = id_of(message);
+  const auto what = message.find("ask");
+  const auto* const word = what == message.end() ? nullptr : what->get_ptr<const std::string*>();
+  if (!out.id)
+    out.fault = "no id: a whole number, not negative";
+  else if (word == nullptr || !is_word(*word))
+    out.fault = "no ask: a word of lower-case letters";
+  else if (message.size() > PageMessage::kMaxArguments + 2)
+    out.fault = "too many arguments";
+  if (!out.fault.empty()) return out;
+  out.what = *word;
+  message.erase("id");
+  message.erase("ask");
+  out.arguments = std::move(message);
+  return out;
 }
 
 }  // namespace tagwrench

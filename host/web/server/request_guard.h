@@ -3,9 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
 
@@ -69,5 +74,60 @@ class RequestGuard {
  private:
   std::string token_;
 };
+
+// From the target of a request to a file, and no other file. Pure but for open_confined().
+
+/// The parts of a path between slashes, decoded: names of letters, digits and "-_.~@+", none of
+/// which begins with a dot.
+struct SitePath {
+  std::vector<std::string> names;
+  bool folder = false;  ///< ends with a slash
+
+  /// "/a/b", or "/a/b/" if it is a folder.
+  std::string text() const;
+};
+
+/// Nothing: not the absolute path of one host's resource, or anything that could leave a folder or
+/// mean something else to somebody else (dots, escapes of these, backslashes, zeros). A query does
+/// not count.
+std::optional<SitePath> parse_target(std::string_view target);
+
+bool is_file_name(std::string_view name) noexcept;
+
+struct OpenedFile {
+  UniqueFd fd;
+  std::uint64_t size = 0;
+  std::int64_t changed_ns = 0;
+};
+
+/// A regular file below `folder`, on a way without symbolic links.
+std::optional<OpenedFile> open_confined(const std::filesystem::path& folder,
+                                        const std::vector<std::string>& names);
+
+// What a page sends: one request, as text. Pure; the bytes are not trusted.
+
+// What a page requests.
+
+/// A page's request, as far as any page's request is checked: `what` is a word of lower-case
+/// letters and underscores, `arguments` an object without "id" and "ask", nested no deeper than
+/// eight.
+struct PageRequest {
+  std::uint64_t page = 0;
+  std::int64_t id = 0;
+  std::string what;
+  nlohmann::json arguments;
+};
+
+struct PageMessage {
+  static constexpr std::size_t kDeepest = 8;
+  static constexpr std::size_t kMaxArguments = 32;
+
+  std::optional<std::int64_t> id;  ///< without one, there is nobody to answer
+  std::string what;
+  nlohmann::json arguments;
+  std::string_view fault;  ///< empty: it is a request. Else what is wrong with it, in words
+};
+
+PageMessage parse_page_message(std::string_view text);
 
 }  // namespace tagwrench

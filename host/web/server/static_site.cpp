@@ -23,6 +23,41 @@ constexpr std::string_view kNotBuilt =
     "<p>The bridge runs. What you wanted to see needs node, which builds the pages: run "
     "<code>./run web</code> in tagwrench's source folder, then load this page again.</p></html>\n";
 
+struct RefusalRow {
+  unsigned status;
+  std::string_view text;  ///< for people and logs
+};
+
+/// In the order of Refusal.
+constexpr RefusalRow kRefusals[] = {
+    {200, ""},
+    {403, "This address is not served: open http://localhost:PORT/ of the bridge."},
+    {403, "Pages of other sites may not ask."},
+    {401, "The token is missing or wrong: open the address that the bridge printed."},
+    {400, "The WebSocket protocol here is tagwrench.v1: load the page again."},
+    {400, "No such path."},
+    {503, "Too many pages are open: close one."},
+    {413, "Too much, or too often."},
+    {400, "This is not understood."},
+};
+
+const RefusalRow& row_of(Refusal refusal) { return kRefusals[static_cast<std::size_t>(refusal)]; }
+
+constexpr std::pair<unsigned, std::string_view> kStatusTexts[] = {
+    {200, "OK"},
+    {304, "Not Modified"},
+    {308, "Permanent Redirect"},
+    {400, "Bad Request"},
+    {401, "Unauthorized"},
+    {403, "Forbidden"},
+    {404, "Not Found"},
+    {405, "Method Not Allowed"},
+    {413, "Content Too Large"},
+    {426, "Upgrade Required"},
+    {431, "Request Header Fields Too Large"},
+    {503, "Service Unavailable"},
+};
+
 /// What a file's name says about its content.
 constexpr std::string_view content_type(std::string_view name) noexcept {
   constexpr std::pair<std::string_view, std::string_view> kTypes[] = {
@@ -45,8 +80,7 @@ constexpr std::string_view content_type(std::string_view name) noexcept {
       {".yaml", "text/plain; charset=utf-8"},
   };
   for (const auto& [ending, type] : kTypes)
-    if (name.size() > ending.size() && name.substr(name.size() - ending.size()) == ending)
-      return type;
+    if (name.size() > ending.size() && name.ends_with(ending)) return type;
   return "application/octet-stream";
 }
 
@@ -90,10 +124,8 @@ WebAnswer refused(Refusal refusal) {
 }
 
 WebAnswer redirect(const SitePath& path) {
-  SitePath folder = path;
-  folder.folder = true;
   WebAnswer answer = plain_answer(308, "This page has moved: add a slash.");
-  answer.fields += "Location: " + folder.text() + "\r\n";
+  answer.fields += "Location: " + path.text() + "/\r\n";
   return answer;
 }
 
@@ -106,18 +138,15 @@ WebAnswer from_file(const WebRequest& request, OpenedFile file, std::string head
   return answer;
 }
 
+constexpr std::size_t kShown = 60;
+
+std::string harmless(std::string_view text) {
+  std::string out;
+  for (const char c : text.substr(0, kShown)) out += c > ' ' && c < 127 && c != '"' ? c : '?';
+  return out;
+}
+
 }  // namespace
-
-StaticSite::StaticSite(std::filesystem::path pages, std::string token)
-    : pages_(std::move(pages)), guard_(std::move(token)) {}
-
-void StaticSite::serve_folder(std::string url_prefix, std::filesystem::path folder) {
-  folders_[std::move(url_prefix)] = std::move(folder);
-}
-
-void StaticSite::serve_file(std::string url, std::filesystem::path file) {
-  files_[std::move(url)] = std::move(file);
-}
 
 WebAnswer StaticSite::answer(const WebRequest& request) const {
   if (request.method != "GET" && request.method != "HEAD") {
@@ -181,88 +210,32 @@ WebAnswer StaticSite::file(const WebRequest& request, const SitePath& path) cons
 }
 
 WebAnswer plain_answer(unsigned status, std::string_view line, Refusal refusal) {
-  WebAnswer answer;
-  answer.status = status;
-  answer.fields = fields("text/plain; charset=utf-8", kNothingAllowed, kNobody, "no-store");
-  answer.text = std::string(line) + '\n';
-  answer.refusal = refusal;
-  return answer;
+  return {.status = status,
+          .fields = fields("text/plain; charset=utf-8", kNothingAllowed, kNobody, "no-store"),
+          .text = std::string(line) + '\n',
+          .refusal = refusal};
 }
 
-std::string_view refusal_text(Refusal refusal) noexcept {
-  switch (refusal) {
-    case Refusal::none:
-      break;
-    case Refusal::host:
-      return "This address is not served: open http://localhost:PORT/ of the bridge.";
-    case Refusal::origin:
-      return "Pages of other sites may not ask.";
-    case Refusal::token:
-      return "The token is missing or wrong: open the address that the bridge printed.";
-    case Refusal::protocol:
-      return "The WebSocket protocol here is tagwrench.v1: load the page again.";
-    case Refusal::path:
-      return "No such path.";
-    case Refusal::crowd:
-      return "Too many pages are open: close one.";
-    case Refusal::flood:
-      return "Too much, or too often.";
-    case Refusal::nonsense:
-      return "This is not understood.";
-  }
-  return "";
-}
-
-unsigned refusal_status(Refusal refusal) noexcept {
-  switch (refusal) {
-    case Refusal::none:
-      return 200;
-    case Refusal::host:
-    case Refusal::origin:
-      return 403;
-    case Refusal::token:
-      return 401;
-    case Refusal::protocol:
-    case Refusal::nonsense:
-    case Refusal::path:
-      return 400;
-    case Refusal::crowd:
-      return 503;
-    case Refusal::flood:
-      return 413;
-  }
-  return 400;
-}
+std::string_view refusal_text(Refusal refusal) noexcept { return row_of(refusal).text; }
+unsigned refusal_status(Refusal refusal) noexcept { return row_of(refusal).status; }
 
 std::string_view status_text(unsigned status) noexcept {
-  switch (status) {
-    case 200:
-      return "OK";
-    case 304:
-      return "Not Modified";
-    case 308:
-      return "Permanent Redirect";
-    case 400:
-      return "Bad Request";
-    case 401:
-      return "Unauthorized";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 413:
-      return "Content Too Large";
-    case 426:
-      return "Upgrade Required";
-    case 431:
-      return "Request Header Fields Too Large";
-    case 503:
-      return "Service Unavailable";
-    default:
-      return "Error";
+  for (const auto& [number, text] : kStatusTexts)
+    if (number == status) return text;
+  return "Error";
+}
+
+std::string RefusalLog::line(Refusal refusal, std::string_view detail, TimePoint now) {
+  Kind& kind = kinds_[static_cast<std::size_t>(refusal) % kinds_.size()];
+  if (kind.said && now - kind.when < kQuiet) {
+    ++kind.more;
+    return {};
   }
+  std::string line = "web: refused: " + std::string(refusal_text(refusal));
+  if (!detail.empty()) line += " (\"" + harmless(detail) + "\")";
+  if (kind.more > 0) line += " " + std::to_string(kind.more) + " more of these before.";
+  kind = {true, now, 0};
+  return line;
 }
 
 }  // namespace tagwrench

@@ -2,14 +2,15 @@
 // page to itself. Knows nothing of connections.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
 
+#include "host/core/types.h"
 #include "host/web/server/request_guard.h"
-#include "host/web/server/site_path.h"
 
 namespace tagwrench {
 
@@ -17,16 +18,21 @@ struct WebAnswer {
   unsigned status = 200;
   std::string fields;  ///< header lines, each with its end, without length and connection
   std::string text;    ///< the body, unless there is a file
-  OpenedFile file;
+  OpenedFile file{};
   Refusal refusal = Refusal::none;  ///< why, if it was refused
 };
 
 class StaticSite {
  public:
-  StaticSite(std::filesystem::path pages, std::string token);
+  StaticSite(std::filesystem::path pages, std::string token)
+      : pages_(std::move(pages)), guard_(std::move(token)) {}
 
-  void serve_folder(std::string url_prefix, std::filesystem::path folder);
-  void serve_file(std::string url, std::filesystem::path file);
+  void serve_folder(std::string url_prefix, std::filesystem::path folder) {
+    folders_[std::move(url_prefix)] = std::move(folder);
+  }
+  void serve_file(std::string url, std::filesystem::path file) {
+    files_[std::move(url)] = std::move(file);
+  }
 
   WebAnswer answer(const WebRequest& request) const;
   const RequestGuard& guard() const noexcept { return guard_; }
@@ -47,5 +53,24 @@ WebAnswer plain_answer(unsigned status, std::string_view line, Refusal refusal =
 std::string_view refusal_text(Refusal refusal) noexcept;
 unsigned refusal_status(Refusal refusal) noexcept;
 std::string_view status_text(unsigned status) noexcept;
+
+// Says what was refused: of each kind the first at once, then once a minute how many more.
+
+class RefusalLog {
+ public:
+  static constexpr Duration kQuiet = std::chrono::minutes(1);
+
+  /// The line for people; empty if nothing is to be said now. Of `detail`, a stranger's text, a few
+  /// harmless characters are shown.
+  std::string line(Refusal refusal, std::string_view detail, TimePoint now);
+
+ private:
+  struct Kind {
+    bool said = false;
+    TimePoint when{};
+    std::uint64_t more = 0;
+  };
+  std::array<Kind, 16> kinds_;
+};
 
 }  // namespace tagwrench

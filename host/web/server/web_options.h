@@ -28,4 +28,25 @@ struct WebOptions {
   WebPatience patience{};
 };
 
+// Where pages are served, from what is said on the command line.
+
+/// `place`: "", "ADDRESS:PORT", an address with colons of its own in brackets. Throws ConfigError,
+/// which begins with `option` ("--output web").
+WebOptions parse_web(const std::string& option, const std::string& place);
+
+/// Installed, or as they were built: beside the program.
+std::filesystem::path built_pages();
+
+// The token that a page on another computer needs.
+
+struct WebToken {
+  std::string text;
+  bool made = false;  ///< now; it was not there
+};
+
+/// Of a file that its owner alone may read; made, with 43 random characters, where there is none.
+/// Throws ConfigError: others may read it, it is no token (16 to 128 letters, digits, '-', '_',
+/// '.' and '~'), or it cannot be written.
+WebToken web_token(const std::filesystem::path& file);
+
 }  // namespace tagwrench

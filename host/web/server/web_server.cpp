@@ -1,34 +1,36 @@
 #include "host/web/server/web_server.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/post.hpp>
-#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
 #include <csignal>
-#include <map>
-#include <thread>
-#include <utility>
+#include <optional>
+#include <vector>
 
 #include "host/core/config_error.h"
 #include "host/core/log.h"
-#include "host/web/server/http_connection.h"
-#include "host/web/server/page_hub.h"
-#include "host/web/server/refusal_log.h"
 
 namespace tagwrench {
 namespace {
 
 namespace asio = boost::asio;
+namespace http = boost::beast::http;
 using asio::ip::tcp;
-using boost::system::error_code;
+using boost::beast::error_code;
 
+constexpr std::uint32_t kMaxHeader = 8192;
+constexpr std::size_t kPiece = 64 * 1024;
+constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMaxTurnedAway = 16;  // at once; more are closed without a word
 constexpr Duration kCheckEvery = std::chrono::milliseconds(250);
 constexpr Duration kFarewell = std::chrono::milliseconds(700);
@@ -78,204 +80,306 @@ tcp::acceptor listener(asio::io_context& context, const WebOptions& options) {
   return acceptor;
 }
 
+std::string_view view(boost::beast::string_view text) { return {text.data(), text.size()}; }
+
+WebRequest request_of(const HttpRequest& request) {
+  return {.method = view(request.method_string()),
+          .target = view(request.target()),
+          .host = view(request[http::field::host]),
+          .origin = view(request[http::field::origin]),
+          .fetch_site = view(request["Sec-Fetch-Site"]),
+          .authorization = view(request[http::field::authorization]),
+          .protocols = view(request[http::field::sec_websocket_protocol]),
+          .if_none_match = view(request[http::field::if_none_match]),
+          .upgrade = boost::beast::websocket::is_upgrade(request)};
+}
+
+/// What helps to see who it was; never what may hold a token.
+std::string_view telling_part(Refusal refusal, const WebRequest& request) {
+  if (refusal == Refusal::host) return request.host;
+  if (refusal == Refusal::origin) return request.origin;
+  return {};
+}
+
 }  // namespace
 
-class WebServer::Site final : public ConnectionOwner {
+/// One connection that asks for files, or becomes a page. Everything has its time.
+class WebServer::Connection : public std::enable_shared_from_this<Connection> {
  public:
-  explicit Site(const WebOptions& options)
-      : token(options.token),
-        files(options.pages, options.token),
-        hub(context, options.patience),
-        acceptor_(listener(context, options)),
-        retry_(context),
-        checks_(context),
-        patience_(options.patience.request) {
-    endpoint = acceptor_.local_endpoint();
-    hub.on_misbehaviour = [this](Refusal refusal) { refused(refusal, {}); };
-  }
+  Connection(tcp::socket socket, WebServer& server) : socket_(std::move(socket)), server_(server) {}
 
-  ~Site() override { stop(); }
-
-  void stop() {
-    if (!thread_.joinable()) return;
-    asio::post(context, [this] { farewell(); });
-    thread_.join();
-  }
-
-  void start(PageRequestHandler& handler) {
-    hub.start(handler);
-    accept();
-    check();
-    sigset_t all;
-    sigset_t before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    thread_ = std::thread([this] { run(); });
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  }
-
-  WebAnswer answer(const WebRequest& request) override { return files.answer(request); }
-
-  Refusal admits(const WebRequest& request) override {
-    const Refusal refusal = files.guard().socket(request);
-    if (refusal != Refusal::none) return refusal;
-    return hub.has_room() ? Refusal::none : Refusal::crowd;
-  }
-
-  void becomes_page(PageUpgrade&& request) override { hub.add(std::move(request)); }
-
-  void refused(Refusal refusal, std::string_view detail) override {
-    const std::string line = log_.line(refusal, detail, std::chrono::steady_clock::now());
-    if (!line.empty()) log_info(line);
-  }
-
-  void closed(HttpConnection& connection) override { connections_.erase(&connection); }
-
-  asio::io_context context{1};
-  std::string token;
-  StaticSite files;
-  PageHub hub;
-  tcp::endpoint endpoint;
+  void serve();
+  /// One answer to whatever it asks, and good-bye.
+  void turn_away(Refusal refusal);
+  void check(TimePoint now);
+  void drop() noexcept;
+  bool is_turned_away() const noexcept { return turned_away_; }
 
  private:
-  void run() noexcept {
-    pthread_setname_np(pthread_self(), "tagwrench-web");
-    ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
-    for (bool again = true; again;) {
-      again = false;
-      try {
-        context.run();
-      } catch (const std::exception& error) {  // one page's trouble is not the next one's
-        log_info(std::string("web: ") + error.what());
-        again = true;
-      }
-    }
-  }
+  using Parser = http::request_parser<http::empty_body>;
 
-  void accept() {
-    acceptor_.async_accept([this](const error_code& error, tcp::socket socket) {
-      if (error == asio::error::operation_aborted) return;
-      if (error) return accept_later();  // out of descriptors
-      keep_from_children(socket.native_handle());
-      take(std::move(socket));
-      accept();
-    });
-  }
+  void handle(const error_code& error);
+  void handle_request();
+  void failed(const error_code& error);
+  void respond(WebAnswer answer, bool with_body);
+  void send(std::size_t size);
+  void send_file();
+  void sent(const error_code& error);
+  void linger();
+  void discard();
+  void end();
 
-  void accept_later() {
-    retry_.expires_after(kCheckEvery);
-    retry_.async_wait([this](const error_code& error) {
-      if (!error) accept();
-    });
-  }
-
-  void take(tcp::socket socket) {
-    const auto away = std::count_if(connections_.begin(), connections_.end(),
-                                    [](const auto& one) { return one.first->is_turned_away(); });
-    const auto turned_away = static_cast<std::size_t>(away);
-    const bool room = connections_.size() - turned_away + hub.pages() < kMaxConnections;
-    if (!room) refused(Refusal::crowd, {});
-    if (!room && turned_away >= kMaxTurnedAway) return;
-    const auto connection = HttpConnection::make(std::move(socket), *this, patience_);
-    connections_.emplace(connection.get(), connection);
-    if (room)
-      connection->serve();
-    else
-      connection->turn_away(Refusal::crowd);
-  }
-
-  void check() {
-    const TimePoint now = std::chrono::steady_clock::now();
-    for (const auto& [key, connection] : connections_) connection->check(now);
-    hub.check(now);
-    checks_.expires_after(kCheckEvery);
-    checks_.async_wait([this](const error_code& error) {
-      if (!error) check();
-    });
-  }
-
-  /// Pages get a moment to say good-bye, too.
-  void farewell() {
-    error_code ignored;
-    acceptor_.close(ignored);
-    retry_.cancel();
-    for (const auto& [key, connection] : connections_) connection->drop();
-    hub.close_all();
-    until_ = std::chrono::steady_clock::now() + kFarewell;
-    leave();
-  }
-
-  void leave() {
-    if (hub.pages() == 0 || std::chrono::steady_clock::now() > until_) return context.stop();
-    checks_.expires_after(std::chrono::milliseconds(10));
-    checks_.async_wait([this](const error_code&) { leave(); });
-  }
-
-  tcp::acceptor acceptor_;
-  asio::steady_timer retry_;
-  asio::steady_timer checks_;
-  Duration patience_;
-  TimePoint until_{};
-  RefusalLog log_;
-  std::map<const HttpConnection*, std::shared_ptr<HttpConnection>> connections_;
-  std::thread thread_;
+  tcp::socket socket_;
+  WebServer& server_;
+  boost::beast::flat_buffer incoming_{kMaxHeader + 1024};
+  std::optional<Parser> parser_;
+  std::vector<char> outgoing_;
+  OpenedFile file_;  ///< of the answer; what is left of it
+  std::uint64_t file_left_ = 0;
+  bool keep_ = false;  ///< for the next request
+  bool turned_away_ = false;
+  bool ended_ = false;
+  TimePoint deadline_{};
 };
 
-WebServer::WebServer(const WebOptions& options) : site_(std::make_unique<Site>(options)) {}
-WebServer::~WebServer() = default;
+void WebServer::Connection::serve() {
+  deadline_ = std::chrono::steady_clock::now() + server_.patience_;
+  parser_.emplace();
+  parser_->header_limit(kMaxHeader);
+  http::async_read(socket_, incoming_, *parser_,
+                   [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
+                     self->handle(error);
+                   });
+}
 
-void WebServer::start(PageRequestHandler& handler) { site_->start(handler); }
-void WebServer::stop() { site_->stop(); }
-LiveFeed& WebServer::feed() noexcept { return site_->hub.feed(); }
-std::uint16_t WebServer::port() const noexcept { return site_->endpoint.port(); }
-asio::io_context& WebServer::context() noexcept { return site_->context; }
+void WebServer::Connection::turn_away(Refusal refusal) {
+  turned_away_ = true;
+  respond(plain_answer(refusal_status(refusal), refusal_text(refusal), refusal), true);
+}
+
+void WebServer::Connection::handle(const error_code& error) {
+  if (ended_ || error == http::error::end_of_stream || error == asio::error::operation_aborted)
+    return end();
+  if (error) return failed(error);
+  handle_request();
+}
+
+void WebServer::Connection::failed(const error_code& error) {
+  if (error.category() != http::make_error_code(http::error::end_of_stream).category())
+    return end();
+  const bool long_header =
+      error == http::error::header_limit || error == http::error::buffer_overflow;
+  const bool body = error == http::error::unexpected_body || error == http::error::body_limit;
+  keep_ = false;
+  if (long_header)
+    respond(plain_answer(431, "At most 8 kB of headers.", Refusal::flood), true);
+  else if (body)
+    respond(plain_answer(413, "Requests have no body here.", Refusal::flood), true);
+  else
+    respond(plain_answer(400, refusal_text(Refusal::nonsense), Refusal::nonsense), true);
+}
+
+void WebServer::Connection::handle_request() {
+  const WebRequest request = request_of(parser_->get());
+  keep_ = parser_->get().keep_alive();
+  if (request.target != "/ws") {
+    WebAnswer answer = server_.site_.answer(request);
+    if (answer.refusal != Refusal::none)
+      server_.refused(answer.refusal, telling_part(answer.refusal, request));
+    return respond(std::move(answer), request.method != "HEAD");
+  }
+  keep_ = false;
+  Refusal refusal = server_.site_.guard().socket(request);
+  if (refusal == Refusal::none && server_.hub_.pages() >= PageHub::kMaxPages)
+    refusal = Refusal::crowd;
+  if (refusal != Refusal::none) {
+    server_.refused(refusal, telling_part(refusal, request));
+    return respond(plain_answer(refusal_status(refusal), refusal_text(refusal)), true);
+  }
+  if (!request.upgrade) return respond(plain_answer(426, "Only a WebSocket is here."), true);
+  server_.hub_.add(std::move(socket_), parser_->release());
+  end();
+}
+
+void WebServer::Connection::respond(WebAnswer answer, bool with_body) {
+  const bool from_file = static_cast<bool>(answer.file.fd);
+  const std::uint64_t length = from_file ? answer.file.size : answer.text.size();
+  std::string head =
+      fmt::format("HTTP/1.1 {} {}\r\n{}Connection: {}\r\n", answer.status,
+                  status_text(answer.status), answer.fields, keep_ ? "keep-alive" : "close");
+  if (answer.status != 304) head += fmt::format("Content-Length: {}\r\n", length);
+  head += "\r\n";
+  outgoing_.assign(head.begin(), head.end());
+  if (with_body && !from_file)
+    outgoing_.insert(outgoing_.end(), answer.text.begin(), answer.text.end());
+  file_ = std::move(answer.file);
+  file_left_ = with_body && from_file ? file_.size : 0;
+  send(outgoing_.size());
+}
+
+void WebServer::Connection::send(std::size_t size) {
+  deadline_ = std::chrono::steady_clock::now() + server_.patience_;
+  asio::async_write(socket_, asio::buffer(outgoing_.data(), size),
+                    [self = shared_from_this()](const error_code& error, std::size_t /*sent*/) {
+                      self->sent(error);
+                    });
+}
+
+/// A file that has grown shorter meanwhile ends the connection: its length is promised.
+void WebServer::Connection::send_file() {
+  outgoing_.resize(kPiece);
+  const std::size_t wanted = std::min<std::uint64_t>(file_left_, kPiece);
+  const ssize_t got = ::read(file_.fd.get(), outgoing_.data(), wanted);
+  if (got <= 0) return end();
+  file_left_ -= static_cast<std::uint64_t>(got);
+  send(static_cast<std::size_t>(got));
+}
+
+void WebServer::Connection::sent(const error_code& error) {
+  if (error || ended_) return end();
+  if (file_left_ > 0) return send_file();
+  file_ = {};
+  outgoing_ = {};
+  if (keep_) return serve();
+  linger();
+}
+
+/// Closed at once, what it is still sending would make the kernel throw away the answer.
+void WebServer::Connection::linger() {
+  deadline_ = std::chrono::steady_clock::now() + kLinger;
+  error_code ignored;
+  socket_.shutdown(tcp::socket::shutdown_send, ignored);
+  outgoing_.resize(kPiece);
+  discard();
+}
+
+void WebServer::Connection::discard() {
+  socket_.async_read_some(
+      asio::buffer(outgoing_),
+      [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
+        error ? self->end() : self->discard();
+      });
+}
+
+void WebServer::Connection::check(TimePoint now) {
+  if (now > deadline_) drop();
+}
+
+void WebServer::Connection::drop() noexcept {
+  error_code ignored;
+  socket_.close(ignored);  // whatever waits for it ends with an error
+}
+
+void WebServer::Connection::end() {
+  if (std::exchange(ended_, true)) return;
+  drop();
+  server_.connections_.erase(this);
+}
+
+WebServer::WebServer(const WebOptions& options)
+    : token_(options.token),
+      site_(options.pages, options.token),
+      hub_(context_, options.patience),
+      acceptor_(listener(context_, options)),
+      endpoint_(acceptor_.local_endpoint()),
+      retry_(context_),
+      checks_(context_),
+      patience_(options.patience.request) {
+  hub_.on_misbehaviour = [this](Refusal refusal) { refused(refusal, {}); };
+}
+
+void WebServer::stop() {
+  if (!thread_.joinable()) return;
+  asio::post(context_, [this] { farewell(); });
+  thread_.join();
+}
+
+void WebServer::start(PageRequestHandler& handler) {
+  hub_.start(handler);
+  accept();
+  check();
+  sigset_t all;
+  sigset_t before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  thread_ = std::thread([this] { run(); });
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+void WebServer::refused(Refusal refusal, std::string_view detail) {
+  const std::string line = log_.line(refusal, detail, std::chrono::steady_clock::now());
+  if (!line.empty()) log_info(line);
+}
+
+void WebServer::run() noexcept {
+  pthread_setname_np(pthread_self(), "tagwrench-web");
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
+  for (bool again = true; again;) {
+    again = false;
+    try {
+      context_.run();
+    } catch (const std::exception& error) {  // one page's trouble is not the next one's
+      log_info(std::string("web: ") + error.what());
+      again = true;
+    }
+  }
+}
+
+void WebServer::accept() {
+  acceptor_.async_accept([this](const error_code& error, tcp::socket socket) {
+    if (error == asio::error::operation_aborted) return;
+    if (error) return retry_.after(kCheckEvery, [this] { accept(); });  // out of descriptors
+    keep_from_children(socket.native_handle());
+    take(std::move(socket));
+    accept();
+  });
+}
+
+void WebServer::take(tcp::socket socket) {
+  const auto away = std::count_if(connections_.begin(), connections_.end(),
+                                  [](const auto& one) { return one.first->is_turned_away(); });
+  const auto turned_away = static_cast<std::size_t>(away);
+  const bool room = connections_.size() - turned_away + hub_.pages() < kMaxConnections;
+  if (!room) refused(Refusal::crowd, {});
+  if (!room && turned_away >= kMaxTurnedAway) return;
+  const auto connection = std::make_shared<Connection>(std::move(socket), *this);
+  connections_.emplace(connection.get(), connection);
+  if (room)
+    connection->serve();
+  else
+    connection->turn_away(Refusal::crowd);
+}
+
+void WebServer::check() {
+  const TimePoint now = std::chrono::steady_clock::now();
+  for (const auto& [key, connection] : connections_) connection->check(now);
+  hub_.check(now);
+  checks_.after(kCheckEvery, [this] { check(); });
+}
+
+/// Pages get a moment to say good-bye, too.
+void WebServer::farewell() {
+  error_code ignored;
+  acceptor_.close(ignored);
+  retry_.cancel();
+  for (const auto& [key, connection] : connections_) connection->drop();
+  hub_.close_all();
+  until_ = std::chrono::steady_clock::now() + kFarewell;
+  leave();
+}
+
+void WebServer::leave() {
+  if (hub_.pages() == 0 || std::chrono::steady_clock::now() > until_) return context_.stop();
+  checks_.after(std::chrono::milliseconds(10), [this] { leave(); });
+}
 
 std::string WebServer::url() const {
-  const bool any = site_->endpoint.address().is_unspecified();
-  return "http://" + (any ? "HOST:" + std::to_string(port()) : endpoint_text(site_->endpoint)) +
-         '/';
+  const bool any = endpoint_.address().is_unspecified();
+  return "http://" + (any ? "HOST:" + std::to_string(port()) : endpoint_text(endpoint_)) + '/';
 }
 
 std::string WebServer::url_with_token() const {
-  return site_->token.empty() ? url() : url() + "#token=" + site_->token;
-}
-
-void WebServer::post(std::function<void()> work) { asio::post(site_->context, std::move(work)); }
-bool WebServer::pictures_wanted() const noexcept { return site_->hub.pictures_wanted(); }
-
-void WebServer::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text) {
-  site_->hub.answer(page, id, ok, std::move(text));
-}
-
-void WebServer::answer(std::uint64_t page, std::int64_t id, bool ok, std::string text,
-                       const nlohmann::json& data) {
-  site_->hub.answer(page, id, ok, std::move(text), data);
-}
-
-void WebServer::send_all(const nlohmann::json& message) { site_->hub.send_all(message); }
-
-void WebServer::send(std::uint64_t page, const nlohmann::json& message) {
-  site_->hub.send(page, message);
-}
-
-void WebServer::send_picture(std::shared_ptr<const std::vector<std::uint8_t>> message) {
-  site_->hub.send_picture(std::move(message));
-}
-
-void WebServer::set_hello(const nlohmann::json& hello) { site_->hub.set_hello(hello); }
-std::size_t WebServer::pages() const noexcept { return site_->hub.pages(); }
-LiveFigures WebServer::figures() const { return site_->hub.figures(); }
-
-void WebServer::watch_pictures(std::function<void(const ImageView& picture)> watcher) {
-  site_->hub.watch_pictures(std::move(watcher));
-}
-
-void WebServer::serve_folder(std::string url_prefix, std::filesystem::path folder) {
-  site_->files.serve_folder(std::move(url_prefix), std::move(folder));
-}
-
-void WebServer::serve_file(std::string url, std::filesystem::path file) {
-  site_->files.serve_file(std::move(url), std::move(file));
+  return token_.empty() ? url() : url() + "#token=" + token_;
 }
 
 }  // namespace tagwrench

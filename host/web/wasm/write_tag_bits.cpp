@@ -1,9 +1,9 @@
 // Writes the cells of every tag of every family, as the program prints and tracks them, for
-// page_tags.cpp: one number a tag, its bits row by row, the first one highest.
+// page.cpp: one number a tag, its bits row by row, the first one highest.
 #include <cstdint>
 #include <cstdio>
 
-#include "host/tracker/tag_patterns.h"
+#include "host/tracker/target.h"
 
 int main() {
   using namespace tagwrench;

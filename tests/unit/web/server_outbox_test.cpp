@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "host/web/server/outbox.h"
-#include "host/web/server/refusal_log.h"
+#include "host/web/server/page_hub.h"
+#include "host/web/server/static_site.h"
 
 namespace tagwrench {
 namespace {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "host/web/server/page_message.h"
+#include "host/web/server/request_guard.h"
 
 namespace tagwrench {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "host/web/server/site_path.h"
+#include "host/web/server/request_guard.h"
 #include "tests/support/temporary_folder.h"
 
 namespace tagwrench {

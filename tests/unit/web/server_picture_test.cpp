@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host/web/server/picture_message.h"
+#include "host/web/server/live_feed.h"
 #include "tests/unit/web/live_frames.h"
 
 namespace tagwrench {

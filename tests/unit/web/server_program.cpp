@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "host/web/server/live_feed.h"
-#include "host/web/server/page_message.h"
+#include "host/web/server/request_guard.h"
 #include "host/web/server/web_server.h"
 
 namespace {

@@ -4,8 +4,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "host/output/sample_text.h"
-#include "host/web/server/sample_stream.h"
+#include "host/output/line_outputs.h"
+#include "host/web/server/live_feed.h"
 #include "tests/unit/web/live_frames.h"
 
 namespace tagwrench {

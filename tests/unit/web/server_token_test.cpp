@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "host/core/config_error.h"
-#include "host/web/server/token_file.h"
+#include "host/web/server/web_options.h"
 #include "host/web/server/web_server.h"
 #include "tests/support/temporary_folder.h"
 

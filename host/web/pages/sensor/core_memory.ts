@@ -1,5 +1,5 @@
 // The core's memory as TypeScript sees it: what it exports (host/web/wasm/browser_core.cpp), and where the
-// numbers of a sample lie in it (struct PageSample in host/web/wasm/session.h).
+// numbers of a sample lie in it (struct PageSample in host/web/wasm/browser_core.cpp).
 
 export interface FoundSquares {
   /** Of the family; one for each eight numbers of `tags`. */
