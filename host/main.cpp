@@ -1,39 +1,18 @@
 // The table of commands. Exit status: 0 done, 1 failed while running, 2 wrong usage or a
 // configuration that cannot be used.
+#include <dlfcn.h>
 #include <fcntl.h>
 
 #include <csignal>
 #include <cstdlib>
 #include <exception>
-#include <functional>
-#include <memory>
 #include <opencv2/core/utility.hpp>
 #include <string>
-#include <vector>
 
-#include "host/commands/analyze_command.h"
-#include "host/commands/board/command.h"
-#include "host/commands/calibrate_command.h"
-#include "host/commands/camera_timing_command.h"
-#include "host/commands/certificate_command.h"
-#include "host/commands/check_command.h"
-#include "host/commands/control_command.h"
-#include "host/commands/design_command.h"
-#include "host/commands/doctor_command.h"
-#include "host/commands/export_command.h"
-#include "host/commands/gadget_command.h"
-#include "host/commands/manual_command.h"
-#include "host/commands/read_command.h"
-#include "host/commands/record_command.h"
-#include "host/commands/run_command.h"
-#include "host/commands/sim_command.h"
-#include "host/commands/spnav_command.h"
-#include "host/commands/tags_command.h"
-#include "host/commands/zero_command.h"
+#include "host/commands/commands.h"
 #include "host/core/command_line/command_line.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
-#include "host/core/os/blas_threads.h"
 
 namespace tagwrench {
 namespace {
@@ -41,41 +20,29 @@ namespace {
 constexpr int kFailed = 1;
 constexpr int kUnusable = 2;
 
-struct Declared {
-  std::function<bool()> parsed;
-  std::function<int()> run;
-};
+/// In the order of the help text.
+constexpr void (*kCommands[])(command_line::Command program) = {
+    // what runs and what it leaves
+    run_command, sim_command, record_command, export_command, read_command,
+    // setting up
+    calibrate_command, tags_command, board_command,
+    // how good it is
+    analyze_command, camera_timing_command, check_command, zero_command, certificate_command,
+    design_command,
+    // at the desk
+    control_command, spnav_command, gadget_command, doctor_command, manual_command};
 
-template <typename Command>
-Declared declare(command_line::Command program) {
-  const auto command = std::make_shared<Command>(program);
-  return {[command] { return command->parsed(); }, [command] { return command->run(); }};
+template <typename Function>
+Function* library_function(const char* name) noexcept {
+  return reinterpret_cast<Function*>(::dlsym(RTLD_DEFAULT, name));
 }
 
-/// In the order of the help text.
-constexpr Declared (*kCommands[])(command_line::Command) = {
-    // what runs and what it leaves
-    declare<RunCommand>, declare<SimCommand>, declare<RecordCommand>, declare<ExportCommand>,
-    declare<ReadCommand>,
-    // setting up
-    declare<CalibrateCommand>, declare<TagsCommand>, declare<BoardCommand>,
-    // how good it is
-    declare<AnalyzeCommand>, declare<CameraTimingCommand>, declare<CheckCommand>,
-    declare<ZeroCommand>, declare<CertificateCommand>, declare<DesignCommand>,
-    // at the desk
-    declare<ControlCommand>, declare<SpnavCommand>, declare<GadgetCommand>, declare<DoctorCommand>,
-    declare<ManualCommand>};
-
-/// What does the command that was given; nothing: help was asked for.
-std::function<int()> command_of(command_line::Program& program, int argc, char** argv) {
-  program.require_subcommand();
-  std::vector<Declared> commands;
-  for (const auto declaration : kCommands) commands.push_back(declaration(program));
-  if (!program.parse(argc, argv)) return {};
-  for (const Declared& command : commands) {
-    if (command.parsed()) return command.run;
-  }
-  return {};
+/// OpenBLAS, which apt may choose as OpenCV's LAPACK, starts a thread for every core beyond the
+/// first when it is loaded, for sums that this program does not ask it for. Its variable of the
+/// environment would have to be set before: libc forgets what a function of .preinit_array sets.
+void end_blas_threads() noexcept {
+  if (auto* set_threads = library_function<void(int)>("openblas_set_num_threads")) set_threads(1);
+  if (auto* end_threads = library_function<int()>("blas_thread_shutdown_")) end_threads();
 }
 
 /// A closed standard stream would give its number to the next file that is opened, a device's say.
@@ -100,8 +67,9 @@ int main(int argc, char** argv) {
         "tagwrench: a camera under a spring platform as a 6-axis force-torque sensor and 6-DOF "
         "input device",
         TAGWRENCH_VERSION);
-    const std::function<int()> command = command_of(program, argc, argv);
-    return command ? command() : 0;
+    program.require_subcommand();
+    for (const auto declare : kCommands) declare(program);
+    return program.parse(argc, argv) ? program.run() : 0;
   } catch (const ConfigError& e) {
     log_info(e.what());
     return kUnusable;

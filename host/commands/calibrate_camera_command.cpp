@@ -1,5 +1,5 @@
-#include "host/commands/calibrate_camera_command.h"
-
+// `tagwrench calibrate camera`: pictures of a board in, measured/camera.yaml beside a sensor.yaml
+// out.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,13 +13,14 @@
 #include <vector>
 
 #include "host/app/input.h"
-#include "host/app/sources.h"
 #include "host/calibration/camera/collector.h"
+#include "host/calibration/camera/fit.h"
 #include "host/calibration/print/board_spec.h"
+#include "host/commands/commands.h"
 #include "host/commands/events.h"
-#include "host/commands/exit_status.h"
 #include "host/commands/measured_results.h"
 #include "host/core/config_error.h"
+#include "host/core/count_text.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
@@ -36,6 +37,17 @@ constexpr int kViewsFromCamera = 20;
 constexpr int kViewsFromFolders = 60;
 constexpr Duration kSayEvery = std::chrono::seconds(2);
 constexpr double kGuessedFocal = 1.25;  // of the image's width
+
+struct CalibrateCameraOptions {
+  std::string source;                ///< SRC: a camera or a folder
+  std::vector<std::string> folders;  ///< or folders, when source is empty
+  std::string board;                 ///< board_spec.h
+  std::string sensor;                ///< path; empty: the paper's sensor, and `out` is needed
+  std::string out;                   ///< path of a new sensor.yaml; empty: `sensor`
+  std::optional<int> views;
+  std::optional<double> seconds;
+  int events = -1;  ///< descriptor, see Events
+};
 
 /// The sensor whose camera it is, and where the result goes.
 struct Record {
@@ -344,17 +356,14 @@ std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
   return look_at_camera(options, board, record, stop);
 }
 
-}  // namespace
-
+/// Throws ConfigError if it cannot start, or if the views are too poor; then nothing has been
+/// written.
 int calibrate_camera(const CalibrateCameraOptions& options) {
   const BoardSpec board = parse_board(options.board);
   const Record record = open_record(options);
   const UniqueFd stop = termination_fd();
   std::unique_ptr<ViewCollector> collector = collect(options, board, record, stop);
-  if (!collector) {
-    log_info("stopped; nothing was written");
-    return kExitStopped;
-  }
+  if (!collector) return stopped_unwritten();
   collector->check();
   if (collector->mirrored() != record.sensor.camera.mirrored) {
     log_info(fmt::format("the camera's image is {}: writing mirrored: {}",
@@ -372,10 +381,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
     if (fit.views[i].used) coverage.add(views[i].corners, fit.views[i].pose);
   }
   check_fit(fit, coverage);
-  if (termination_requested()) {
-    log_info("stopped; nothing was written");
-    return kExitStopped;
-  }
+  if (termination_requested()) return stopped_unwritten();
   write(record, fit);
   report(fit, views, coverage, record);
   const fs::path folder = measured_folder(record.file());
@@ -386,6 +392,35 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
         "the calibration in newtons was made with the lens as it was described; run `tagwrench "
         "calibrate wrench` again");
   return 0;
+}
+
+}  // namespace
+
+void calibrate_camera_command(command_line::Command family) {
+  const auto o = std::make_shared<CalibrateCameraOptions>();
+  auto verb = family.add_subcommand(
+      "camera", "the lens, from a printed board shown to the camera (tagwrench tags --board)");
+  auto source = verb.add_option("--source", o->source,
+                                "the camera: v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or "
+                                "images:DIR");
+  auto images = verb.add_option("--images", o->folders, "folders of pictures of the board");
+  source.excludes(images);
+  verb.add_option("--board", o->board,
+                  "charuco:COLUMNSxROWS:SQUAREmm:MARKERmm:DICTIONARY or "
+                  "checkerboard:COLUMNSxROWS:SQUAREmm, counted in squares")
+      .required();
+  verb.add_option("--sensor", o->sensor, "sensor.yaml whose camera this is");
+  verb.add_option("--out", o->out,
+                  "a new sensor.yaml to make; what is found goes into measured/ beside it, "
+                  "without --out beside --sensor");
+  verb.add_option("--views", o->views,
+                  "views of the board to use: as many at least from a camera, at most from folders")
+      .check(command_line::range(kMinCameraViews, kMaxCameraViews));
+  verb.add_option("--seconds", o->seconds,
+                  "look at a camera no longer than this, then use what there is")
+      .check(calibration_seconds());
+  add_events_option(verb, o->events);
+  verb.runs([o] { return calibrate_camera(*o); });
 }
 
 }  // namespace tagwrench

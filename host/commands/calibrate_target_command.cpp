@@ -1,5 +1,5 @@
-#include "host/commands/calibrate_target_command.h"
-
+// `tagwrench calibrate target`: the platform at rest, then moved about, in; where the tags sit and
+// what they look like, in the folder measured/ beside sensor.yaml, out.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -7,18 +7,17 @@
 #include <limits>
 
 #include "host/app/input.h"
-#include "host/app/sources.h"
 #include "host/calibration/target/recorder.h"
 #include "host/calibration/target/verdict.h"
+#include "host/commands/commands.h"
 #include "host/commands/events.h"
-#include "host/commands/exit_status.h"
 #include "host/commands/measured_results.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
 #include "host/sensor/measured_files.h"
-#include "host/sensor/sensor_identity.h"
-#include "host/tracker/diagnostic_text.h"
+#include "host/tracker/rotation.h"
+#include "host/tracker/tracker.h"
 
 namespace tagwrench {
 namespace {
@@ -29,6 +28,15 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t kMaxKeyframes = 150;
 constexpr double kSecondsFromCamera = 30;
 constexpr Duration kAdviseEvery = std::chrono::seconds(2);
+
+struct CalibrateTargetOptions {
+  std::string sensor;             ///< path
+  std::string source;             ///< SRC
+  std::string out;                ///< path of a new sensor.yaml to measure for; empty: `sensor`
+  std::optional<long> frames;     ///< use no more than this, the rest included
+  std::optional<double> seconds;  ///< alike, by the frames' own time
+  int events = -1;                ///< descriptor, see Events
+};
 
 /// Says what to do, and every two seconds how far it is.
 class MotionGuide {
@@ -112,7 +120,7 @@ TargetFile found(const fs::path& sensor_file, const SensorConfig& sensor,
   TargetFile out;
   out.stamp = stamp_for(sensor_file);
   out.target = sensor.target;
-  out.rest = rest_platform(estimate.camera_T_tag);
+  out.rest = midpoint_frame(estimate.camera_T_tag);
   out.camera_sha256 = sha256_of(sensor.camera);
   const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
   for (std::size_t t = 0; t < out.target.tags.size(); ++t) {
@@ -123,13 +131,8 @@ TargetFile found(const fs::path& sensor_file, const SensorConfig& sensor,
   return out;
 }
 
-int stopped() {
-  log_info("stopped; nothing was written");
-  return kExitStopped;
-}
-
-}  // namespace
-
+/// Throws ConfigError if it cannot start, or if the recording cannot show where the tags sit; then
+/// nothing has been written.
 int calibrate_target(const CalibrateTargetOptions& options) {
   const MeasuredSensor measured(options.sensor, options.out,
                                 {kMeasuredTarget, kMeasuredPicture, kMeasuredZero});
@@ -142,13 +145,13 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   TargetRecorder record(sensor.camera, sensor.target, sensor.rest, kMaxKeyframes);
   log_info("source: " + input.source->format().description);
   log_info(fmt::format("hands off until {} frames at rest are taken", sensor.rest.frames));
-  if (!watch(*input.source, options, stop, record, events)) return stopped();
+  if (!watch(*input.source, options, stop, record, events)) return stopped_unwritten();
   check_record(record, sensor.target, sensor.rest);
 
   log_info(fmt::format("adjusting to {} pictures", record.keyframes().size()));
   TimePoint said = Clock::now();
   const TargetEstimate estimate =
-      TargetAdjuster(record.at_rest()).adjust(record.keyframes(), [&](double share) {
+      adjust_target(record.at_rest(), record.keyframes(), [&](double share) {
         events.progress(kSeeingFraction + (1 - kSeeingFraction) * share);
         if (Clock::now() - said >= kAdviseEvery) {
           said = Clock::now();
@@ -156,7 +159,7 @@ int calibrate_target(const CalibrateTargetOptions& options) {
         }
         return !termination_requested();
       });
-  if (termination_requested()) return stopped();
+  if (termination_requested()) return stopped_unwritten();
   check_estimate(estimate, sensor.camera);
   measured.make({kMeasuredCamera});
   write_measured_target(measured.folder(), found(measured.sensor(), sensor, estimate),
@@ -172,6 +175,29 @@ int calibrate_target(const CalibrateTargetOptions& options) {
         "the calibration in newtons was made with the target as it was; run `tagwrench calibrate "
         "wrench` again");
   return 0;
+}
+
+}  // namespace
+
+void calibrate_target_command(command_line::Command family) {
+  const auto o = std::make_shared<CalibrateTargetOptions>();
+  auto verb = family.add_subcommand(
+      "target", "where the tags sit, from the platform at rest and then moved about");
+  verb.add_option("--sensor", o->sensor, "sensor.yaml of this sensor").required();
+  verb.add_option("--source", o->source,
+                  source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}))
+      .required();
+  verb.add_option("--out", o->out,
+                  "a new sensor.yaml to make, in another folder; what is found goes into measured/ "
+                  "beside it, without --out beside --sensor");
+  verb.add_option("--frames", o->frames, "use no more than N frames")
+      .check(command_line::range(1, 2'000'000'000));
+  verb.add_option("--seconds", o->seconds,
+                  "use no more than S seconds; without it a folder is used up and anything else "
+                  "for 30 s")
+      .check(calibration_seconds());
+  add_events_option(verb, o->events);
+  verb.runs([o] { return calibrate_target(*o); });
 }
 
 }  // namespace tagwrench

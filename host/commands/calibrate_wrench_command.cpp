@@ -1,5 +1,5 @@
-#include "host/commands/calibrate_wrench_command.h"
-
+// `tagwrench calibrate wrench`: known loads, one after the other, in; measured/wrench.json and its
+// data out.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -8,24 +8,25 @@
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <system_error>
 
-#include "host/app/recording_sensor.h"
-#include "host/app/sources.h"
-#include "host/calibration/wrench/plan_config.h"
-#include "host/commands/calibrate_wrench/checks.h"
-#include "host/commands/calibrate_wrench/recorder.h"
+#include "host/app/input.h"
+#include "host/app/recording.h"
+#include "host/calibration/wrench/plan.h"
+#include "host/commands/calibrate_wrench/recording.h"
 #include "host/commands/calibrate_wrench/references.h"
-#include "host/commands/calibrate_wrench/replay.h"
 #include "host/commands/calibrate_wrench/result.h"
 #include "host/commands/calibrate_wrench/run.h"
-#include "host/commands/exit_status.h"
+#include "host/commands/commands.h"
 #include "host/commands/measured_results.h"
 #include "host/commands/static_measurement.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
+#include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
 #include "host/core/sha256.h"
+#include "host/sensor/calibration_file.h"
 #include "host/sensor/measured_files.h"
 #include "host/wrench/zero.h"
 
@@ -34,15 +35,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
+struct CalibrateWrenchOptions : ReferenceInstrumentOptions {
+  std::string sensor;  ///< path
+  std::string source;  ///< SRC
+  std::string plan;    ///< of a ready-made plan, or path; of a recording empty: its own
+  std::string out;     ///< path; empty: measured/wrench.json beside `sensor`
+  std::string notes;   ///< environment, for the record
+  std::optional<RecordOptions> record;
+  RecordOptions recording;   ///< becomes that
+  std::string keep = "raw";  ///< of it
+  bool resume = false;
+  bool force = false;
+  bool require_all = false;
+  bool list_plans = false;
+  std::string show_plan;          ///< name; printed to standard output
+  std::optional<double> seconds;  ///< of the frames' own time, then stop as if interrupted
+  int events = -1;                ///< descriptor, see Events; keys come from standard input then
+};
+
 constexpr int kRecordingFailed = 1, kAttempts = 3;  // attempts of the simulated person
 
 int list_plans() {
   for (const ReadyPlan& ready : ready_plans()) {
     const WrenchPlan plan = parse_plan(ready.text, ready.name);
-    std::fputs(fmt::format("{:18} {} steps: {}; about {} minutes\n", ready.name, plan.steps.size(),
-                           plan.about, plan.minutes)
-                   .c_str(),
-               stdout);
+    fmt::print("{:18} {} steps: {}; about {} minutes\n", ready.name, plan.steps.size(), plan.about,
+               plan.minutes);
   }
   return 0;
 }
@@ -62,6 +79,109 @@ Matrix6 known_stiffness(const SensorConfig& sensor, const std::string& file) {
       "roughly, wrench: {{springs: {{centres_mm: ..., axial_n_per_mm: ..., lateral_n_per_mm: "
       "...}}}}",
       file));
+}
+
+// What is refused before anything is measured; all throw ConfigError.
+
+/// With `require_all` a plan that leaves an axis open; else says what will be completed. `range`:
+/// full load, N and N m.
+void check_plan(const WrenchPlan& plan, const Vector6& range, bool require_all) {
+  std::string missing;
+  for (const std::string& line : coverage_of(plan, range).missing())
+    missing += (missing.empty() ? "" : "; ") + line;
+  if (missing.empty()) return;
+  if (require_all) throw ConfigError(fmt::format("--plan {}: {}; add steps", plan.name, missing));
+  log_info(
+      fmt::format("--plan {}: {}; that stays as the spring model has it and is marked so "
+                  "(--require-all refuses)",
+                  plan.name, missing));
+}
+
+/// What is in the way of the files to be written.
+void check_files(const CalibrationFiles& files, const CalibrateWrenchOptions& options) {
+  std::error_code none;
+  const fs::path folder = files.calibration.parent_path();
+  if (folder.filename() == kMeasuredFolder && !fs::exists(folder, none)) {
+    check_measurable(folder, {});
+  } else {
+    for (const fs::path& file : {files.calibration, files.data, files.progress, files.before})
+      check_replaceable(file);
+  }
+  const bool waits = fs::exists(files.progress, none);
+  if (options.resume && !waits) {
+    throw ConfigError(fmt::format("--resume: there is no {} to go on from; leave it out",
+                                  files.progress.string()));
+  }
+  if (options.resume || options.force) return;
+  if (waits) {
+    throw ConfigError(
+        fmt::format("{}: a calibration was stopped here; --resume goes on, --force begins anew",
+                    files.progress.string()));
+  }
+  if (!fs::exists(files.calibration, none)) return;
+  try {
+    read_calibration(files.calibration);
+  } catch (const ConfigError&) {
+    throw ConfigError(
+        fmt::format("--out {}: is there, but is no calibration; name another file, "
+                    "or --force",
+                    files.calibration.string()));
+  }
+}
+
+/// Pictures cannot be asked to hang a weight, and a person before a camera needs no pipe.
+void check_source(const CalibrateWrenchOptions& options) {
+  if (!options.emulated_cell.empty() && !parse_source(options.source).is(SourceKind::simulator)) {
+    throw ConfigError(
+        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
+                    options.source));
+  }
+  if (parse_source(options.source).is(SourceKind::images)) {
+    throw ConfigError(fmt::format(
+        "--source {}: nobody is there who could do what the plan asks; give a camera, sim, or the "
+        "recording of a calibration",
+        options.source));
+  }
+  if (!options.record) return;
+  check_recording(*options.record, "--record");
+  if (options.resume) {
+    throw ConfigError(
+        "--record, --resume: what was measured before would not be in the recording; leave one "
+        "out");
+  }
+}
+
+/// What a recording has already, or cannot do any more.
+void check_replay_options(const CalibrateWrenchOptions& options) {
+  if (!options.record && !options.resume && !options.seconds && options.board.empty() &&
+      options.cells.empty() && options.optoforce.empty() && options.counts_per_unit.empty() &&
+      options.emulated_cell.empty())
+    return;
+  throw ConfigError(
+      "--record, --resume, --seconds, --board, --cells, --optoforce, --counts-per-unit, "
+      "--emulated-cell: are for loads that are still to come, the recording has its own; leave "
+      "them out");
+}
+
+/// A rest that is learned at the start is that of the mounting in which the program was started.
+void check_resumable(const SensorConfig& sensor, const WrenchPlan& plan, const Progress& progress,
+                     const fs::path& partial) {
+  if (rest_is_calibrated(sensor)) return;
+  int next = 0;
+  const auto done = [&] {
+    return std::any_of(progress.records.begin(), progress.records.end(),
+                       [&](const StepRecord& record) { return record.step == next; }) ||
+           std::find(progress.skipped.begin(), progress.skipped.end(), next) !=
+               progress.skipped.end();
+  };
+  while (next < static_cast<int>(plan.steps.size()) && done()) ++next;
+  if (next == static_cast<int>(plan.steps.size()) ||
+      plan.steps[static_cast<std::size_t>(next)].mounting == plan.steps.front().mounting)
+    return;
+  throw ConfigError(fmt::format(
+      "--resume: this sensor's rest is learned anew at every start, and now it lies otherwise than "
+      "when {} was begun; run `tagwrench calibrate target`, then begin again with --force",
+      partial.string()));
 }
 
 std::string now_utc() {
@@ -208,10 +328,7 @@ int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles
     log_info(fmt::format("going on: {} steps are done", progress.records.size()));
   }
   const std::unique_ptr<Reference> reference =
-      open_reference(plan,
-                     {options.board, options.cells, options.optoforce, options.counts_per_unit,
-                      options.emulated_cell},
-                     at.bench.get(), at.time_zero);
+      open_reference(plan, options, at.bench.get(), at.time_zero);
   log_info("source: " + at.input.source->format().description);
   if (reference) log_info("reference: " + reference->description());
   if (!rest_is_calibrated(sensor)) {
@@ -314,18 +431,83 @@ int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFile
   return 0;
 }
 
-}  // namespace
-
+/// 1: stopped or failed on the way, what was measured is kept for --resume; or written, but a
+/// recording that was asked for is not whole. Throws ConfigError if it cannot start, or if what was
+/// measured makes no calibration. One that was in force stays so until the new one is complete.
 int calibrate_wrench(const CalibrateWrenchOptions& options) {
   if (options.list_plans) return list_plans();
   if (!options.show_plan.empty()) {
-    std::fputs(plan_text(options.show_plan).c_str(), stdout);
+    print_data(plan_text(options.show_plan));
     return 0;
   }
   const CalibrationFiles files =
       files_of(options.out.empty() ? measured_wrench(options) : fs::path(options.out));
   return parse_source(options.source).is(SourceKind::recording) ? calibrate_again(options, files)
                                                                 : calibrate_live(options, files);
+}
+
+}  // namespace
+
+void calibrate_wrench_command(command_line::Command family) {
+  const auto o = std::make_shared<CalibrateWrenchOptions>();
+  auto verb = family.add_subcommand("wrench", "newtons, from known loads; step by step");
+  verb.add_flag("--list-plans", o->list_plans, "name the ready-made plans");
+  verb.add_option("--show-plan", o->show_plan, "print a plan, to be changed and given as a file");
+  verb.add_option("--sensor", o->sensor, "sensor.yaml of this sensor");
+  verb.add_option("--source", o->source,
+                  "sim | sim:SCENARIO.yaml, which loads itself, or "
+                  "v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or recording:FILE of --record, whose "
+                  "loads are fitted once more");
+  verb.add_option("--plan", o->plan,
+                  "a ready-made plan (--list-plans) or a plan file; of a recording, without it "
+                  "its own");
+  verb.add_option("--out", o->out,
+                  "file to write; without it measured/wrench.json beside --sensor");
+  verb.add_option("--notes", o->notes, "temperature, place, who: goes into the record");
+  auto board =
+      verb.add_option("--board", o->board, "serial port of the board with the load cell, or auto");
+  verb.add_option("--cells", o->cells,
+                  "its load cells' calibration; without it the one kept for this board");
+  verb.add_option("--emulated-cell", o->emulated_cell,
+                  "with --source sim and an emulated board: the pipe that the board reads its "
+                  "orders from, so that its cell feels the simulated hand; in real time")
+      .needs(board);
+  verb.add_option("--optoforce", o->optoforce, "serial port of an OptoForce sensor");
+  verb.add_option("--counts-per-unit", o->counts_per_unit,
+                  "of that, from its data sheet: per N of Fx Fy Fz, per N m of Tx Ty Tz")
+      .delimiter(',')
+      .expected(6)
+      .check(command_line::positive_number());
+  auto record = verb.add_option(
+      "--record", o->recording.file,
+      "keep frames, readings and accepted steps in a new file, for --source recording:FILE");
+  verb.add_option("--keep", o->keep,
+                  "what of each frame is recorded:\n"
+                  "  raw       as it came from the source (MJPG stays MJPG)\n"
+                  "  region    grey pixels of the part around the tags")
+      .check(command_line::one_of({"raw", "region"}))
+      .capture_default_str()
+      .needs(record);
+  verb.add_flag("--resume", o->resume, "go on with a calibration that was stopped");
+  verb.add_flag("--force", o->force, "begin anew, whatever is there");
+  verb.add_flag("--require-all", o->require_all,
+                "refuse unless all six axes are measured, in place of completing them from the "
+                "spring model");
+  verb.add_option("--seconds", o->seconds, "stop after S seconds of frames; --resume goes on")
+      .check(calibration_seconds());
+  add_events_option(verb, o->events);
+  const auto check = [=] {
+    if (o->list_plans || !o->show_plan.empty()) return;
+    const bool recorded = o->source.starts_with("recording:");
+    for (const char* needed : {"--sensor", "--source", "--plan"}) {
+      const bool optional = recorded && std::string_view(needed) == "--plan";
+      if (verb.count(needed) == 0 && !optional) command_line::missing(needed);
+    }
+    if (o->recording.file.empty()) return;
+    o->recording.keep = o->keep == "raw" ? record::Keep::raw : record::Keep::region;
+    o->record = o->recording;
+  };
+  verb.runs([o] { return calibrate_wrench(*o); }, check);
 }
 
 }  // namespace tagwrench

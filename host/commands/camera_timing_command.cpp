@@ -1,34 +1,31 @@
-#include "host/commands/camera_timing_command.h"
-
+// `tagwrench camera-timing`: a camera, a lamp or a screen before it, and a report.
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <vector>
 
 #include "host/app/board/board_loop.h"
 #include "host/app/input.h"
 #include "host/app/scenario_config.h"
-#include "host/app/sources.h"
+#include "host/commands/commands.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
 #include "host/motion/shaping.h"
-#include "host/output/uhid_outputs.h"
+#include "host/output/hid_outputs.h"
 #include "host/output/watchdog.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
-#include "host/tools/camera_timing/board_pattern_lamp.h"
 #include "host/tools/camera_timing/measurement.h"
 #include "host/tools/camera_timing/page_patch.h"
-#include "host/tools/camera_timing/screen_measurement.h"
+#include "host/tools/camera_timing/pattern_lamp.h"
 #include "host/tools/camera_timing/screen_window.h"
-#include "host/tools/camera_timing/simulated_lamp.h"
 #include "host/tracker/tracker.h"
-#include "host/web/server/token_file.h"
-#include "host/web/server/web_place.h"
+#include "host/web/server/web_options.h"
 #include "host/wrench/estimate.h"
 
 namespace tagwrench {
@@ -38,6 +35,18 @@ constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr double kMin = 3;   // s: enough pictures at 25 Hz
 constexpr double kMax = 20;  // s: a bare LED stays cool enough
+
+struct TimingOptions {
+  std::string source;
+  std::string port;
+  std::string sensor;
+  std::string json;
+  double seconds = 10;
+  command_line::Option screen_given;
+  std::string screen;     ///< empty: a window
+  std::string web_token;  ///< file
+  bool fast = false;
+};
 
 /// A camera and the lamp before it.
 struct Bench {
@@ -141,121 +150,35 @@ class Processing {
   int held_ = 0;
 };
 
-}  // namespace
-
-CameraTimingCommand::CameraTimingCommand(command_line::Command program)
-    : verb_(program.add_subcommand(
-          "camera-timing",
-          "measure the camera with the LED: true frame rate, latency, jitter, read-out, stale and "
-          "missing frames")) {
-  verb_.footer(
-      "With a board, its LED lights the picture: steadily for 3 s, not at all for 1 s, then in a\n"
-      "pattern. Hands off, and little light from elsewhere. Without a board, --screen shows a "
-      "window\n"
-      "that flips between black and white, for the camera to look at; that tells frame rate and\n"
-      "latency alone, the screen's own latency included. --screen web is the same as a page, for "
-      "a\n"
-      "phone or a tablet before the camera. Without any of them:\n"
-      "  tagwrench camera-timing --source sim:tests/sim/scenarios/camera_timing.yaml --port sim "
-      "--fast");
-  verb_.add_option("--source", source_, "the camera: v4l2:/dev/videoN, sim or sim:SCENARIO.yaml")
-      .required();
-  command_line::Option port = verb_.add_option(
-      "--port", port_,
-      "the board: its serial port, usb:VENDOR:PRODUCT, or sim for the simulated lamp");
-  screen_option_ = verb_
-                       .add_option("--screen", screen_,
-                                   "a screen instead of a board's LED: window (as without a "
-                                   "value), or web[:ADDRESS:PORT], a page for any browser")
-                       .expected(0, 1)
-                       .excludes(port);
-  verb_
-      .add_option("--web-token", web_token_,
-                  "file with the token that the page needs, so that other computers may open it; "
-                  "made if it is not there")
-      .needs(screen_option_);
-  verb_.add_option("--sensor", sensor_, "sensor.yaml of this sensor");
-  verb_.add_option("--seconds", seconds_, "length of the pattern")
-      .check(command_line::number(
-          kMin, kMax, fmt::format("a number of seconds from {:g} to {:g}", kMin, kMax), "SECONDS"))
-      .capture_default_str();
-  verb_.add_option("--json", json_,
-                   "write the report as JSON to this file too; - is standard output");
-  verb_.add_flag("--fast", fast_, "the simulated sensor runs as fast as it can");
-}
-
-int CameraTimingCommand::run() const {
-  const bool screen = screen_option_.count() > 0;
-  if (!screen && port_.empty())
-    throw ConfigError(
-        "camera-timing: needs a light: --port PORT for a board's LED, --port sim or --screen");
-  if (screen) check_screen();
-  if (!json_.empty() && json_ != "-") check_report_file(json_);
-  return screen ? run_with_screen() : run_with_lamp();
-}
-
-void CameraTimingCommand::check_screen() const {
-  const std::string kind = split_spec(screen_).kind;
-  if (!screen_.empty() && screen_ != "window" && kind != "web") {
+void check_screen(const TimingOptions& o) {
+  const std::string kind = split_spec(o.screen).kind;
+  if (!o.screen.empty() && o.screen != "window" && kind != "web") {
     throw ConfigError(fmt::format(
-        "--screen {}: is no screen; use --screen, or --screen web, or web:ADDRESS:PORT", screen_));
+        "--screen {}: is no screen; use --screen, or --screen web, or web:ADDRESS:PORT", o.screen));
   }
-  if (kind != "web" && !web_token_.empty())
+  if (kind != "web" && !o.web_token.empty())
     throw ConfigError("--web-token: is for a page; use it with --screen web:ADDRESS:PORT");
-  if (parse_source(source_).is(SourceKind::simulator)) {
+  if (parse_source(o.source).is(SourceKind::simulator)) {
     if (kind == "web")
       throw ConfigError(
           "--screen web: the simulated camera sees no screen; give a camera as --source, or leave "
           "web out");
-  } else if (fast_) {
+  } else if (o.fast) {
     throw ConfigError("--fast: a camera has its own time; leave it out");
   }
 }
 
-void CameraTimingCommand::print(const std::string& text, const std::string& json) const {
-  fmt::print("{}", json_ == "-" ? json : text);
-  if (!json_.empty() && json_ != "-") write_atomically(json_, json);
+void print(const TimingOptions& o, const std::string& text, const std::string& json) {
+  fmt::print("{}", o.json == "-" ? json : text);
+  if (!o.json.empty() && o.json != "-") write_atomically(o.json, json);
 }
 
-int CameraTimingCommand::run_with_screen() const {
-  const UniqueFd stop = termination_fd();
-  const Spec screen = split_spec(screen_);
-  if (parse_source(source_).is(SourceKind::simulator)) {
-    const Bench bench = simulated_bench(sensor_, source_, fast_);
-    auto& patch = dynamic_cast<FlipPatch&>(*bench.lamp);
-    return measure(*bench.input.source, patch, stop, [] { return "simulated, without latency"; });
-  }
-  if (screen.kind != "web") {
-    ScreenWindow window;
-    const Input input = open_input({sensor_, source_, false});
-    return measure(*input.source, window, stop, [&] { return window.description(); });
-  }
-  WebOptions options = parse_web("--screen web", screen.argument);
-  options.pages = built_pages();
-  std::string token_text;
-  if (!web_token_.empty()) {
-    const WebToken token = web_token(web_token_);
-    options.token = token.text;
-    token_text = token.made ? "&token=" + token.text
-                            : fmt::format("&token=... (the token is in {})", web_token_);
-  }
-  PagePatch page(options);
-  const Input input = open_input({sensor_, source_, false});
-  log_info("the page: " + page.url() + token_text);
-  log_info("open it on the screen that the camera looks at; Ctrl-C ends");
-  if (!page.wait_for_page(stop.get())) {
-    log_info("camera-timing: " + (page.ended().empty() ? "stopped" : page.ended()));
-    return kFailed;
-  }
-  return measure(*input.source, page, stop, [&] { return page.description(); });
-}
-
-int CameraTimingCommand::measure(FrameSource& source, FlipPatch& patch, const UniqueFd& stop,
-                                 const std::function<std::string()>& screen) const {
+int measure(const TimingOptions& o, FrameSource& source, FlipPatch& patch, const UniqueFd& stop,
+            const std::function<std::string()>& screen) {
   log_info("source: " + source.format().description);
   log_info("point the camera at the flipping patch, so that it fills the picture");
   ScreenOptions options;
-  options.seconds = seconds_;
+  options.seconds = o.seconds;
   options.stopped = [&] { return termination_requested(); };
   options.stop_fd = stop.get();
   const ScreenMeasurement measured = measure_screen(source, patch, options);
@@ -264,22 +187,56 @@ int CameraTimingCommand::measure(FrameSource& source, FlipPatch& patch, const Un
     return kFailed;
   }
   const double period = std::chrono::duration<double>(source.format().period).count();
-  print(report_text(measured, source.format().description, screen(), period),
+  print(o, report_text(measured, source.format().description, screen(), period),
         report_json(measured, source.format().description, screen(), period));
   return kDone;
 }
 
-int CameraTimingCommand::run_with_lamp() const {
+int run_with_screen(const TimingOptions& o) {
   const UniqueFd stop = termination_fd();
-  Bench bench = port_ == "sim" ? simulated_bench(sensor_, source_, fast_)
-                               : board_bench(sensor_, source_, port_, fast_);
+  const Spec screen = split_spec(o.screen);
+  if (parse_source(o.source).is(SourceKind::simulator)) {
+    const Bench bench = simulated_bench(o.sensor, o.source, o.fast);
+    auto& patch = dynamic_cast<FlipPatch&>(*bench.lamp);
+    return measure(o, *bench.input.source, patch, stop,
+                   [] { return "simulated, without latency"; });
+  }
+  if (screen.kind != "web") {
+    ScreenWindow window;
+    const Input input = open_input({o.sensor, o.source, false});
+    return measure(o, *input.source, window, stop, [&] { return window.description(); });
+  }
+  WebOptions options = parse_web("--screen web", screen.argument);
+  options.pages = built_pages();
+  std::string token_text;
+  if (!o.web_token.empty()) {
+    const WebToken token = web_token(o.web_token);
+    options.token = token.text;
+    token_text = token.made ? "&token=" + token.text
+                            : fmt::format("&token=... (the token is in {})", o.web_token);
+  }
+  PagePatch page(options);
+  const Input input = open_input({o.sensor, o.source, false});
+  log_info("the page: " + page.url() + token_text);
+  log_info("open it on the screen that the camera looks at; Ctrl-C ends");
+  if (!page.wait_for_page(stop.get())) {
+    log_info("camera-timing: " + (page.ended().empty() ? "stopped" : page.ended()));
+    return kFailed;
+  }
+  return measure(o, *input.source, page, stop, [&] { return page.description(); });
+}
+
+int run_with_lamp(const TimingOptions& o) {
+  const UniqueFd stop = termination_fd();
+  Bench bench = o.port == "sim" ? simulated_bench(o.sensor, o.source, o.fast)
+                                : board_bench(o.sensor, o.source, o.port, o.fast);
   if (!bench.lamp) return kFailed;
   check_size(bench.input);
   log_info("source: " + bench.input.source->format().description);
   Processing processing(bench.input.sensor);
 
   CameraTimingOptions options;
-  options.seconds = seconds_;
+  options.seconds = o.seconds;
   options.process = [&](Frame& frame) { processing.take(frame); };
   options.stopped = [&] { return termination_requested(); };
   options.stop_fd = stop.get();
@@ -298,8 +255,61 @@ int CameraTimingCommand::run_with_lamp() const {
   const CameraTimingSetting setting{
       bench.input.source->format().description, bench.lamp_description, processing.output(),
       std::chrono::duration<double>(bench.input.source->format().period).count()};
-  print(report_text(measured, setting), report_json(measured, setting));
+  print(o, report_text(measured, setting), report_json(measured, setting));
   return kDone;
+}
+
+int measure_camera(const TimingOptions& o) {
+  const bool screen = o.screen_given.count() > 0;
+  if (!screen && o.port.empty())
+    throw ConfigError(
+        "camera-timing: needs a light: --port PORT for a board's LED, --port sim or --screen");
+  if (screen) check_screen(o);
+  if (!o.json.empty() && o.json != "-") check_report_file(o.json);
+  return screen ? run_with_screen(o) : run_with_lamp(o);
+}
+
+}  // namespace
+
+void camera_timing_command(command_line::Command program) {
+  const auto o = std::make_shared<TimingOptions>();
+  auto verb = program.add_subcommand(
+      "camera-timing",
+      "measure the camera with the LED: true frame rate, latency, jitter, read-out, stale and "
+      "missing frames");
+  verb.footer(
+      "With a board, its LED lights the picture: steadily for 3 s, not at all for 1 s, then in a\n"
+      "pattern. Hands off, and little light from elsewhere. Without a board, --screen shows a "
+      "window\n"
+      "that flips between black and white, for the camera to look at; that tells frame rate and\n"
+      "latency alone, the screen's own latency included. --screen web is the same as a page, for "
+      "a\n"
+      "phone or a tablet before the camera. Without any of them:\n"
+      "  tagwrench camera-timing --source sim:tests/sim/scenarios/camera_timing.yaml --port sim "
+      "--fast");
+  verb.add_option("--source", o->source, "the camera: v4l2:/dev/videoN, sim or sim:SCENARIO.yaml")
+      .required();
+  auto port = verb.add_option(
+      "--port", o->port,
+      "the board: its serial port, usb:VENDOR:PRODUCT, or sim for the simulated lamp");
+  o->screen_given = verb.add_option("--screen", o->screen,
+                                    "a screen instead of a board's LED: window (as without a "
+                                    "value), or web[:ADDRESS:PORT], a page for any browser")
+                        .expected(0, 1)
+                        .excludes(port);
+  verb.add_option("--web-token", o->web_token,
+                  "file with the token that the page needs, so that other computers may open it; "
+                  "made if it is not there")
+      .needs(o->screen_given);
+  verb.add_option("--sensor", o->sensor, "sensor.yaml of this sensor");
+  verb.add_option("--seconds", o->seconds, "length of the pattern")
+      .check(command_line::number(
+          kMin, kMax, fmt::format("a number of seconds from {:g} to {:g}", kMin, kMax), "SECONDS"))
+      .capture_default_str();
+  verb.add_option("--json", o->json,
+                  "write the report as JSON to this file too; - is standard output");
+  verb.add_flag("--fast", o->fast, "the simulated sensor runs as fast as it can");
+  verb.runs([o] { return measure_camera(*o); });
 }
 
 }  // namespace tagwrench

@@ -1,17 +1,21 @@
-#include "host/commands/check_command.h"
-
+// `tagwrench check`: whether a calibrated sensor still measures what it did, found out where it
+// stands.
 #include <fmt/format.h>
 
 #include <cmath>
 #include <iostream>
 #include <limits>
+#include <memory>
 #include <numbers>
+#include <optional>
+#include <vector>
 
-#include "host/app/sources.h"
+#include "host/app/board/run_board.h"
+#include "host/app/input.h"
 #include "host/board/cell_calibration.h"
-#include "host/commands/check_text.h"
-#include "host/commands/emulated_cell.h"
-#include "host/commands/events_option.h"
+#include "host/commands/calibrate_wrench/references.h"
+#include "host/commands/commands.h"
+#include "host/commands/static_measurement.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
@@ -19,6 +23,23 @@
 
 namespace tagwrench {
 namespace {
+
+struct CheckOptions {
+  std::string sensor;            ///< path
+  std::string source;            ///< SRC
+  int events = -1;               ///< descriptor, see Events
+  std::optional<double> mass_g;  ///< to be hung
+  double mass_sigma_percent = 0.5;
+  std::vector<double> at_mm;  ///< where a load takes hold, platform frame
+  double at_sigma_mm = 0.3;
+  std::vector<double> gravity{0, 0, -1};  ///< along which masses pull, camera axes
+  double direction_sigma_deg = 1;         ///< of gravity
+  std::string board;                      ///< port of the board whose load cell tells the force
+  std::string cells;                      ///< calibration of its load cells
+  int channel = 0;
+  std::vector<double> direction;  ///< of the force on the platform, camera axes
+  std::string emulated_cell;      ///< pipe to the emulated board, for its cell; empty: none
+};
 
 constexpr int kOff = 1;
 constexpr Duration kPatience = std::chrono::seconds(20);
@@ -94,140 +115,35 @@ double least_change(const CheckOptions& options, const Vector6& range) {
   return 0.3 * load.known.cwiseQuotient(range).cwiseAbs().maxCoeff();
 }
 
-}  // namespace
-
-CheckCommand::CheckCommand(command_line::Command program)
-    : verb_(program.add_subcommand(
-          "check", "say line by line whether a calibrated sensor still measures what it did")) {
-  verb_.add_option("--sensor", options_.sensor, "sensor.yaml of this sensor").required();
-  verb_
-      .add_option("--source", options_.source,
-                  source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}))
-      .required();
-  add_events_option(verb_, options_.events);
-  add_load_options();
-}
-
-void CheckCommand::add_load_options() {
-  const auto vector = [&](const char* name, std::vector<double>& value, const char* help) {
-    return verb_.add_option(name, value, help).delimiter(',').expected(3).check(finite());
-  };
-  command_line::Option mass =
-      verb_.add_option("--mass-g", options_.mass_g, "a known mass to hang on, g")
-          .check(command_line::range(0.1, 1e5));
-  command_line::Option at =
-      vector("--at", options_.at_mm,
-             "x,y,z: where a load takes hold, mm, platform frame (origin between the tags, "
-             "axes as the camera's)");
-  vector("--gravity", options_.gravity,
-         "x,y,z: which way masses pull, camera axes; 0,0,-1 when the camera looks up");
-  verb_
-      .add_option("--mass-sigma-percent", options_.mass_sigma_percent,
-                  "how well the mass is known, 1 standard deviation")
-      .check(command_line::range(0.0, 50.0));
-  verb_.add_option("--at-sigma-mm", options_.at_sigma_mm, "how well the point is known")
-      .check(command_line::range(0.0, 50.0));
-  command_line::Option board = verb_.add_option(
-      "--board", options_.board, "a load cell of this board to push with: its port, or auto");
-  command_line::Option direction =
-      vector("--direction", options_.direction,
-             "x,y,z: of the force on the platform when the cell is pushed");
-  verb_
-      .add_option("--cells", options_.cells,
-                  "calibration file of its load cells; without it the one kept for this board")
-      .needs(board);
-  verb_.add_option("--channel", options_.channel, "of the load cell")
-      .check(command_line::range(0, 3))
-      .needs(board);
-  verb_
-      .add_option("--emulated-cell", options_.emulated_cell,
-                  "with --source sim and an emulated board: the pipe that the board reads its "
-                  "orders from, so that its cell feels the simulated hand")
-      .needs(board);
-  mass.needs(at);
-  board.needs(at);
-  board.needs(direction);
-  direction.needs(board);
-  mass.excludes(board);
-}
-
-int CheckCommand::run() const {
-  if (!(vector3(options_.gravity).norm() > kMin))
-    throw ConfigError("--gravity: has no length; give a direction such as 0,0,-1");
-  if (!options_.direction.empty() && !(vector3(options_.direction).norm() > kMin))
-    throw ConfigError("--direction: has no length; give a direction such as 0,0,-1");
-  const UniqueFd stop = termination_fd();
-  const std::unique_ptr<RunBoard> board = open_board(options_.board, options_.cells);
-  if (board && !board->connected()) return stopped();
-  BenchInput at;
-  const InputOptions from{options_.sensor, options_.source, /*fast=*/!board};
-  if (board && options_.emulated_cell.empty()) {
-    at.input = open_input(from);  // a board has its own time
-  } else {
-    at = open_at_bench(from);
-  }
-  if (!options_.emulated_cell.empty() && !at.bench) {
-    throw ConfigError(
-        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
-                    options_.source));
-  }
-  Input& input = at.input;
-  check_size(input);
-  check_calibrated_rest(input.sensor, "check");
-  if (board && !board->settle_light(input, stop)) return stopped();
-  StaticMeasurement static_measurement(input.sensor, std::chrono::seconds(2),
-                                       options_.mass_g ? kPatienceForMass : kPatience);
-  Events events(options_.events);
-  log_info("source: " + input.source->format().description);
-  log_info("hands off for some seconds");
-  std::unique_ptr<Output> cell;
-  if (board) {
-    input.sensor.reference = ReferenceLine{options_.channel, vector3(options_.at_mm) * 1e-3,
-                                           vector3(options_.direction).normalized()};
-    cell = board->output(input.sensor, "");
-  }
-  const Seen seen = watch(*input.source, stop, static_measurement, events, cell.get());
-  if (seen == Seen::stopped) return stopped();
-  if (const std::string why = why_nothing(seen, static_measurement); !why.empty()) {
-    log_info(why);
-    return kOff;
-  }
-  bool fine = print(judge(static_measurement.result()));
-  if (options_.mass_g) fine = by_mass(at, stop, static_measurement, events) && fine;
-  if (board) fine = by_cell(at, stop, *board, *cell) && fine;
-  if (termination_requested()) return stopped();
-  return fine ? 0 : kOff;
-}
-
-bool CheckCommand::by_mass(BenchInput& at, const UniqueFd& stop,
-                           StaticMeasurement& static_measurement, Events& events) const {
+bool by_mass(const CheckOptions& options, BenchInput& at, const UniqueFd& stop,
+             StaticMeasurement& static_measurement, Events& events) {
   ProofLoad load;
   load.range = at.input.sensor.wrench.range;
   const Vector6 before = static_measurement.result().wrench;
-  static_measurement.wait_for_change(least_change(options_, load.range));
+  static_measurement.wait_for_change(least_change(options, load.range));
   log_info(fmt::format("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest",
-                       *options_.mass_g, options_.at_mm[0], options_.at_mm[1], options_.at_mm[2]));
-  if (at.bench) at.bench->hang(*options_.mass_g * 1e-3, vector3(options_.at_mm) * 1e-3);
+                       *options.mass_g, options.at_mm[0], options.at_mm[1], options.at_mm[2]));
+  if (at.bench) at.bench->hang(*options.mass_g * 1e-3, vector3(options.at_mm) * 1e-3);
   const Seen loaded = watch(*at.input.source, stop, static_measurement, events);
   InSituFinding scale{.subject = Subject::scale, .fault = Fault::not_known};
   if (loaded == Seen::enough && static_measurement.result().held) {
     load.measured = static_measurement.result().wrench - before;
     load.measured_covariance = static_measurement.wrench_sigma().cwiseAbs2().asDiagonal();
-    set_known(options_, static_measurement.displacement(), load);
+    set_known(options, static_measurement.displacement(), load);
     scale = judge(load);
   }
   return loaded != Seen::stopped && print({scale});
 }
 
 /// Until the scale is known well, or patience is lost.
-bool CheckCommand::by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard& board,
-                           Output& cell) const {
+bool by_cell(const CheckOptions& options, BenchInput& at, const UniqueFd& stop,
+             const RunBoard& board, Output& cell) {
   const SensorConfig& sensor = at.input.sensor;
   Tracker tracker = make_tracker(sensor);
   WrenchEstimator wrench(sensor.wrench);
   std::optional<EmulatedCell> hand;
-  if (!options_.emulated_cell.empty())
-    hand.emplace(options_.emulated_cell, options_.channel, *at.bench, at.time_zero);
+  if (!options.emulated_cell.empty())
+    hand.emplace(options.emulated_cell, options.channel, *at.bench, at.time_zero);
   log_info("now push with the load cell, slowly, on and off, for some seconds");
   if (hand) simulated_push(*at.bench, sensor.wrench.range, *sensor.reference);
   std::optional<TimePoint> begin;
@@ -249,6 +165,107 @@ bool CheckCommand::by_cell(BenchInput& at, const UniqueFd& stop, const RunBoard&
     if (pushed >= kPatience || (known && pushed >= kMinPush)) break;
   }
   return print({judge(board.monitor())});
+}
+
+/// 0: all is fine; 1: something is not, or could not be told.
+int check(const CheckOptions& options) {
+  if (!(vector3(options.gravity).norm() > kMin))
+    throw ConfigError("--gravity: has no length; give a direction such as 0,0,-1");
+  if (!options.direction.empty() && !(vector3(options.direction).norm() > kMin))
+    throw ConfigError("--direction: has no length; give a direction such as 0,0,-1");
+  const UniqueFd stop = termination_fd();
+  const std::unique_ptr<RunBoard> board = open_board(options.board, options.cells);
+  if (board && !board->connected()) return stopped();
+  BenchInput at;
+  const InputOptions from{options.sensor, options.source, /*fast=*/!board};
+  if (board && options.emulated_cell.empty()) {
+    at.input = open_input(from);  // a board has its own time
+  } else {
+    at = open_at_bench(from);
+  }
+  if (!options.emulated_cell.empty() && !at.bench) {
+    throw ConfigError(
+        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
+                    options.source));
+  }
+  Input& input = at.input;
+  check_size(input);
+  check_calibrated_rest(input.sensor, "check");
+  if (board && !board->settle_light(input, stop)) return stopped();
+  StaticMeasurement static_measurement(input.sensor, std::chrono::seconds(2),
+                                       options.mass_g ? kPatienceForMass : kPatience);
+  Events events(options.events);
+  log_info("source: " + input.source->format().description);
+  log_info("hands off for some seconds");
+  std::unique_ptr<Output> cell;
+  if (board) {
+    input.sensor.reference = ReferenceLine{options.channel, vector3(options.at_mm) * 1e-3,
+                                           vector3(options.direction).normalized()};
+    cell = board->output(input.sensor, "");
+  }
+  const Seen seen = watch(*input.source, stop, static_measurement, events, cell.get());
+  if (seen == Seen::stopped) return stopped();
+  if (const std::string why = why_nothing(seen, static_measurement); !why.empty()) {
+    log_info(why);
+    return kOff;
+  }
+  bool fine = print(judge(static_measurement.result()));
+  if (options.mass_g) fine = by_mass(options, at, stop, static_measurement, events) && fine;
+  if (board) fine = by_cell(options, at, stop, *board, *cell) && fine;
+  if (termination_requested()) return stopped();
+  return fine ? 0 : kOff;
+}
+
+void add_load_options(command_line::Command verb, CheckOptions& options) {
+  const auto vector = [&](const char* name, std::vector<double>& value, const char* help) {
+    return verb.add_option(name, value, help).delimiter(',').expected(3).check(finite());
+  };
+  auto mass = verb.add_option("--mass-g", options.mass_g, "a known mass to hang on, g")
+                  .check(command_line::range(0.1, 1e5));
+  auto at = vector("--at", options.at_mm,
+                   "x,y,z: where a load takes hold, mm, platform frame (origin between the tags, "
+                   "axes as the camera's)");
+  vector("--gravity", options.gravity,
+         "x,y,z: which way masses pull, camera axes; 0,0,-1 when the camera looks up");
+  verb.add_option("--mass-sigma-percent", options.mass_sigma_percent,
+                  "how well the mass is known, 1 standard deviation")
+      .check(command_line::range(0.0, 50.0));
+  verb.add_option("--at-sigma-mm", options.at_sigma_mm, "how well the point is known")
+      .check(command_line::range(0.0, 50.0));
+  auto board = verb.add_option("--board", options.board,
+                               "a load cell of this board to push with: its port, or auto");
+  auto direction = vector("--direction", options.direction,
+                          "x,y,z: of the force on the platform when the cell is pushed");
+  verb.add_option("--cells", options.cells,
+                  "calibration file of its load cells; without it the one kept for this board")
+      .needs(board);
+  verb.add_option("--channel", options.channel, "of the load cell")
+      .check(command_line::range(0, 3))
+      .needs(board);
+  verb.add_option("--emulated-cell", options.emulated_cell,
+                  "with --source sim and an emulated board: the pipe that the board reads its "
+                  "orders from, so that its cell feels the simulated hand")
+      .needs(board);
+  mass.needs(at);
+  board.needs(at);
+  board.needs(direction);
+  direction.needs(board);
+  mass.excludes(board);
+}
+
+}  // namespace
+
+void check_command(command_line::Command program) {
+  const auto o = std::make_shared<CheckOptions>();
+  auto verb = program.add_subcommand(
+      "check", "say line by line whether a calibrated sensor still measures what it did");
+  verb.add_option("--sensor", o->sensor, "sensor.yaml of this sensor").required();
+  verb.add_option("--source", o->source,
+                  source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}))
+      .required();
+  add_events_option(verb, o->events);
+  add_load_options(verb, *o);
+  verb.runs([o] { return check(*o); });
 }
 
 }  // namespace tagwrench

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <exception>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -53,59 +52,39 @@ Events::Events(int fd) noexcept : fd_(fd) {
 
 void Events::line(std::string_view kind, const std::string& text) noexcept {
   if (!on()) return;
-  try {
-    send({{"line", {{"kind", kind}, {"text", text}}}});
-  } catch (const std::exception&) {
-    return;  // out of memory: untold
-  }
+  send({{"line", {{"kind", kind}, {"text", text}}}});
 }
 
 void Events::live(const std::string& text) noexcept {
   if (!on() || !due(live_, kLiveEventEvery)) return;
-  try {
-    send({{"live", text}});
-  } catch (const std::exception&) {
-    return;
-  }
+  send({{"live", text}});
 }
 
 void Events::progress(double part) noexcept {
   const int percent = std::isfinite(part) ? static_cast<int>(std::lround(100 * part)) : 0;
   if (!on() || percent == percent_) return;
-  try {
-    if (send({{"progress", std::clamp(percent, 0, 100) / 100.0}})) percent_ = percent;
-  } catch (const std::exception&) {
-    return;
-  }
+  if (send({{"progress", std::clamp(percent, 0, 100) / 100.0}})) percent_ = percent;
 }
 
 void Events::coverage(std::initializer_list<std::pair<const char*, Seen>> seen) noexcept {
   if (!on()) return;
-  try {
-    nlohmann::json coverage = nlohmann::json::object();
-    for (const auto& [name, value] : seen)
-      std::visit([&, key = name](const auto& v) { coverage[key] = v; }, value);
-    std::string text = dump_json(coverage);
-    if (text == coverage_) return;
-    if (send({{"coverage", coverage}})) coverage_ = std::move(text);
-  } catch (const std::exception&) {
-    return;
-  }
+  nlohmann::json coverage = nlohmann::json::object();
+  for (const auto& [name, value] : seen)
+    std::visit([&, key = name](const auto& v) { coverage[key] = v; }, value);
+  std::string text = dump_json(coverage);
+  if (text == coverage_) return;
+  if (send({{"coverage", coverage}})) coverage_ = std::move(text);
 }
 
 void Events::picture(const ImageView& image, std::span<const TagCorners> tags) noexcept {
   if (!on() || !rest_.empty() || !due(picture_, kPictureEventEvery)) return;
-  try {
-    nlohmann::json outlines = nlohmann::json::array();
-    for (const TagCorners& tag : tags) outlines.push_back({{"id", tag.id}, {"px", tag.px}});
-    send({{"picture",
-           {{"width", image.width},
-            {"height", image.height},
-            {"tags", std::move(outlines)},
-            {"jpeg", jpeg_in_base64(image)}}}});
-  } catch (const std::exception&) {
-    return;
-  }
+  nlohmann::json outlines = nlohmann::json::array();
+  for (const TagCorners& tag : tags) outlines.push_back({{"id", tag.id}, {"px", tag.px}});
+  send({{"picture",
+         {{"width", image.width},
+          {"height", image.height},
+          {"tags", std::move(outlines)},
+          {"jpeg", jpeg_in_base64(image)}}}});
 }
 
 bool Events::due(TimePoint& last, Duration every) const noexcept {

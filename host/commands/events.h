@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "host/core/command_line/command_line.h"
 #include "host/core/types.h"
 
 namespace tagwrench {
@@ -53,6 +54,11 @@ class Events {
   int percent_ = -1;      ///< told last
   std::string coverage_;  ///< told last
 };
+
+/// The option by which a program that starts a verb asks for its events; no help mentions it.
+inline void add_events_option(command_line::Command verb, int& descriptor) {
+  verb.add_option("--events", descriptor).hidden().check(command_line::range(3, 1023));
+}
 
 /// The outline of a board as a tag's, from where its corners are; nothing where there are none.
 std::vector<TagCorners> outline_of(std::span<const std::array<double, 2>> corners_px);

@@ -1,17 +1,26 @@
-#include "host/commands/gadget_command.h"
-
+// `tagwrench gadget`: this computer as a USB device of another one.
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdio>
-
+#include "host/commands/commands.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
-#include "host/output/gadget_daemon.h"
-#include "host/output/uhid_device.h"
+#include "host/output/gadget_output.h"
+#include "host/output/gadget_tree.h"
+#include "host/output/hid_outputs.h"
 
 namespace tagwrench {
 namespace {
+
+struct GadgetCommandOptions {
+  KernelPlaces places;
+  GadgetInheritance inherited;  ///< of `keep`
+  std::string name = "sensor";
+  std::string face = "spacemouse";
+  std::string id;
+  std::string udc;
+  bool self_powered = false;
+};
 
 std::string described(const GadgetFound& gadget) {
   return fmt::format("{} {}", face_name(*gadget.face), hex_id(gadget.id.vendor, gadget.id.product));
@@ -62,95 +71,55 @@ std::string run_command_of(const std::string& name) {
   return "tagwrench run --output gadget" + more;
 }
 
-}  // namespace
-
-GadgetCommand::GadgetCommand(command_line::Command program)
-    : verb_(program.add_subcommand("gadget", "be a USB device of another computer")),
-      keep_(verb_.add_subcommand("keep", "").hidden()),
-      up_(verb_.add_subcommand("up", "make the device and offer it at the USB device port")),
-      down_(verb_.add_subcommand("down", "take it away; done if it is not there")) {
-  verb_.require_subcommand();
-  verb_.add_subcommand("status", "device ports of this computer, and what is on them");
-  verb_.footer("`tagwrench run --output gadget` then feeds it. Only up and down need root.");
-  for (command_line::Command command : {up_, down_}) {
-    command.add_option("--name", name_, "of the sensor, as `tagwrench run --name` has it")
-        .capture_default_str();
-  }
-  up_.add_option("--face", face_, "what the other computer sees")
-      .check(command_line::one_of({"spacemouse", "wrench"}))
-      .capture_default_str();
-  up_.add_option("--id", id_, "VENDOR:PRODUCT; without it 256f:c62e, and of the wrench 1209:7a6e");
-  up_.add_option("--udc", udc_, "USB device controller; without it the first free one");
-  keep_.add_option("--face", face_).check(command_line::one_of({"spacemouse", "wrench"}));
-  keep_.add_option("--sysfs", inherited_.places.sysfs);
-  keep_.add_option("--devices", inherited_.places.devices);
-  keep_.add_option("--function", inherited_.function).required();
-  keep_.add_option("--node", inherited_.node).required();
-  up_.add_flag("--self-powered", self_powered_,
-               "the board has a supply of its own; without it up to 500 mA are asked for");
-}
-
-int GadgetCommand::run() const {
-  if (keep_.parsed()) {
-    GadgetInheritance given = inherited_;
-    given.face = face_of(face_).value();
-    keep_gadget(given);
-  } else if (up_.parsed()) {
-    up();
-  } else if (down_.parsed()) {
-    down();
-  } else {
-    status();
-  }
-  return 0;
-}
-
-void GadgetCommand::up() const {
+int bring_up(const GadgetCommandOptions& o) {
   GadgetFiles files;
-  GadgetTree tree(files, places_.gadgets());
-  GadgetSpec spec = spec_of(name_, face_, id_, self_powered_);
-  check_gadget_name(name_);
-  const std::string ours = std::string(kGadgetPrefix) + name_;
-  choose_controller(controllers(files, places_, tree.all()), udc_, ours);
-  prepare_kernel(files, places_, run_program);
-  need_root(places_, "up", name_);
-  const UniqueFd lock = lock_gadgets(places_);
+  GadgetTree tree(files, o.places.gadgets());
+  GadgetSpec spec = spec_of(o.name, o.face, o.id, o.self_powered);
+  check_gadget_name(o.name);
+  const std::string ours = std::string(kGadgetPrefix) + o.name;
+  choose_controller(controllers(files, o.places, tree.all()), o.udc, ours);
+  prepare_kernel(files, o.places, run_program);
+  need_root(o.places, "up", o.name);
+  const UniqueFd lock = lock_gadgets(o.places);
   const Controller controller =
-      choose_controller(controllers(files, places_, tree.all()), udc_, ours);
+      choose_controller(controllers(files, o.places, tree.all()), o.udc, ours);
   spec.udc = controller.name;
-  if (const std::optional<GadgetFound> found = tree.find(name_)) {
+  if (const std::optional<GadgetFound> found = tree.find(o.name)) {
     if (same(*found, spec, controller)) {
       log_info(fmt::format("gadget {}: is up already on {}; feed it: {}", ours, found->udc,
-                           run_command_of(name_)));
-      return;
+                           run_command_of(o.name)));
+      return 0;
     }
-    rest(files, places_, tree, *found);
+    rest(files, o.places, tree, *found);
   }
   tree.up(spec);
   log_info(fmt::format("gadget {}: up on {} as {}; feed it: {}", ours, spec.udc,
-                       described(tree.find(name_).value()), run_command_of(name_)));
+                       described(tree.find(o.name).value()), run_command_of(o.name)));
+  return 0;
 }
 
-void GadgetCommand::down() const {
+int take_down(const GadgetCommandOptions& o) {
   GadgetFiles files;
-  GadgetTree tree(files, places_.gadgets());
-  const std::string ours = std::string(kGadgetPrefix) + name_;
-  if (!tree.find(name_)) {
+  GadgetTree tree(files, o.places.gadgets());
+  const std::string ours = std::string(kGadgetPrefix) + o.name;
+  if (!tree.find(o.name)) {
     log_info(fmt::format("gadget {}: is not up", ours));
-    return;
+    return 0;
   }
-  need_root(places_, "down", name_);
-  const UniqueFd lock = lock_gadgets(places_);
-  if (const std::optional<GadgetFound> found = tree.find(name_)) rest(files, places_, tree, *found);
-  tree.down(name_);
+  need_root(o.places, "down", o.name);
+  const UniqueFd lock = lock_gadgets(o.places);
+  if (const std::optional<GadgetFound> found = tree.find(o.name))
+    rest(files, o.places, tree, *found);
+  tree.down(o.name);
   log_info(fmt::format("gadget {}: taken down", ours));
+  return 0;
 }
 
-void GadgetCommand::status() const {
+int show_status(const GadgetCommandOptions& o) {
   GadgetFiles files;
-  const GadgetTree tree(files, places_.gadgets());
+  const GadgetTree tree(files, o.places.gadgets());
   const std::vector<GadgetFound> gadgets = tree.all();
-  const std::vector<Controller> ports = controllers(files, places_, gadgets);
+  const std::vector<Controller> ports = controllers(files, o.places, gadgets);
   for (const Controller& one : ports) {
     fmt::print("controller {}: {}, {}, {}\n", one.name, one.state, one.speed,
                one.owner.empty() ? "free" : "has " + one.owner);
@@ -161,18 +130,58 @@ void GadgetCommand::status() const {
       continue;
     }
     const std::string node =
-        gadget_node(files, places_, tree.function(*gadget.name(), *gadget.face)).value_or("");
+        gadget_node(files, o.places, tree.function(*gadget.name(), *gadget.face)).value_or("");
     fmt::print("gadget {}: {}, serial {}, {}, {}\n", gadget.folder, described(gadget),
                gadget.serial, gadget.udc.empty() ? "not bound" : "on " + gadget.udc,
-               node.empty() ? "no node" : places_.devices + "/" + node);
+               node.empty() ? "no node" : o.places.devices + "/" + node);
   }
   std::fflush(stdout);
-  if (!ports.empty()) return;
+  if (!ports.empty()) return 0;
   try {
     choose_controller(ports, "", "");
   } catch (const ConfigError& none) {
     log_info(none.what());
   }
+  return 0;
+}
+
+}  // namespace
+
+void gadget_command(command_line::Command program) {
+  const auto o = std::make_shared<GadgetCommandOptions>();
+  auto verb = program.add_subcommand("gadget", "be a USB device of another computer");
+  verb.require_subcommand();
+  auto keep = verb.add_subcommand("keep", "").hidden();
+  auto up = verb.add_subcommand("up", "make the device and offer it at the USB device port");
+  auto down = verb.add_subcommand("down", "take it away; done if it is not there");
+  for (command_line::Command command : {up, down}) {
+    command.add_option("--name", o->name, "of the sensor, as `tagwrench run --name` has it")
+        .capture_default_str();
+  }
+  up.add_option("--face", o->face, "what the other computer sees")
+      .check(command_line::one_of({"spacemouse", "wrench"}))
+      .capture_default_str();
+  up.add_option("--id", o->id, "VENDOR:PRODUCT; without it 256f:c62e, and of the wrench 1209:7a6e");
+  up.add_option("--udc", o->udc, "USB device controller; without it the first free one");
+  keep.add_option("--face", o->face).check(command_line::one_of({"spacemouse", "wrench"}));
+  keep.add_option("--sysfs", o->inherited.places.sysfs);
+  keep.add_option("--devices", o->inherited.places.devices);
+  keep.add_option("--function", o->inherited.function).required();
+  keep.add_option("--node", o->inherited.node).required();
+  up.add_flag("--self-powered", o->self_powered,
+              "the board has a supply of its own; without it up to 500 mA are asked for");
+  keep.runs([o] {
+    o->inherited.face = face_of(o->face).value();
+    keep_gadget(o->inherited);
+    return 0;
+  });
+  up.runs([o] { return bring_up(*o); });
+  down.runs([o] { return take_down(*o); });
+  verb.add_subcommand("status", "device ports of this computer, and what is on them").runs([o] {
+    return show_status(*o);
+  });
+  // Last: the verbs below would have it too.
+  verb.footer("`tagwrench run --output gadget` then feeds it. Only up and down need root.");
 }
 
 }  // namespace tagwrench

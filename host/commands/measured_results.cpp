@@ -1,14 +1,16 @@
 #include "host/commands/measured_results.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <ctime>
 #include <system_error>
 
-#include "host/commands/today.h"
 #include "host/core/config_error.h"
+#include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
+#include "host/sensor/measured_files.h"
 #include "host/sensor/sensor_config.h"
-#include "host/sensor/sensor_identity.h"
 
 namespace tagwrench {
 namespace {
@@ -24,6 +26,13 @@ SensorConfig as_it_is(const fs::path& sensor) {
 }
 
 }  // namespace
+
+int stopped_unwritten() {
+  log_info("stopped; nothing was written");
+  return kExitStopped;
+}
+
+std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::localtime(std::time(nullptr))); }
 
 MeasuredStamp stamp_for(const fs::path& sensor) {
   std::error_code error;

@@ -1,4 +1,4 @@
-// What calibrations and `zero` share about the folder measured/.
+// What calibrations and `zero` share: the folder measured/, dates, and an end before the result.
 #pragma once
 
 #include <filesystem>
@@ -8,6 +8,14 @@
 #include "host/sensor/measured_files.h"
 
 namespace tagwrench {
+
+/// Exit status of a calibration that its user has stopped.
+inline constexpr int kExitStopped = 1;
+/// Says so, where nothing was written, and returns it.
+int stopped_unwritten();
+
+/// YYYY-MM-DD, here.
+std::string today();
 
 /// Today, by this program, for this sensor.yaml.
 MeasuredStamp stamp_for(const std::filesystem::path& sensor);

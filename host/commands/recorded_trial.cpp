@@ -8,12 +8,12 @@
 #include <cmath>
 #include <fstream>
 
-#include "host/app/recording_sensor.h"
+#include "host/app/recording.h"
 #include "host/calibration/analysis/trial_csv.h"
 #include "host/core/config_error.h"
 #include "host/core/count_text.h"
 #include "host/recording/reader.h"
-#include "host/sensor/sensor_identity.h"
+#include "host/sensor/measured_files.h"
 
 namespace tagwrench {
 namespace {

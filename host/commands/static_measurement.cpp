@@ -7,6 +7,7 @@
 
 #include "host/app/input.h"
 #include "host/calibration/light/control.h"
+#include "host/core/axis_names.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/tracker/acquire.h"
@@ -87,21 +88,12 @@ StaticMeasurement::StaticMeasurement(const SensorConfig& sensor, Duration wanted
 void StaticMeasurement::restart() {
   since_.reset();
   counted_ = {};
-  frames_ = held_ = 0;
-  wrench_sum_.setZero();
-  variance_sum_.setZero();
-  displacement_sum_.setZero();
-  residual_sum_ = 0;
-  for (Alone& tag : alone_) {
-    tag.held = 0;
-    tag.displacement.setZero();
-    tag.covariance.setZero();
-    tag.residual_fraction = tag.blur_px2 = 0;
-  }
+  sum_ = {};
+  for (Alone& tag : alone_) tag.sum = {};
 }
 
 void StaticMeasurement::wait_for_change(double least) {
-  before_ = held_ > 0 ? (wrench_sum_ / held_).eval() : Vector6::Zero().eval();
+  before_ = sum_.held > 0 ? (sum_.wrench / sum_.held).eval() : Vector6::Zero().eval();
   least_change_ = least;
   begin_.reset();
   moved_ = false;
@@ -139,21 +131,21 @@ StaticMeasurement::Progress StaticMeasurement::add(const Frame& frame) {
   }
   if (!since_) since_ = frame.capture_time;
   counted_ = frame.capture_time - *since_;
-  ++frames_;
+  ++sum_.frames;
   if (carries_numbers(sample.status)) {
-    ++held_;
-    wrench_sum_ += sample.wrench;
-    variance_sum_ += sample.wrench_sigma.cwiseAbs2();
-    displacement_sum_ += track.displacement;
-    residual_sum_ += track.residual_fraction;
+    ++sum_.held;
+    sum_.wrench += sample.wrench;
+    sum_.variance += sample.wrench_sigma.cwiseAbs2();
+    sum_.displacement += track.displacement;
+    sum_.residual_fraction += track.residual_fraction;
   }
   for (Alone& tag : alone_) {
     if (tag.last.status != Status::ok) continue;
-    ++tag.held;
-    tag.displacement += tag.last.displacement;
-    tag.covariance += tag.last.covariance;
-    tag.residual_fraction += tag.last.residual_fraction;
-    tag.blur_px2 += tag.last.blur_px2;
+    ++tag.sum.held;
+    tag.sum.displacement += tag.last.displacement;
+    tag.sum.covariance += tag.last.covariance;
+    tag.sum.residual_fraction += tag.last.residual_fraction;
+    tag.sum.blur_px2 += tag.last.blur_px2;
   }
   if (counted_ < wanted_) return late ? Progress::gave_up : Progress::waiting;
   note_picture(frame);
@@ -166,32 +158,34 @@ void StaticMeasurement::note_picture(const Frame& frame) {
 
 AtRest StaticMeasurement::result() const {
   AtRest rest;
-  rest.frames = frames_;
+  rest.frames = sum_.frames;
   rest.rest_frames = sensor_.rest.appearance->frames;
   for (const Alone& tag : alone_) {
-    const double n = std::max(1, tag.held);
+    const double n = std::max(1, tag.sum.held);
     rest.tags.push_back({.id = tag.id,
-                         .held = frames_ > 0 && tag.held >= kHeldFraction * frames_,
+                         .held = sum_.frames > 0 && tag.sum.held >= kHeldFraction * sum_.frames,
                          .centre = tag.centre,
-                         .displacement = tag.displacement / n,
-                         .covariance = tag.covariance / n,
-                         .residual_fraction = tag.residual_fraction / n,
-                         .blur_px2 = tag.blur_px2 / n});
+                         .displacement = tag.sum.displacement / n,
+                         .covariance = tag.sum.covariance / n,
+                         .residual_fraction = tag.sum.residual_fraction / n,
+                         .blur_px2 = tag.sum.blur_px2 / n});
   }
   rest.now = now_;
   rest.then = then_;
-  rest.held = frames_ > 0 && held_ >= kHeldFraction * frames_;
-  rest.residual_fraction = residual_sum_ / std::max(1, held_);
-  rest.wrench = wrench_sum_ / std::max(1, held_) - sensor_.zero.set;
+  rest.held = sum_.frames > 0 && sum_.held >= kHeldFraction * sum_.frames;
+  rest.residual_fraction = sum_.residual_fraction / std::max(1, sum_.held);
+  rest.wrench = sum_.wrench / std::max(1, sum_.held) - sensor_.zero.set;
   rest.range = sensor_.wrench.range;
   return rest;
 }
 
 Vector6 StaticMeasurement::wrench_sigma() const {
-  return (variance_sum_ / std::max(1, held_)).cwiseSqrt();
+  return (sum_.variance / std::max(1, sum_.held)).cwiseSqrt();
 }
 
-Vector6 StaticMeasurement::displacement() const { return displacement_sum_ / std::max(1, held_); }
+Vector6 StaticMeasurement::displacement() const {
+  return sum_.displacement / std::max(1, sum_.held);
+}
 
 Seen watch(FrameSource& source, const UniqueFd& stop, StaticMeasurement& static_measurement,
            Events& events, Output* board) {
@@ -221,6 +215,137 @@ std::string why_nothing(Seen seen, const StaticMeasurement& static_measurement) 
     return "it never stood still: hands off, no wind, and no mass that swings";
   return static_measurement.result().frames > 0 ? ""
                                                 : "too few frames: it takes 3 s with hands off";
+}
+
+namespace {
+
+constexpr const char* kAgain = "`tagwrench calibrate target`, then `tagwrench calibrate wrench`";
+
+/// In the order of Subject.
+constexpr const char* kSubjects[] = {"light", "focus", "tags", "residual", "zero", "scale"};
+
+std::string moved(const Vector6& move) {
+  return fmt::format("by {:.1f} um ({:+.1f} {:+.1f} {:+.1f}) and {:.1f} mrad",
+                     move.head<3>().norm() * 1e6, move[0] * 1e6, move[1] * 1e6, move[2] * 1e6,
+                     move.tail<3>().norm() * 1e3);
+}
+
+std::string fine(const InSituFinding& f) {
+  switch (f.subject) {
+    case Subject::light:
+      return fmt::format("the tags' white is at {:.0f} of 255; {:.0f} when calibrated", f.amount,
+                         f.expected);
+    case Subject::focus:
+      return fmt::format("the variance of the edges' blur has changed by {:+.2f} px^2", f.amount);
+    case Subject::tags:
+      return fmt::format("they agree to {:.1f} um and {:.1f} mrad", f.move.head<3>().norm() * 1e6,
+                         f.move.tail<3>().norm() * 1e3);
+    case Subject::residual:
+      return fmt::format("{:.1f} % of the contrast is not explained by the picture at rest",
+                         100 * f.amount);
+    case Subject::zero:
+      return fmt::format("reads {:+.2f} % of the range on {}", 100 * f.amount, kWrenchAxes[f.axis]);
+    case Subject::scale:
+      return fmt::format("measured / known = {:.4f} +/- {:.4f}", f.amount, f.sigma);
+  }
+  return "";
+}
+
+std::string not_known(Subject subject) {
+  switch (subject) {
+    case Subject::tags:
+      return "one tag alone: nothing tells whether it has slipped";
+    case Subject::zero:
+      return "cannot be told: the tags disagree or are not held (see above), or no range is known";
+    case Subject::scale:
+      return "the load did not act long enough, or far too little";
+    case Subject::light:
+    case Subject::focus:
+    case Subject::residual:
+      break;
+  }
+  return "no tag is held: see the other lines";
+}
+
+std::string wrong(const InSituFinding& f) {
+  switch (f.fault) {
+    case Fault::too_dark:
+      return fmt::format(
+          "too dark: the tags' white is at {:.0f} of 255, at {:.0f} when calibrated: mend the "
+          "light, "
+          "or let `run --board` set it",
+          f.amount, f.expected);
+    case Fault::too_bright:
+      return fmt::format(
+          "too bright: {:.0f} % of the tags are clipped, {:.0f} % when calibrated: less light or a "
+          "shorter exposure",
+          100 * f.amount, 100 * f.expected);
+    case Fault::out_of_focus:
+      if (f.expected > 0) {
+        return fmt::format(
+            "out of focus: edges are blurred by {:.1f} px, by {:.1f} when calibrated: focus again; "
+            "if it stays, {}",
+            f.amount, f.expected, kAgain);
+      }
+      return fmt::format(
+          "the lens has moved: the variance of the edges' blur has changed by {:+.2f} px^2: focus "
+          "again; if it stays, {}",
+          f.amount, kAgain);
+    case Fault::tag_not_seen:
+      return fmt::format(
+          "tag {} is not held: is it covered, dirty, out of focus or loose? then check again",
+          f.tag);
+    case Fault::tag_moved:
+      return fmt::format("tag {} has moved {} against the other: fix it, then {}", f.tag,
+                         moved(f.move), kAgain);
+    case Fault::some_tag_moved:
+      return fmt::format("a tag has moved {} against another, perhaps tag {}: fix them, then {}",
+                         moved(f.move), f.tag, kAgain);
+    case Fault::residual_grown:
+      return fmt::format(
+          "{:.1f} % of tag {}'s contrast is not explained by the picture at rest (up to {:.0f} % "
+          "is "
+          "fine): clean tag and lens, look for glare; if it stays, {}",
+          100 * f.amount, f.tag, 100 * f.expected, kAgain);
+    case Fault::zero_drifted:
+      return fmt::format("reads {:+.1f} % of the range on {} with hands off: `tagwrench zero`",
+                         100 * f.amount, kWrenchAxes[f.axis]);
+    case Fault::rest_elsewhere:
+      return fmt::format(
+          "reads {:+.0f} % of the range on {} with hands off, too far for drift: take off what "
+          "lies "
+          "on it; in another mounting, {}",
+          100 * f.amount, kWrenchAxes[f.axis], kAgain);
+    case Fault::scale_wrong:
+      return fmt::format(
+          "measured / known = {:.4f} +/- {:.4f}: `tagwrench calibrate wrench`, if the load is "
+          "right",
+          f.amount, f.sigma);
+    case Fault::load_elsewhere:
+      return fmt::format(
+          "{:.0f} % of the range on {} is not what this load does (scale {:.3f}): check where it "
+          "takes hold and which way it pulls (--at, --gravity, --direction); if they are right, "
+          "`tagwrench calibrate wrench`",
+          100 * f.expected, kWrenchAxes[f.axis], f.amount);
+    case Fault::none:
+    case Fault::not_known:
+      break;
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string text(const InSituFinding& finding) {
+  const bool unknown = finding.fault == Fault::not_known;
+  return fmt::format("{:<7}{:<10}{}",
+                     finding.fine() ? "fine"
+                     : unknown      ? "?"
+                                    : "OFF",
+                     kSubjects[static_cast<int>(finding.subject)],
+                     finding.fine() ? fine(finding)
+                     : unknown      ? not_known(finding.subject)
+                                    : wrong(finding));
 }
 
 }  // namespace tagwrench

@@ -1,4 +1,5 @@
-// The sensor standing still for some seconds: what all its tags say together, and each alone.
+// The sensor standing still for some seconds, for `check` and `zero`: what all its tags say
+// together and each alone, and in words what was found.
 #pragma once
 
 #include <algorithm>
@@ -66,10 +67,18 @@ class StaticMeasurement {
     std::unique_ptr<Tracker> tracker;
     StationarityDetector meter;
     Track last{};
-    int held = 0;
-    Vector6 displacement = Vector6::Zero();
-    Matrix6 covariance = Matrix6::Zero();
-    double residual_fraction = 0, blur_px2 = 0;
+    struct {
+      int held = 0;
+      Vector6 displacement = Vector6::Zero();
+      Matrix6 covariance = Matrix6::Zero();
+      double residual_fraction = 0, blur_px2 = 0;
+    } sum = {};
+  };
+  /// Of all tags together, over frames that stood still.
+  struct Sums {
+    int frames = 0, held = 0;
+    Vector6 wrench = Vector6::Zero(), variance = Vector6::Zero(), displacement = Vector6::Zero();
+    double residual_fraction = 0;
   };
 
   void restart();
@@ -89,11 +98,7 @@ class StaticMeasurement {
   double least_change_ = 0;
   Vector6 before_ = Vector6::Zero();
 
-  int frames_ = 0;
-  int held_ = 0;
-  Vector6 wrench_sum_ = Vector6::Zero(), variance_sum_ = Vector6::Zero();
-  Vector6 displacement_sum_ = Vector6::Zero();
-  double residual_sum_ = 0;
+  Sums sum_;
   TagPicture now_, then_;
 };
 
@@ -106,5 +111,8 @@ Seen watch(FrameSource& source, const UniqueFd& stop, StaticMeasurement& static_
 
 /// Why watch() saw too little, in words; empty if there is something to judge.
 std::string why_nothing(Seen seen, const StaticMeasurement& static_measurement);
+
+/// In one line, with what to do: "fine   light     white at 190 of 255, as at rest".
+std::string text(const InSituFinding& finding);
 
 }  // namespace tagwrench

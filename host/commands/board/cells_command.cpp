@@ -11,10 +11,11 @@
 
 #include "host/app/board/board_loop.h"
 #include "host/board/cell_calibration.h"
-#include "host/commands/board/options.h"
+#include "host/commands/board/board.h"
+#include "host/commands/commands.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
-#include "host/output/text_sink.h"
+#include "host/output/line_outputs.h"
 
 namespace tagwrench {
 namespace {
@@ -144,11 +145,9 @@ std::string file_to_write(const BoardOptions& options, const link::BoardSession&
   return path;
 }
 
-int say(const std::string& text) {
-  TextSink out("-", /*lossless=*/true);
-  if (out.write(text) != SendStatus::failed) return 0;
-  log_info(out.failure());
-  return 1;
+int stopped_unchanged() {
+  log_info("stopped; nothing was changed");
+  return 0;
 }
 
 }  // namespace
@@ -171,19 +170,13 @@ int board_calibrate_cell(const BoardOptions& options) {
                  : fmt::format("put {:g} kg on load cell {}, let it come to rest, press Enter",
                                mass, options.channel));
     const Key key = wait_for_key(loop);
-    if (key == Key::stopped) {
-      log_info("stopped; nothing was changed");
-      return 0;
-    }
+    if (key == Key::stopped) return stopped_unchanged();
     if (key == Key::ended)
       throw ConfigError(fmt::format(
           "calibrate-cell: standard input ended before {:g} kg; one line per mass is needed",
           mass));
     const auto mean = measure(loop, options);
-    if (!mean) {
-      log_info("stopped; nothing was changed");
-      return 0;
-    }
+    if (!mean) return stopped_unchanged();
     if (mean->saturated) {
       throw ConfigError(fmt::format(
           "calibrate-cell: load cell {} is at the end of its amplifier's range under {:g} kg; take "
@@ -200,13 +193,14 @@ int board_calibrate_cell(const BoardOptions& options) {
   cell = link::fit_cell(points, options.gravity);
   cell.noise_counts = std::sqrt(variance / static_cast<double>(points.size()));
   link::save_cells(path, id, cells);
-  return say(fmt::format(
+  print_data(fmt::format(
       "cell {}: {:.6g} N per count +- {:.2g} %, zero at {:.1f} counts, noise {:.2g} N{}\nkept in "
       "{}\n",
       options.channel, cell.newtons_per_count,
       100 * std::abs(cell.newtons_per_count_sigma / cell.newtons_per_count), cell.zero_counts,
       std::abs(cell.noise_counts * cell.newtons_per_count),
       points.size() > 2 ? fmt::format(", {:.2g} N off the line", cell.residual_n) : "", path));
+  return 0;
 }
 
 int board_tare(const BoardOptions& options) {
@@ -231,10 +225,7 @@ int board_tare(const BoardOptions& options) {
   }
   if (!wait_for_cells(loop, mask)) return 0;
   const auto tared = tare(loop, options, mask);
-  if (!tared) {
-    log_info("stopped; nothing was changed");
-    return 0;
-  }
+  if (!tared) return stopped_unchanged();
   std::string report;
   for (const link::TareResult& result : *tared) {
     link::CellCalibration& cell = cells[result.channel];
@@ -255,7 +246,8 @@ int board_tare(const BoardOptions& options) {
   }
   link::save_cells(path, link::id_text(loop.session().hello().unique_id), cells);
   if (!left_out.empty()) log_info(fmt::format("left out, not calibrated: load cell {}", left_out));
-  return say(fmt::format("{}kept in {}\n", report, path));
+  print_data(fmt::format("{}kept in {}\n", report, path));
+  return 0;
 }
 
 }  // namespace tagwrench

@@ -14,11 +14,12 @@
 #include <string_view>
 
 #include "host/app/board/board_loop.h"
-#include "host/board/serial_places.h"
-#include "host/commands/board/options.h"
+#include "host/board/serial_port.h"
+#include "host/commands/board/board.h"
+#include "host/commands/commands.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
-#include "host/output/text_sink.h"
+#include "host/output/line_outputs.h"
 
 extern char** environ;
 
@@ -143,8 +144,8 @@ int board_flash(const BoardOptions& options) {
   const std::string port = flash_port(options);
   const std::vector<std::string> arguments = avrdude_arguments(options, port, image);
   if (options.dry_run) {
-    TextSink out("-", /*lossless=*/true);
-    return out.write(fmt::format("{}\n", fmt::join(arguments, " "))) == SendStatus::failed ? 1 : 0;
+    print_data(fmt::format("{}\n", fmt::join(arguments, " ")));
+    return 0;
   }
   { const link::SerialPort free(port, link::kBaud); }  // or it says what is the matter
   log_info(fmt::format("running {}", fmt::join(arguments, " ")));

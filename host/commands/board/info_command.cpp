@@ -5,10 +5,11 @@
 
 #include "host/app/board/board_loop.h"
 #include "host/board/cell_calibration.h"
-#include "host/commands/board/options.h"
+#include "host/commands/board/board.h"
+#include "host/commands/commands.h"
 #include "host/core/json/json_text.h"
 #include "host/core/log.h"
-#include "host/output/text_sink.h"
+#include "host/output/line_outputs.h"
 
 namespace tagwrench {
 namespace {
@@ -106,12 +107,9 @@ std::string as_json(const BoardSession& session, const std::string& port) {
 int board_info(const BoardOptions& options) {
   BoardLoop loop(options.port, session_options(options));
   if (!loop.settle()) return 0;
-  TextSink out("-", /*lossless=*/true);
-  const std::string text = options.json ? as_json(loop.session(), loop.link().port())
-                                        : for_people(loop.session(), loop.link().port());
-  if (out.write(text) != SendStatus::failed) return 0;
-  log_info(out.failure());
-  return 1;
+  print_data(options.json ? as_json(loop.session(), loop.link().port())
+                          : for_people(loop.session(), loop.link().port()));
+  return 0;
 }
 
 }  // namespace tagwrench

@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <initializer_list>
+#include <optional>
 
 #include "host/app/board/board_loop.h"
-#include "host/commands/board/options.h"
+#include "host/commands/board/board.h"
+#include "host/core/command_line/command_line.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 
@@ -32,36 +32,29 @@ struct Light {
 
 Light light_of(const BoardOptions& options) {
   const std::vector<std::string>& words = options.light;
-  const auto number = [&](std::size_t i, double least, double most) {
-    double value = 0;
-    const char* end = words[i].data() + words[i].size();
-    const auto [stop, error] = std::from_chars(words[i].data(), end, value);
-    if (error != std::errc() || stop != end || !(value >= least && value <= most))
-      not_a_light(options);
-    return value;
+  const auto number = [&](const std::string& text, double least, double most) {
+    const std::optional<double> value = command_line::to_number(text);
+    if (!value || !(*value >= least && *value <= most)) not_a_light(options);
+    return *value;
   };
   Light out;
   const std::size_t count = words.size();
   if (words[0] == "off" && count == 1) return out;
   if (words[0] == "strobe" && (count == 3 || count == 4)) {
     out.led.mode = link::LedMode::strobe;
-    out.led.period_us = static_cast<std::uint32_t>(number(1, 1, 60e6));
-    out.led.width_us = static_cast<std::uint16_t>(number(2, 1, 65535));
-    if (count == 4) out.phase_us = number(3, -60e6, 60e6);
+    out.led.period_us = static_cast<std::uint32_t>(number(words[1], 1, 60e6));
+    out.led.width_us = static_cast<std::uint16_t>(number(words[2], 1, 65535));
+    if (count == 4) out.phase_us = number(words[3], -60e6, 60e6);
     return out;
   }
   if (words[0] == "pattern" && count <= 3) {
     out.led.mode = link::LedMode::pattern;
-    out.led.period_us = static_cast<std::uint32_t>(count > 1 ? number(1, 1, 60e6) : 7000);
-    out.led.pattern_seed = static_cast<std::uint16_t>(count > 2 ? number(2, 1, 32767) : 1);
+    out.led.period_us = static_cast<std::uint32_t>(count > 1 ? number(words[1], 1, 60e6) : 7000);
+    out.led.pattern_seed = static_cast<std::uint16_t>(count > 2 ? number(words[2], 1, 32767) : 1);
     return out;
   }
   if (count != 1 || words[0].back() != '%') not_a_light(options);
-  double percent = 0;
-  const char* end = words[0].data() + words[0].size() - 1;
-  const auto [stop, error] = std::from_chars(words[0].data(), end, percent);
-  if (error != std::errc() || stop != end || !(percent >= 0 && percent <= 100))
-    not_a_light(options);
+  const double percent = number(words[0].substr(0, words[0].size() - 1), 0, 100);
   out.led.mode = link::LedMode::steady;
   out.led.level_permille = static_cast<std::uint16_t>(std::lround(percent * 10));
   return out;

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <array>
 
-#include "host/board/optoforce_sensor.h"
-#include "host/commands/board/options.h"
+#include "host/board/optoforce.h"
+#include "host/commands/board/board.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/output/text_sink.h"
+#include "host/output/line_outputs.h"
 
 namespace tagwrench {
 namespace {

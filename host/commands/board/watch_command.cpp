@@ -1,14 +1,157 @@
-// `tagwrench board watch` and `tagwrench board log`.
+// `tagwrench board watch` and `tagwrench board log`: samples of a board as lines, CSV and JSON for
+// programs, a line of all cells for people.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+
 #include "host/board/cell_calibration.h"
-#include "host/commands/board/options.h"
-#include "host/commands/board/text.h"
+#include "host/commands/board/board.h"
 #include "host/core/log.h"
-#include "host/output/text_sink.h"
+#include "host/output/line_outputs.h"
 
 namespace tagwrench {
 namespace {
+
+constexpr const char* kBoardCsvHeader =
+    "kind,channel,t_ns,t_sigma_ns,counts,value,sigma,sequence,lost_before\n";
+
+std::int64_t ns(TimePoint time) {
+  return std::chrono::duration_cast<Duration>(time.time_since_epoch()).count();
+}
+
+std::string cell_text(std::size_t channel, const link::CellReading& reading,
+                      const link::CellCalibration& calibration) {
+  const char* full = reading.saturated ? " SATURATED" : "";
+  if (!calibration.calibrated)
+    return fmt::format("cell {} {:+9d} counts{}", channel, reading.counts, full);
+  const link::Newtons force = calibration.newtons(reading.counts);
+  return fmt::format("cell {} {:+9.4f} N ±{:.4f}{}", channel, force.value, force.sigma, full);
+}
+
+std::string csv_row(std::string_view kind, int channel, const link::HostTime& time,
+                    const std::string& rest = ",,,,") {
+  return fmt::format("{},{},{},{},{}\n", kind, channel, ns(time.time), time.sigma.count(), rest);
+}
+
+std::string json_row(const std::string& head, const link::HostTime& time, const std::string& rest) {
+  return fmt::format("{{{},\"t_ns\":{},\"t_sigma_ns\":{}{}}}\n", head, ns(time.time),
+                     time.sigma.count(), rest);
+}
+
+/// `calibration` says newtons, or nothing (then value and sigma are empty, null in JSON).
+std::string csv_line(const link::CellReading& r, const link::CellCalibration& calibration) {
+  const link::Newtons force = calibration.newtons(r.counts);
+  const std::string newtons = calibration.calibrated
+                                  ? fmt::format("{:.6g},{:.3g}", force.value, force.sigma)
+                                  : std::string(",");
+  return csv_row(r.saturated ? "cell_saturated" : "cell", r.channel, r.time,
+                 fmt::format("{},{},{},{}", r.counts, newtons, r.sequence, r.lost_before));
+}
+
+std::string csv_line(const link::AdcReading& r) {
+  return csv_row("adc", r.channel, r.time,
+                 fmt::format("{},,,{},{}", r.counts, r.sequence, r.lost_before));
+}
+
+std::string csv_line(const link::ButtonReading& r) {
+  return csv_row(r.pressed ? "press" : "release", r.button, r.time);
+}
+
+std::string csv_line(const link::FaultReading& r) {
+  return csv_row(link::fault_name(static_cast<std::uint32_t>(r.code)), r.channel, r.time);
+}
+
+std::string json_line(const link::CellReading& r, const link::CellCalibration& calibration) {
+  const link::Newtons force = calibration.newtons(r.counts);
+  const std::string newtons =
+      calibration.calibrated
+          ? fmt::format(R"("f_n":{:.6g},"f_sigma_n":{:.3g})", force.value, force.sigma)
+          : std::string(R"("f_n":null,"f_sigma_n":null)");
+  return json_row(fmt::format(R"("kind":"cell","channel":{})", r.channel), r.time,
+                  fmt::format(R"(,"counts":{},{},"saturated":{},"sequence":{},"lost_before":{})",
+                              r.counts, newtons, r.saturated, r.sequence, r.lost_before));
+}
+
+std::string json_line(const link::AdcReading& r) {
+  return json_row(fmt::format(R"("kind":"adc","channel":{})", r.channel), r.time,
+                  fmt::format(R"(,"counts":{},"sequence":{},"lost_before":{})", r.counts,
+                              r.sequence, r.lost_before));
+}
+
+std::string json_line(const link::ButtonReading& r) {
+  return json_row(fmt::format(R"("kind":"button","button":{})", r.button), r.time,
+                  fmt::format(R"(,"pressed":{})", r.pressed));
+}
+
+std::string json_line(const link::FaultReading& r) {
+  return json_row(fmt::format(R"("kind":"fault","fault":"{}","channel":{})",
+                              link::fault_name(static_cast<std::uint32_t>(r.code)), r.channel),
+                  r.time, "");
+}
+
+/// What people see: the latest of everything.
+class BoardView {
+ public:
+  void take(const link::CellReading& reading) {
+    if (reading.channel >= cells_.size()) return;
+    Cell& cell = cells_[reading.channel];
+    cell.seen = true;
+    cell.reading = reading;
+    cell.lost += reading.lost_before;
+    latest_ = reading.time;
+  }
+  void take(const link::AdcReading& reading) {
+    if (reading.channel < adc_.size()) adc_[reading.channel] = reading.counts;
+  }
+  void take(const link::ButtonReading& reading) {
+    if (reading.button >= pressed_.size()) return;
+    button_seen_[reading.button] = true;
+    pressed_[reading.button] = reading.pressed;
+  }
+
+  /// One line; cells that have said nothing since `stale` are said to be so.
+  std::string line(const link::CellCalibrations& calibrations, const BoardLoop& loop,
+                   TimePoint stale) const {
+    const double t = std::chrono::duration<double>(latest_.time.time_since_epoch()).count();
+    const double sigma_us = std::chrono::duration<double, std::micro>(latest_.sigma).count();
+    std::string out = fmt::format("{:14.6f} s ±{:3.0f} us", t, sigma_us);
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      const Cell& cell = cells_[i];
+      const link::FaultCode fault = loop.cell_fault(i);
+      out += "  ";
+      if (fault == link::FaultCode::cell_stuck) {
+        out += fmt::format("cell {} is stuck", i);
+      } else if (!cell.seen || fault == link::FaultCode::cell_silent) {
+        out += fmt::format("cell {} is not wired", i);
+      } else if (cell.reading.time.time < stale) {
+        out += fmt::format("cell {} is silent", i);
+      } else {
+        out += cell_text(i, cell.reading, calibrations[i]);
+      }
+      if (cell.lost > 0) out += fmt::format(" ({} lost)", cell.lost);
+    }
+    for (std::size_t i = 0; i < adc_.size(); ++i) {
+      if (adc_[i] >= 0) out += fmt::format("  adc {} {}", i, adc_[i]);
+    }
+    for (std::size_t i = 0; i < pressed_.size(); ++i) {
+      if (button_seen_[i]) out += fmt::format("  button {} {}", i, pressed_[i] ? "down" : "up");
+    }
+    return out + "\n";
+  }
+
+ private:
+  struct Cell {
+    bool seen = false;
+    link::CellReading reading;
+    std::uint64_t lost = 0;
+  };
+  std::array<Cell, link::kMaxChannels> cells_;
+  std::array<int, 8> adc_{-1, -1, -1, -1, -1, -1, -1, -1};
+  std::array<bool, 8> button_seen_{};
+  std::array<bool, 8> pressed_{};
+  link::HostTime latest_;
+};
 
 /// One board, one stream of lines.
 class Watch {

@@ -1,26 +1,35 @@
 #include "host/commands/calibrate_wrench/references.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cmath>
-#include <variant>
+#include <cstring>
+#include <optional>
 
 #include "host/app/board/board_loop.h"
-#include "host/board/optoforce_sensor.h"
-#include "host/commands/board/options.h"
-#include "host/commands/emulated_cell.h"
+#include "host/board/optoforce.h"
+#include "host/commands/board/board.h"
 #include "host/core/config_error.h"
-#include "host/source/simulator/bench_references.h"
+#include "host/source/simulator/bench.h"
 
 namespace tagwrench {
 namespace {
 
+constexpr double kPointEvery = 0.004;  // s; a hand trembles at 12 Hz
+constexpr double kMaxCatchUp = 1.0;    // s of the past that are told once
+
 constexpr double kStepSigma = 0.289;  // of one count: its uniform distribution, 1 / sqrt(12)
 
-/// A load cell on the board.
+/// A load cell on the board; of an emulated one perhaps in the simulated hand.
 class BoardCell final : public Reference {
  public:
-  BoardCell(const ReferenceInstrumentOptions& options, int channel)
+  BoardCell(const ReferenceInstrumentOptions& options, int channel,
+            const sim::Bench* bench = nullptr, TimePoint start = {})
       : options_(board_options(options)),
         loop_(options_.port, session_options(options_), "--board"),
         channel_(static_cast<std::size_t>(channel)) {
@@ -33,17 +42,15 @@ class BoardCell final : public Reference {
           "{}: cell {} is not calibrated; run `tagwrench board calibrate-cell --channel {}`",
           loop_.link().port(), channel, channel));
     }
+    if (bench != nullptr) hand_.emplace(options.emulated_cell, channel, *bench, start);
   }
 
   int poll_fd() const noexcept override {
     return const_cast<BoardLoop&>(loop_).link().poll_fd();  // NOLINT: it has no const access
   }
   void service() noexcept override {
-    try {
-      loop_.turn(std::chrono::steady_clock::now());
-    } catch (const std::exception&) {
-      return;  // out of memory: the next one
-    }
+    if (hand_) hand_->follow();
+    loop_.turn(std::chrono::steady_clock::now());
   }
   bool next(ReferenceReading& reading) noexcept override {
     for (link::CellReading cell; loop_.session().next(cell);) {
@@ -64,7 +71,8 @@ class BoardCell final : public Reference {
     return std::abs(cell_.newtons_per_count_sigma / cell_.newtons_per_count);
   }
   std::string description() const override {
-    return fmt::format("load cell {} of the board", channel_);
+    return fmt::format("load cell {} of the board{}", channel_,
+                       hand_ ? ", emulated, in the simulated hand" : "");
   }
   std::string trouble() override { return {}; }  // the loop says its own
 
@@ -80,30 +88,7 @@ class BoardCell final : public Reference {
   BoardLoop loop_;
   std::size_t channel_;
   link::CellCalibration cell_;
-};
-
-/// The same, in the simulated hand.
-class PressedCell final : public Reference {
- public:
-  PressedCell(const ReferenceInstrumentOptions& options, int channel, const sim::Bench& bench,
-              TimePoint start)
-      : cell_(options, channel), hand_(options.emulated_cell, channel, bench, start) {}
-
-  int poll_fd() const noexcept override { return cell_.poll_fd(); }
-  void service() noexcept override {
-    hand_.follow();
-    cell_.service();
-  }
-  bool next(ReferenceReading& reading) noexcept override { return cell_.next(reading); }
-  double gain_sigma() const noexcept override { return cell_.gain_sigma(); }
-  std::string description() const override {
-    return cell_.description() + ", emulated, in the simulated hand";
-  }
-  std::string trouble() override { return cell_.trouble(); }
-
- private:
-  BoardCell cell_;
-  EmulatedCell hand_;
+  std::optional<EmulatedCell> hand_;
 };
 
 class Optoforce final : public Reference {
@@ -183,7 +168,7 @@ std::unique_ptr<Reference> simulated(const WrenchPlan& plan,
                                      const sim::Bench& bench, TimePoint start) {
   const bool cell = plan.reference == ReferenceKind::load_cell;
   if (cell && !options.board.empty() && !options.emulated_cell.empty())
-    return std::make_unique<PressedCell>(options, plan.cell_channel, bench, start);
+    return std::make_unique<BoardCell>(options, plan.cell_channel, &bench, start);
   if (!options.board.empty() || !options.optoforce.empty()) {
     throw ConfigError(
         "--board, --optoforce: the simulated sensor has simulated instruments; leave these out, or "
@@ -200,6 +185,34 @@ std::unique_ptr<Reference> simulated(const WrenchPlan& plan,
 }
 
 }  // namespace
+
+EmulatedCell::EmulatedCell(const std::string& orders, int channel, const sim::Bench& bench,
+                           TimePoint simulation_start)
+    : orders_(::open(orders.c_str(), O_WRONLY | O_APPEND | O_NONBLOCK | O_CLOEXEC)),
+      channel_(channel),
+      bench_(bench),
+      start_(simulation_start),
+      told_to_(bench.newest()) {
+  if (orders_) return;
+  throw ConfigError(fmt::format(
+      "--emulated-cell {}: {}; give the pipe (mkfifo) that the emulated board has as its standard "
+      "input",
+      orders, errno == ENXIO ? "nobody reads it" : std::strerror(errno)));
+}
+
+void EmulatedCell::follow() noexcept {
+  // An order that is given later changes nothing before the reaction time is over.
+  const double decided = bench_.newest() + bench_.settings().times.reaction;
+  told_to_ = std::max(told_to_, decided - kMaxCatchUp);
+  while (told_to_ + kPointEvery < decided) {
+    told_to_ += kPointEvery;
+    const auto at = start_.time_since_epoch() + Duration(std::llround(1e9 * told_to_));
+    std::array<char, 80> line;
+    const auto end = fmt::format_to_n(line.data(), line.size(), "cell {} at {} {:.6f}\n", channel_,
+                                      at.count(), bench_.cell_force(told_to_));
+    if (::write(orders_.get(), line.data(), std::min(end.size, line.size())) < 0) return;
+  }
+}
 
 std::unique_ptr<Reference> open_reference(const WrenchPlan& plan,
                                           const ReferenceInstrumentOptions& options,

@@ -1,15 +1,49 @@
-// What a calibration has found: the fit, its files, and a table for people.
+// What a calibration leaves: its progress while it is stopped, the files of the fit, and a table
+// for people.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "host/calibration/wrench/observations.h"
+#include "host/calibration/wrench/plan.h"
+#include "host/calibration/wrench/record.h"
 #include "host/sensor/calibration_file.h"
 #include "host/wrench/fit.h"
 
 namespace tagwrench {
+
+struct Progress {
+  std::vector<StepRecord> records;
+  std::vector<int> skipped;
+};
+
+/// Each load has a rest of its zero before it. `steps` have step and zero.
+template <class Steps>
+bool zeros_fit(const Steps& steps, const WrenchPlan& plan) {
+  int zero = -1;
+  return std::all_of(steps.begin(), steps.end(), [&](const auto& s) {
+    if (plan.steps[static_cast<std::size_t>(s.step)].kind == StepKind::rest) zero = s.zero;
+    return s.zero == zero;
+  });
+}
+
+/// What a file of progress belongs to.
+struct ProgressOf {
+  std::string plan_sha256;    ///< of the plan's text
+  std::string sensor_sha256;  ///< of what identifies the sensor
+};
+
+/// Replaces the file as a whole. Throws std::runtime_error.
+void save_progress(const std::filesystem::path& path, const ProgressOf& of,
+                   const Progress& progress);
+
+/// Throws ConfigError if it cannot be read, is not such a file, or belongs to another plan or
+/// another sensor.
+Progress load_progress(const std::filesystem::path& path, const ProgressOf& of,
+                       const WrenchPlan& plan);
 
 struct CalibrationFiles {
   std::filesystem::path calibration;

@@ -3,16 +3,15 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/ioctl.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 
-#include "host/commands/calibrate_wrench/keys.h"
 #include "host/commands/calibrate_wrench/simulated_person.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
-#include "host/tracker/diagnostic_text.h"
 #include "host/tracker/tracker.h"
 
 namespace tagwrench {
@@ -70,6 +69,51 @@ class Telling {
   TimePoint shown_{};
 };
 
+/// Single keys from the terminal, or from a program that presses them. Where standard input is a
+/// terminal: keys come without Return, and are not shown. Everything is put back at the end.
+class Keys {
+ public:
+  /// `program`: standard input is a pipe, a byte a key.
+  explicit Keys(bool program) noexcept {
+    if (program) {
+      there_ = true;
+      return;
+    }
+    // A program in the background would be stopped for touching the terminal.
+    if (::isatty(STDIN_FILENO) == 0 || ::tcgetpgrp(STDIN_FILENO) != ::getpgrp()) return;
+    if (::tcgetattr(STDIN_FILENO, &before_) != 0) return;
+    termios raw = before_;
+    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+    raw.c_cc[VMIN] = 0;
+    raw.c_cc[VTIME] = 0;
+    there_ = changed_ = ::tcsetattr(STDIN_FILENO, TCSANOW, &raw) == 0;
+  }
+  Keys(const Keys&) = delete;
+  Keys& operator=(const Keys&) = delete;
+  ~Keys() {
+    if (changed_) ::tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  }
+
+  bool there() const noexcept { return there_; }
+  /// -1 where there are no keys.
+  int poll_fd() const noexcept { return there_ ? STDIN_FILENO : -1; }
+  /// The next key; 0 if none was pressed. Never blocks.
+  char next() noexcept {
+    if (!there_) return 0;
+    pollfd entry{STDIN_FILENO, POLLIN, 0};
+    char key = 0;
+    if (::poll(&entry, 1, 0) <= 0) return 0;
+    if (::read(STDIN_FILENO, &key, 1) == 1) return key;
+    there_ = changed_ = false;  // the terminal, or the program, is gone
+    return 0;
+  }
+
+ private:
+  bool there_ = false;
+  bool changed_ = false;  ///< the terminal
+  termios before_{};
+};
+
 class Runner {
  public:
   Runner(const GuideRun& run, WrenchGuide& guide)
@@ -78,7 +122,7 @@ class Runner {
         source_(*run.at->input.source),
         tracker_(run.at->input.sensor.camera, run.at->input.sensor.target,
                  run.at->input.sensor.rest),
-        keys_(run.events->on() ? Keys::From::program : Keys::From::terminal) {
+        keys_(run.events->on()) {
     if (run.at->bench)
       person_.emplace(*run.at->bench, *run.plan, run.at->input.sensor.wrench.range);
   }
@@ -142,12 +186,10 @@ class Runner {
         end_ = GuideEnd::ended;
         return;
       case ReadStatus::disconnected:
-        if (run_.recorder != nullptr) run_.recorder->disconnected(source_.detail());
-        tell_.line(source_.detail());
+        tell_event(record::EventKind::disconnected, source_.detail());
         return;
       case ReadStatus::reconnected:
-        if (run_.recorder != nullptr) run_.recorder->reconnected(source_.detail());
-        tell_.line(source_.detail());
+        tell_event(record::EventKind::reconnected, source_.detail());
         return;
       default:
         return;
@@ -196,9 +238,10 @@ class Runner {
   }
 
   /// What people are told is in the recording too.
-  void say(const std::string& line) {
+  void say(const std::string& line) { tell_event(record::EventKind::note, line); }
+  void tell_event(record::EventKind kind, const std::string& line) {
     tell_.line(line);
-    if (run_.recorder != nullptr) run_.recorder->note(line);
+    if (run_.recorder != nullptr) run_.recorder->event(kind, line);
   }
 
   /// What was accepted is not lost, whatever comes.

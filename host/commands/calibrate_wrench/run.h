@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <optional>
 
-#include "host/app/bench_input.h"
+#include "host/app/input.h"
 #include "host/calibration/wrench/guide.h"
 #include "host/calibration/wrench/reference.h"
-#include "host/commands/calibrate_wrench/progress.h"
-#include "host/commands/calibrate_wrench/recorder.h"
+#include "host/commands/calibrate_wrench/recording.h"
+#include "host/commands/calibrate_wrench/result.h"
 #include "host/commands/events.h"
 
 namespace tagwrench {

@@ -1,13 +1,18 @@
 // A calibration that is recorded: its frames, tracks and readings, and the stretch of them in which
-// each step was accepted.
+// each step was accepted; and such a recording once more, the same frames through the tracker, the
+// same stretches.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "host/app/input.h"
+#include "host/calibration/wrench/plan.h"
 #include "host/calibration/wrench/record.h"
 #include "host/calibration/wrench/reference.h"
+#include "host/recording/reader.h"
 #include "host/recording/writer.h"
 
 namespace tagwrench {
@@ -34,9 +39,9 @@ class CalibrationRecorder {
   void frame(const Frame& frame, const Region& decoded, const RawFrame& raw,
              const Track& track) noexcept;
   void reading(const ReferenceReading& reading, int channel) noexcept;
-  void disconnected(std::string_view detail) noexcept;
-  void reconnected(std::string_view detail) noexcept;
-  void note(std::string_view text) noexcept;
+  void event(record::EventKind kind, std::string_view detail) noexcept {
+    writer_.event(kind, latest_, detail);
+  }
   /// Marks what was accepted since the last call, and what no longer counts. Must come before the
   /// next frame and the next reading.
   void follow(const std::vector<StepRecord>& records);
@@ -60,5 +65,27 @@ class CalibrationRecorder {
   TimePoint latest_{};  ///< frame
   bool told_ = false;
 };
+
+/// Of a step that was accepted and still counted in the end.
+struct AcceptedStep {
+  int step = 0;            ///< of the plan
+  int zero = 0;            ///< steps with one number count from one rest
+  TimePoint from{}, to{};  ///< first and last frame
+  std::int64_t id = 0;     ///< of the acceptance: later readings were not known by then
+};
+
+/// In the order in which they were accepted. Throws ConfigError: there are none, or they do not fit
+/// the plan.
+std::vector<AcceptedStep> accepted_steps(record::RecordingReader& recording,
+                                         const WrenchPlan& plan);
+
+/// Tracks all frames of `input` and gives each step what it had in the calibration itself.
+/// `readings` is at its beginning. Throws ConfigError: a step has nothing to go by.
+std::vector<StepRecord> replay_steps(Input& input, record::RecordingReader& readings,
+                                     const std::vector<AcceptedStep>& steps,
+                                     const WrenchPlan& plan);
+
+/// Steps of the plan that are not there, for people: "step 3 (...), step 4 (...)"; empty: none.
+std::string not_recorded(const std::vector<AcceptedStep>& steps, const WrenchPlan& plan);
 
 }  // namespace tagwrench

@@ -1,17 +1,32 @@
-#include "host/commands/calibrate_wrench/replay.h"
+#include "host/commands/calibrate_wrench/recording.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "host/calibration/wrench/guide.h"
+#include "host/commands/calibrate_wrench/result.h"
+#include "host/core/command_line/command_line.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/tracker/tracker.h"
 
 namespace tagwrench {
 namespace {
+
+constexpr const char* kGainSigma = "reference_gain_sigma";
+constexpr std::pair<const char*, std::string RecordedCalibration::*> kTexts[] = {
+    {"plan", &RecordedCalibration::plan},
+    {"plan_yaml", &RecordedCalibration::plan_yaml},
+    {"reference", &RecordedCalibration::reference},
+    {"notes", &RecordedCalibration::notes}};
+
+/// Exact but for the rounding of the seconds, far less than the time between frames.
+TimePoint time_point(double seconds) {
+  return TimePoint(Duration(static_cast<Duration::rep>(std::llround(seconds * 1e9))));
+}
 
 constexpr Duration kRounding = std::chrono::microseconds(1);  // of marks
 constexpr int kMaxZeros = 100'000;
@@ -24,15 +39,6 @@ double seconds(TimePoint time) {
 [[noreturn]] void damaged(const record::RecordingReader& recording, const std::string& what) {
   throw ConfigError(
       fmt::format("recording:{}: {}; calibrate anew", recording.path().string(), what));
-}
-
-/// Each load has a rest of its zero before it.
-bool zeros_fit(const std::vector<AcceptedStep>& steps, const WrenchPlan& plan) {
-  int zero = -1;
-  return std::all_of(steps.begin(), steps.end(), [&](const AcceptedStep& s) {
-    if (plan.steps[static_cast<std::size_t>(s.step)].kind == StepKind::rest) zero = s.zero;
-    return s.zero == zero;
-  });
 }
 
 /// A reading with the number that orders it among the marks.
@@ -98,6 +104,67 @@ void track_frames(Input& input, const std::vector<AcceptedStep>& steps,
 }
 
 }  // namespace
+
+void put_into(record::Head& head, const RecordedCalibration& calibration) {
+  for (const auto& [key, text] : kTexts) head.more.emplace_back(key, calibration.*text);
+  head.more.emplace_back(kGainSigma, fmt::format("{}", calibration.gain_sigma));
+}
+
+RecordedCalibration calibration_in(const record::Head& head) {
+  RecordedCalibration out;
+  for (const auto& [key, value] : head.more) {
+    for (const auto& [name, text] : kTexts)
+      if (key == name) out.*text = value;
+    if (key != kGainSigma) continue;
+    const double number = command_line::to_number(value).value_or(0);
+    out.gain_sigma = number >= 0 && number < 1 ? number : 0;
+  }
+  return out;
+}
+
+void CalibrationRecorder::frame(const Frame& frame, const Region& decoded, const RawFrame& raw,
+                                const Track& track) noexcept {
+  latest_ = frame.capture_time;
+  writer_.frame(frame, decoded, raw);
+  writer_.track(track);
+}
+
+void CalibrationRecorder::reading(const ReferenceReading& reading, int channel) noexcept {
+  record::ReferenceRecord row;
+  row.time = reading.time;
+  row.time_sigma = reading.time_sigma;
+  row.channel = channel;
+  row.axes = reading.axes;
+  for (std::size_t i = 0; i < std::min<std::size_t>(reading.axes, 6); ++i) {
+    row.value[i] = reading.value[i];
+    row.sigma[i] = reading.sigma[i];
+  }
+  row.saturated = reading.saturated;
+  writer_.reference(row);
+}
+
+void CalibrationRecorder::follow(const std::vector<StepRecord>& records) {
+  std::vector<Marked> now;
+  for (const StepRecord& record : records)
+    now.push_back(
+        {record.step, record.zero, record.frames.front().time, record.frames.back().time});
+  const auto [lost, fresh] = std::mismatch(marked_.begin(), marked_.end(), now.begin(), now.end());
+  for (auto old = marked_.end(); old != lost;) {
+    --old;
+    writer_.withdraw(old->step, time_point(old->from));
+  }
+  for (auto m = fresh; m != now.end(); ++m) {
+    writer_.mark(m->step, true, time_point(m->from), m->zero);
+    writer_.mark(m->step, false, time_point(m->to));
+  }
+  marked_ = std::move(now);
+}
+
+std::string CalibrationRecorder::trouble() {
+  if (told_ || !writer_.state().failed) return {};
+  told_ = true;
+  return writer_.failure();
+}
 
 std::vector<AcceptedStep> accepted_steps(record::RecordingReader& recording,
                                          const WrenchPlan& plan) {

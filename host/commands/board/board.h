@@ -1,4 +1,4 @@
-// What `tagwrench board` is told on its command line.
+// What `tagwrench board` is told on its command line, and what it does; all return the exit status.
 #pragma once
 
 #include <optional>
