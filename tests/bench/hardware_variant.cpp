@@ -8,7 +8,7 @@
 #include <sstream>
 #include <vector>
 
-#include "host/commands/hardware_instrument.h"
+#include "host/commands/design_hardware.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/tools/design/design.h"
 #include "host/tools/design/geometry.h"

@@ -8,7 +8,6 @@
 
 #include "host/motion/profile_manager.h"
 #include "host/output/hid_report.h"
-#include "host/sensor/default_profile.h"
 #include "host/sensor/sensor_config.h"
 #include "host/wrench/zero.h"
 

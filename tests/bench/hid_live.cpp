@@ -17,7 +17,7 @@
 #include "host/app/pipeline.h"
 #include "host/output/line_outputs.h"
 #include "host/output/spnav_output.h"
-#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/bench/hid_clip.h"
 #include "tests/bench/hid_figures.h"
 #include "tests/bench/hid_spnav.h"

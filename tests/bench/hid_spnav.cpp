@@ -21,8 +21,9 @@ HidHolder::HidHolder(const std::string& path) {
   stopped_.reset(ends[1]);
   std::optional<SpnavSockets> sockets = listen_spnav(path);
   if (!sockets) throw std::runtime_error("a daemon is there already: " + path);
-  daemon_.emplace(std::move(*sockets), SpnavDaemonOptions{}, stopped_.get());
-  thread_ = std::thread([this] { daemon_->run(); });
+  thread_ = std::thread([stop = stopped_.get(), own = std::move(*sockets)]() mutable {
+    run_spnav_daemon(std::move(own), {}, stop);
+  });
 }
 
 HidHolder::~HidHolder() {

@@ -27,7 +27,6 @@ class HidHolder {
  private:
   UniqueFd stop_;
   UniqueFd stopped_;
-  std::optional<SpnavDaemon> daemon_;
   std::thread thread_;
 };
 

@@ -5,6 +5,7 @@
 
 #include "host/calibration/target/recorder.h"
 #include "host/calibration/target/verdict.h"
+#include "host/tracker/rotation.h"
 #include "tests/bench/tracker_clip.h"
 
 namespace tagwrench::bench {
@@ -40,11 +41,11 @@ SensorConfig calibrated(const SensorConfig& sensor, const sim::Scenario& scenari
     record.add(frame);
   }
   check_record(record, sensor.target, sensor.rest);
-  const TargetEstimate estimate = TargetAdjuster(record.at_rest()).adjust(record.keyframes());
+  const TargetEstimate estimate = adjust_target(record.at_rest(), record.keyframes());
   check_estimate(estimate, sensor.camera);
 
   SensorConfig found = sensor;
-  const Eigen::Isometry3d platform = rest_platform(estimate.camera_T_tag);
+  const Eigen::Isometry3d platform = midpoint_frame(estimate.camera_T_tag);
   const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
   for (std::size_t t = 0; t < found.target.tags.size(); ++t) {
     found.target.tags[t].platform_T_tag = platform.inverse() * estimate.camera_T_tag[t];

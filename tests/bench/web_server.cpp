@@ -24,7 +24,7 @@
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 #include "host/web/server/live_feed.h"
-#include "host/web/server/page_message.h"
+#include "host/web/server/request_guard.h"
 #include "host/wrench/estimate.h"
 #include "tests/bench/hid_figures.h"
 

@@ -31,7 +31,7 @@ test(
   { skip },
   async () => {
     const { CSV_HEADER, csvText } = await loadModule('common/csv.ts');
-    const source = readFileSync(join(root, 'host/output/sample_text.h'), 'utf8');
+    const source = readFileSync(join(root, 'host/output/line_outputs.h'), 'utf8');
     const columns = [
       ...source
         .slice(source.indexOf('kCsvHeader'))
@@ -189,7 +189,7 @@ test(
       for (const back of [false, true])
         assert.ok(Math.abs(deflection(shape, push + 1e-3, back) - deflection(shape, push, back)) < 0.01);
     }
-    // As host/motion/response_curve.cpp has it: through the points, never falling, never beyond them.
+    // As host/motion/shaping.cpp has it: through the points, never falling, never beyond them.
     const curve = {
       power: 1,
       points: [

@@ -79,7 +79,7 @@ TEST_F(TagsInput, PlacesThatTakeNoFileAreRefused) {
   ASSERT_EQ(::mkfifo((temporary_ / "pipe.pdf").c_str(), 0600), 0);
   const Outcome pipe = tags({}, "pipe.pdf");
   EXPECT_EQ(pipe.status, 2) << pipe.err;
-  EXPECT_NE(pipe.err.find("is a pipe"), std::string::npos) << pipe.err;
+  EXPECT_NE(pipe.err.find("is not a regular file"), std::string::npos) << pipe.err;
   EXPECT_TRUE(std::filesystem::is_fifo(temporary_ / "pipe.pdf"));
 }
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "host/output/spnav_link.h"
+#include "host/output/spnav_daemon.h"
 #include "host/output/spnav_protocol.h"
 #include "tests/fuzz/expect.h"
 

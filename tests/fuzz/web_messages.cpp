@@ -5,9 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "host/web/server/page_message.h"
 #include "host/web/server/request_guard.h"
-#include "host/web/server/site_path.h"
 #include "tests/fuzz/expect.h"
 
 namespace {

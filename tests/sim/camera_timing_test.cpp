@@ -12,9 +12,8 @@
 #include "host/app/scenario_config.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tools/camera_timing/measurement.h"
-#include "host/tools/camera_timing/screen_measurement.h"
+#include "host/tools/camera_timing/pattern_lamp.h"
 #include "host/tools/camera_timing/screen_window.h"
-#include "host/tools/camera_timing/simulated_lamp.h"
 
 namespace tagwrench::test {
 namespace {

@@ -5,7 +5,7 @@
 #include "host/app/scenario_config.h"
 #include "host/source/simulator/geometry.h"
 #include "host/tools/design/design.h"
-#include "host/tracker/tag_patterns.h"
+#include "host/tracker/target.h"
 #include "tests/bench/tracker_bound.h"
 
 namespace tagwrench {

@@ -2,7 +2,7 @@
 // them.
 #include <gtest/gtest.h>
 
-#include "host/calibration/light/settle.h"
+#include "host/calibration/light/control.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"

@@ -5,9 +5,9 @@
 
 #include <filesystem>
 
-#include "host/output/sample_text.h"
+#include "host/output/line_outputs.h"
 #include "host/recording/writer.h"
-#include "host/sensor/default_profile.h"
+#include "host/sensor/sensor_config.h"
 #include "tests/sim/played.h"
 #include "tests/support/temporary_folder.h"
 

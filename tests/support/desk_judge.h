@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "host/motion/gestures.h"
-#include "host/source/simulator/desk_use.h"
+#include "host/source/simulator/trajectory.h"
 
 namespace tagwrench::test {
 

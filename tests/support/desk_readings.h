@@ -5,9 +5,9 @@
 #include <cstdint>
 
 #include "host/core/types.h"
-#include "host/source/simulator/desk_use.h"
 #include "host/source/simulator/random.h"
 #include "host/source/simulator/scenario.h"
+#include "host/source/simulator/trajectory.h"
 
 namespace tagwrench::test {
 

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "host/core/types.h"
-#include "host/source/simulator/scenario.h"
+#include "host/source/simulator/disturbances.h"
 
 namespace tagwrench::test {
 

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "host/calibration/analysis/csv_mapping.h"
+#include "host/calibration/analysis/trial_csv.h"
 
 namespace tagwrench::test {
 namespace {

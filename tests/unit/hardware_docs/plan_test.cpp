@@ -1,12 +1,13 @@
 // The calibration plan of a sensor to be built: its points are on the printed hood, its weight is
 // one that the springs bear.
+#include "host/calibration/wrench/plan.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
 
-#include "host/calibration/wrench/plan_config.h"
-#include "host/commands/hardware_plan.h"
+#include "host/commands/design_hardware.h"
 #include "host/tools/design/drawing.h"
 #include "host/tools/design/parameters.h"
 
