@@ -13,13 +13,22 @@ check() { # WHAT COMMAND...
   if "$@" < /dev/null; then echo "ok - $what"; else failed=$((failed + 1)); echo "FAILED - $what"; fi
 }
 
-wait_for() { # COMMAND...: until it succeeds; the processor may be emulated, so there is much patience
-  local left=600
+# What happens in the guest, a line each: the journal, devices that udev has made, what the program of libspnav was told.
+exec 8< <(
+  journalctl --follow --lines=0 --output=cat &
+  udevadm monitor --udev &
+  tail --lines=0 --follow=name --retry /home/alice/motion 2> /dev/null &
+  wait
+)
+# Until it succeeds, tried again when something happens, and every five seconds for what nobody announces (a process that has
+# ended). The processor may be emulated, so there is much patience.
+wait_for() { # COMMAND...
+  local end=$((SECONDS + 120))
   until "$@" > /dev/null 2>&1; do
-    left=$((left - 1))
-    [ "$left" -gt 0 ] || return 1
-    sleep 0.2
+    [ "$SECONDS" -lt "$end" ] || return 1
+    if read -r -t 5 -u 8 _; then read -r -N 65536 -t 0.01 -u 8 _; fi # and what has come with it
   done
+  return 0 # the loop's own status is that of the last read
 }
 
 same() { [ "$1" = "$2" ] || { echo "  is '$1', not '$2'"; return 1; }; }
@@ -100,7 +109,7 @@ check "he enables the service; without a camera it waits" at_the_seat systemctl 
 check "and says so" eval 'at_the_seat systemctl --user show -p StatusText tagwrench | grep -q "waiting for a camera"'
 check "and makes no device" same "$(ls /sys/class/hidraw 2>/dev/null)" ""
 
-check "the socket's keeper runs beside it" at_the_seat systemctl --user is-active --quiet tagwrench-spnav
+check "the socket's daemon runs beside it" at_the_seat systemctl --user is-active --quiet tagwrench-spnav
 
 install -d -o alice -g alice /home/alice/.config /home/alice/.config/tagwrench
 install -o alice -g alice "$frames/rest/sensor.yaml" /home/alice/.config/tagwrench/
