@@ -69,7 +69,8 @@ int main(int argc, char** argv) {
         TAGWRENCH_VERSION);
     program.require_subcommand();
     for (const auto declare : kCommands) declare(program);
-    return program.parse(argc, argv) ? program.run() : 0;
+    if (!program.parse(argc, argv)) return 0;
+    return program.action()();
   } catch (const ConfigError& e) {
     log_info(e.what());
     return kUnusable;

@@ -367,7 +367,7 @@ class KwinFocus : public FocusWatch {
   std::optional<Focus> heard_;
 };
 
-/// Null: KWin does not run in this session.
+/// Null: this desktop's windows are not KWin's.
 std::unique_ptr<FocusWatch> focus_in_kwin() {
   sd_bus* opened = nullptr;
   if (std::getenv("WAYLAND_DISPLAY") == nullptr || sd_bus_open_user(&opened) < 0) return {};

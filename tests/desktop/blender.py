@@ -70,7 +70,7 @@ def main():
     blender = with_a_place_for_the_socket(["blender", "--factory-startup", "--window-geometry", "0", "0", "800", "600",
                                            "--python", here + "/blender_view.py"])
     with desktop.Desk(arguments.tagwrench, arguments.out) as desk:
-        desk.keeper()
+        desk.spnav_daemon()
         desk.screen()
         view = desktop.View(arguments.out + "/view")
         desk.environment["TAGWRENCH_VIEW"] = view.path

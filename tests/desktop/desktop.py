@@ -171,10 +171,10 @@ class Desk(contextlib.ExitStack):
     def screenshot(self, name):
         subprocess.run(["import", "-window", "root", f"{self.out}/{name}.png"], env=self.environment, check=True)
 
-    def keeper(self):
+    def spnav_daemon(self):
         """The process that holds the socket, as a service would."""
-        self.start(self.tagwrench, "spnav", "--socket", self.socket, log="keeper")
-        wait_until(lambda: os.path.exists(self.socket), "the keeper's socket")
+        self.start(self.tagwrench, "spnav", "--socket", self.socket, log="daemon")
+        wait_until(lambda: os.path.exists(self.socket), "the daemon's socket")
 
     def push(self, axis, share):
         """A bridge, from its start to its end: the simulated sensor at rest, pushed by a share of its range for two seconds, and

@@ -55,7 +55,7 @@ def main():
     desktop.need("Xvfb", "xdotool", "import", "freecad")
     here = os.path.dirname(os.path.abspath(__file__))
     with desktop.Desk(arguments.tagwrench, arguments.out) as desk:
-        desk.keeper()
+        desk.spnav_daemon()
         desk.screen()
         view = desktop.View(arguments.out + "/view")
         desk.environment["TAGWRENCH_VIEW"] = view.path

@@ -133,8 +133,8 @@ class Program : public Command {
   bool parse(int argc, const char* const* argv);
   /// The same for a program without commands: of what is wrong the bare words, then `advice`.
   bool parse(int argc, const char* const* argv, const std::string& advice);
-  /// What the command that was given does; its exit status.
-  int run() const { return chosen_ ? chosen_() : 0; }
+  /// What the command that was given does, and gives the exit status of; empty: none was given.
+  const std::function<int()>& action() const { return chosen_; }
 
  private:
   explicit Program(std::unique_ptr<CLI::App> app);

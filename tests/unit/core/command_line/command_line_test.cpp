@@ -111,7 +111,7 @@ TEST(CommandLine, RunsWhatWasGiven) {
   board.add_subcommand("led", "its light").runs([] { return 2; });
   board.add_subcommand("info", "who it is").runs([] { return 3; });
   EXPECT_EQ(refusal(program, {"board", "led"}), "");
-  EXPECT_EQ(program.run(), 2);
+  EXPECT_EQ(program.action()(), 2);
 }
 
 TEST(CommandLine, HelpAndVersionEndTheParsing) {
