@@ -160,11 +160,8 @@ bool decode(const uint8_t* bytes, uint8_t count, HelloRequest& message) {
       case tagwrench_link_HelloRequest_protocol_minor_tag:
         reader.varint(read.protocol_minor);
         break;
-      case tagwrench_link_HelloRequest_session_tag:
-        reader.fixed32(read.session);
-        break;
-      default:
-        reader.skip();
+      case tagwrench_link_HelloRequest_session_tag: reader.fixed32(read.session); break;
+      default: reader.skip();
     }
   }
   return take(reader, read, message);
@@ -175,26 +172,17 @@ bool decode(const uint8_t* bytes, uint8_t count, Configure& message) {
   FieldReader reader(bytes, count);
   while (reader.next()) {
     switch (reader.field()) {
-      case tagwrench_link_Configure_host_timeout_ms_tag:
-        reader.varint(read.host_timeout_ms);
-        break;
+      case tagwrench_link_Configure_host_timeout_ms_tag: reader.varint(read.host_timeout_ms); break;
       case tagwrench_link_Configure_cells_tag:
         reader.enumerations(read.cells, read.cell_count, CellInput::a64);
         break;
-      case tagwrench_link_Configure_cell_rate_sps_tag:
-        reader.varint(read.cell_rate_sps);
-        break;
-      case tagwrench_link_Configure_adc_mask_tag:
-        reader.varint(read.adc_mask);
-        break;
-      case tagwrench_link_Configure_adc_rate_hz_tag:
-        reader.varint(read.adc_rate_hz);
-        break;
+      case tagwrench_link_Configure_cell_rate_sps_tag: reader.varint(read.cell_rate_sps); break;
+      case tagwrench_link_Configure_adc_mask_tag: reader.varint(read.adc_mask); break;
+      case tagwrench_link_Configure_adc_rate_hz_tag: reader.varint(read.adc_rate_hz); break;
       case tagwrench_link_Configure_status_period_ms_tag:
         reader.varint(read.status_period_ms);
         break;
-      default:
-        reader.skip();
+      default: reader.skip();
     }
   }
   return take(reader, read, message);
@@ -205,26 +193,13 @@ bool decode(const uint8_t* bytes, uint8_t count, Led& message) {
   FieldReader reader(bytes, count);
   while (reader.next()) {
     switch (reader.field()) {
-      case tagwrench_link_Led_mode_tag:
-        reader.enumeration(read.mode, LedMode::pattern);
-        break;
-      case tagwrench_link_Led_level_permille_tag:
-        reader.varint(read.level_permille);
-        break;
-      case tagwrench_link_Led_period_us_tag:
-        reader.fixed32(read.period_us);
-        break;
-      case tagwrench_link_Led_width_us_tag:
-        reader.varint(read.width_us);
-        break;
-      case tagwrench_link_Led_start_us_tag:
-        reader.fixed32(read.start_us);
-        break;
-      case tagwrench_link_Led_pattern_seed_tag:
-        reader.varint(read.pattern_seed);
-        break;
-      default:
-        reader.skip();
+      case tagwrench_link_Led_mode_tag: reader.enumeration(read.mode, LedMode::pattern); break;
+      case tagwrench_link_Led_level_permille_tag: reader.varint(read.level_permille); break;
+      case tagwrench_link_Led_period_us_tag: reader.fixed32(read.period_us); break;
+      case tagwrench_link_Led_width_us_tag: reader.varint(read.width_us); break;
+      case tagwrench_link_Led_start_us_tag: reader.fixed32(read.start_us); break;
+      case tagwrench_link_Led_pattern_seed_tag: reader.varint(read.pattern_seed); break;
+      default: reader.skip();
     }
   }
   return take(reader, read, message);
@@ -241,14 +216,9 @@ bool decode(const uint8_t* bytes, uint8_t count, Tare& message) {
   FieldReader reader(bytes, count);
   while (reader.next()) {
     switch (reader.field()) {
-      case tagwrench_link_Tare_cell_mask_tag:
-        reader.varint(read.cell_mask);
-        break;
-      case tagwrench_link_Tare_conversions_tag:
-        reader.varint(read.conversions);
-        break;
-      default:
-        reader.skip();
+      case tagwrench_link_Tare_cell_mask_tag: reader.varint(read.cell_mask); break;
+      case tagwrench_link_Tare_conversions_tag: reader.varint(read.conversions); break;
+      default: reader.skip();
     }
   }
   return take(reader, read, message);

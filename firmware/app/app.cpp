@@ -119,17 +119,11 @@ void App::handle_hello(uint32_t now_us) {
 
 link::Result App::handle(uint8_t kind, uint32_t now_us) {
   switch (static_cast<link::Kind>(kind)) {
-    case link::Kind::configure:
-      return configure(now_us);
-    case link::Kind::led:
-      return set_led(now_us);
-    case link::Kind::tare:
-      return tare();
-    case link::Kind::set_id:
-      return set_id();
-    default:
-      ++unknown_kinds_;
-      return link::Result::unknown_kind;
+    case link::Kind::configure: return configure(now_us);
+    case link::Kind::led: return set_led(now_us);
+    case link::Kind::tare: return tare();
+    case link::Kind::set_id: return set_id();
+    default: ++unknown_kinds_; return link::Result::unknown_kind;
   }
 }
 

@@ -48,14 +48,11 @@ bool in_range(const link::Led& command) {
 
 uint16_t mean_permille(const link::Led& command) {
   switch (command.mode) {
-    case link::LedMode::steady:
-      return command.level_permille;
+    case link::LedMode::steady: return command.level_permille;
     case link::LedMode::strobe:
       return static_cast<uint16_t>(command.width_us * 1000ul / command.period_us);
-    case link::LedMode::pattern:
-      return kPatternPermille;
-    default:
-      return 0;
+    case link::LedMode::pattern: return kPatternPermille;
+    default: return 0;
   }
 }
 

@@ -70,10 +70,8 @@ std::string fault(const BoardEvent& news) {
       return fmt::format(
           "board: the data line of load cell {} never goes high; check its amplifier for a short",
           news.other);
-    case FaultCode::supply_low:
-      return "board: its supply is low; use another cable or port";
-    case FaultCode::none:
-      break;
+    case FaultCode::supply_low: return "board: its supply is low; use another cable or port";
+    case FaultCode::none: break;
   }
   return fmt::format("board: fault {} on channel {}", news.value, news.other);
 }
@@ -101,8 +99,7 @@ std::string text(const BoardEvent& news) {
           "board: its firmware speaks protocol {}, this program {}.{}; update tagwrench on this "
           "computer",
           version(news.value), kProtocolMajor, kProtocolMinor);
-    case BoardEvent::Kind::id_given:
-      return "board: it had no id and was given one";
+    case BoardEvent::Kind::id_given: return "board: it had no id and was given one";
     case BoardEvent::Kind::configuration_refused:
       return fmt::format("board: refused its configuration: {}", result_name(news.value));
     case BoardEvent::Kind::led_refused:
@@ -114,12 +111,10 @@ std::string text(const BoardEvent& news) {
     case BoardEvent::Kind::other_host:
       return fmt::format("board: another program speaks to it too (session {:08x}); end it",
                          news.value);
-    case BoardEvent::Kind::fault:
-      return fault(news);
+    case BoardEvent::Kind::fault: return fault(news);
     case BoardEvent::Kind::unplugged:
       return "board: the port is gone; plug it in again, this program waits";
-    case BoardEvent::Kind::plugged:
-      return "board: the port is back";
+    case BoardEvent::Kind::plugged: return "board: the port is back";
   }
   return "?";
 }

@@ -223,11 +223,8 @@ void BoardSession::take(std::span<const std::uint8_t> bytes, TimePoint arrival) 
       first_bytes_[first_byte_count_++] = bytes[i];
     if (frame_bytes_ < 1000) ++frame_bytes_;
     switch (reader_.take(bytes[i])) {
-      case Received::nothing:
-        break;
-      case Received::damaged:
-        ++counters_.damaged_frames;
-        break;
+      case Received::nothing: break;
+      case Received::damaged: ++counters_.damaged_frames; break;
       case Received::frame: {
         // The bytes behind it came later, one after the other.
         const double behind_us =
@@ -263,8 +260,7 @@ void BoardSession::take_frame(TimePoint arrival, std::uint16_t wire_bytes) noexc
   const Kind kind = static_cast<Kind>(reader_.kind());
   if (state_ == BoardState::waiting && kind != Kind::hello) return;
   switch (kind) {
-    case Kind::hello:
-      return read(Hello{}, [&](const Hello& m) { take_hello(m, arrival); });
+    case Kind::hello: return read(Hello{}, [&](const Hello& m) { take_hello(m, arrival); });
     case Kind::capabilities:
       return read(Capabilities{}, [&](const Capabilities& m) {
         capabilities_ = m;
@@ -279,16 +275,11 @@ void BoardSession::take_frame(TimePoint arrival, std::uint16_t wire_bytes) noexc
     case Kind::time_reply:
       return read(TimeReply{},
                   [&](const TimeReply& m) { take_time_reply(m, arrival, wire_bytes); });
-    case Kind::status:
-      return read(Status{}, [&](const Status& m) { take_status(m, arrival); });
-    case Kind::answer:
-      return read(Answer{}, [&](const Answer& m) { take_answer(m); });
-    case Kind::tare_result:
-      return read(TareResult{}, [&](const TareResult& m) { tares_.push(m); });
-    case Kind::fault:
-      return read(Fault{}, [&](const Fault& m) { take_fault(m, arrival); });
-    default:
-      ++counters_.unknown_frames;
+    case Kind::status: return read(Status{}, [&](const Status& m) { take_status(m, arrival); });
+    case Kind::answer: return read(Answer{}, [&](const Answer& m) { take_answer(m); });
+    case Kind::tare_result: return read(TareResult{}, [&](const TareResult& m) { tares_.push(m); });
+    case Kind::fault: return read(Fault{}, [&](const Fault& m) { take_fault(m, arrival); });
+    default: ++counters_.unknown_frames;
   }
 }
 
@@ -375,8 +366,7 @@ void BoardSession::take_answer(const Answer& answer) noexcept {
       tare_due_ = false;
       if (!ok) log_info(BoardEvent::Kind::request_refused, answer.request_kind, result);
       return;
-    case Kind::hello_request:
-      return;  // Hello says it in full
+    case Kind::hello_request: return;  // Hello says it in full
     default:
       if (!ok) log_info(BoardEvent::Kind::request_refused, answer.request_kind, result);
   }

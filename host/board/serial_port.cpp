@@ -185,19 +185,14 @@ SerialFailure failure_of(int error) {
     case ENOENT:
     case ENODEV:
     case ENXIO:
-    case ENOTDIR:
-      return {Kind::absent, error};
+    case ENOTDIR: return {Kind::absent, error};
     case EACCES:
-    case EPERM:
-      return {Kind::denied, error};
+    case EPERM: return {Kind::denied, error};
     case EBUSY:
-    case EWOULDBLOCK:
-      return {Kind::busy, error};
+    case EWOULDBLOCK: return {Kind::busy, error};
     case ENOTTY:
-    case EISDIR:
-      return {Kind::no_serial_port, error};
-    default:
-      return {Kind::other, error};
+    case EISDIR: return {Kind::no_serial_port, error};
+    default: return {Kind::other, error};
   }
 }
 
@@ -408,12 +403,10 @@ std::string text(const SerialFailure& failure, const std::string& path, unsigned
                  const std::string& option) {
   using Kind = SerialFailure::Kind;
   switch (failure.kind) {
-    case Kind::none:
-      return path + ": open";
+    case Kind::none: return path + ": open";
     case Kind::absent:
       return fmt::format("{}: there is no such port; {}", path, port_advice(option));
-    case Kind::denied:
-      return fmt::format("{}: no permission; {}", path, permission_advice(path));
+    case Kind::denied: return fmt::format("{}: no permission; {}", path, permission_advice(path));
     case Kind::busy: {
       const std::string holder = holder_of(path);
       return fmt::format("{}: in use by {}; end it, or give another port with {}", path,
@@ -423,8 +416,7 @@ std::string text(const SerialFailure& failure, const std::string& path, unsigned
       return fmt::format("{}: not a serial port; {}", path, port_advice(option));
     case Kind::no_such_baud:
       return fmt::format("{}: its driver does not do {} baud; use another adapter", path, baud);
-    case Kind::other:
-      break;
+    case Kind::other: break;
   }
   return fmt::format("{}: cannot be opened: {}; plug it in again", path,
                      std::strerror(failure.error));

@@ -161,14 +161,10 @@ class FocusView {
                          best, now, 100 * guide_.more_noise());
     };
     switch (guide_.turn()) {
-      case FocusTurn::begin:
-        return "turn the lens slowly, one way";
-      case FocusTurn::sharper:
-        return "sharper: turn on";
-      case FocusTurn::blurrier:
-        return away("less sharp: turn back");
-      case FocusTurn::away:
-        return away("it was sharper");
+      case FocusTurn::begin: return "turn the lens slowly, one way";
+      case FocusTurn::sharper: return "sharper: turn on";
+      case FocusTurn::blurrier: return away("less sharp: turn back");
+      case FocusTurn::away: return away("it was sharper");
       case FocusTurn::try_on:
         return fmt::format(
             "the sharpest so far, {:.1f} px: turn on, either way, until it gets worse", now);

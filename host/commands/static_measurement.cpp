@@ -253,16 +253,13 @@ std::string fine(const InSituFinding& f) {
 
 std::string not_known(Subject subject) {
   switch (subject) {
-    case Subject::tags:
-      return "one tag alone: nothing tells whether it has slipped";
+    case Subject::tags: return "one tag alone: nothing tells whether it has slipped";
     case Subject::zero:
       return "cannot be told: the tags disagree or are not held (see above), or no range is known";
-    case Subject::scale:
-      return "the load did not act long enough, or far too little";
+    case Subject::scale: return "the load did not act long enough, or far too little";
     case Subject::light:
     case Subject::focus:
-    case Subject::residual:
-      break;
+    case Subject::residual: break;
   }
   return "no tag is held: see the other lines";
 }
@@ -328,8 +325,7 @@ std::string wrong(const InSituFinding& f) {
           "`tagwrench calibrate wrench`",
           100 * f.expected, kWrenchAxes[f.axis], f.amount);
     case Fault::none:
-    case Fault::not_known:
-      break;
+    case Fault::not_known: break;
   }
   return "";
 }

@@ -34,13 +34,11 @@ std::string objection(const std::vector<InSituFinding>& findings) {
       case Fault::some_tag_moved:
       case Fault::tag_not_seen:
       case Fault::out_of_focus:
-      case Fault::rest_elsewhere:
-        return text(f);
+      case Fault::rest_elsewhere: return text(f);
       case Fault::not_known:
         if (f.subject == Subject::zero) return text(f);
         break;
-      default:
-        break;
+      default: break;
     }
   }
   return {};

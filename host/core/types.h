@@ -124,16 +124,11 @@ constexpr bool carries_numbers(Status status) {
 
 constexpr const char* name(Status status) {
   switch (status) {
-    case Status::ok:
-      return "ok";
-    case Status::acquiring:
-      return "acquiring";
-    case Status::lost:
-      return "lost";
-    case Status::doubtful:
-      return "doubtful";
-    case Status::saturated:
-      return "saturated";
+    case Status::ok: return "ok";
+    case Status::acquiring: return "acquiring";
+    case Status::lost: return "lost";
+    case Status::doubtful: return "doubtful";
+    case Status::saturated: return "saturated";
   }
   return "?";
 }
@@ -231,14 +226,10 @@ enum class ZeroState : std::uint8_t {
 
 constexpr const char* name(ZeroState state) {
   switch (state) {
-    case ZeroState::off:
-      return "off";
-    case ZeroState::touched:
-      return "touched";
-    case ZeroState::far:
-      return "far";
-    case ZeroState::following:
-      return "following";
+    case ZeroState::off: return "off";
+    case ZeroState::touched: return "touched";
+    case ZeroState::far: return "far";
+    case ZeroState::following: return "following";
   }
   return "?";
 }

@@ -92,18 +92,12 @@ void Gestures::note(const Sample& sample, Reading& now) noexcept {
 void Gestures::step(const Reading& now) noexcept {
   switch (phase_) {
     case Phase::unsettled:
-    case Phase::ready:
-      return settle(now);
-    case Phase::pulse:
-      return follow_pulse(now);
-    case Phase::landing:
-      return land(now);
-    case Phase::between:
-      return await_second(now);
-    case Phase::pressing:
-      return press(now);
-    case Phase::held:
-      return keep_pressed(now);
+    case Phase::ready: return settle(now);
+    case Phase::pulse: return follow_pulse(now);
+    case Phase::landing: return land(now);
+    case Phase::between: return await_second(now);
+    case Phase::pressing: return press(now);
+    case Phase::held: return keep_pressed(now);
   }
 }
 

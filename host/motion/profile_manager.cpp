@@ -156,35 +156,24 @@ void ProfileManager::take_requests() {
 std::string ProfileManager::granted(const ControlRequest& request) {
   using Kind = ControlRequest::Kind;
   switch (request.kind) {
-    case Kind::none:
-      return {};
-    case Kind::zero:
-      zero_wanted_ = true;
-      return "ok: as soon as nobody touches the sensor\n";
+    case Kind::none: return {};
+    case Kind::zero: zero_wanted_ = true; return "ok: as soon as nobody touches the sensor\n";
     case Kind::next_profile:
       use((current_ + 1) % files_.profiles().size(), "as asked");
       return "ok: " + files_.profiles()[current_].name + "\n";
-    case Kind::profile:
-      return choose(request.name);
+    case Kind::profile: return choose(request.name);
     case Kind::status: {
       std::string line = "ok: profile " + profile().name + " of";
       for (const Profile& p : files_.profiles()) line += " " + p.name;
       return line + "\n";
     }
-    case Kind::window:
-      return window(request.name);
-    case Kind::live:
-      return live();
-    case Kind::show:
-      return show(request.name);
-    case Kind::attempt:
-      return attempt(request);
-    case Kind::keep:
-      return keep();
-    case Kind::revert:
-      return revert();
-    case Kind::unknown:
-      break;
+    case Kind::window: return window(request.name);
+    case Kind::live: return live();
+    case Kind::show: return show(request.name);
+    case Kind::attempt: return attempt(request);
+    case Kind::keep: return keep();
+    case Kind::revert: return revert();
+    case Kind::unknown: break;
   }
   return "error: requests are zero, next, profile NAME, window NAME, status, live and show NAME\n";
 }

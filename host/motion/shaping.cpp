@@ -266,12 +266,9 @@ ResponseCurve::ResponseCurve(const CurveOptions& options) noexcept : options_(op
 double ResponseCurve::operator()(double in) const noexcept {
   const double x = std::clamp(in, 0.0, 1.0);
   switch (options_.kind) {
-    case CurveKind::linear:
-      return x;
-    case CurveKind::power:
-      return std::pow(x, options_.power);
-    case CurveKind::points:
-      return between_points(x);
+    case CurveKind::linear: return x;
+    case CurveKind::power: return std::pow(x, options_.power);
+    case CurveKind::points: return between_points(x);
   }
   return x;
 }
@@ -316,8 +313,7 @@ const Vector6& AxisFilter::step(double seconds, const Vector6& value) noexcept {
 
 double AxisFilter::weight(double seconds, const Vector6& value) noexcept {
   switch (options_.kind) {
-    case FilterKind::none:
-      return 1;
+    case FilterKind::none: return 1;
     case FilterKind::exponential:
       return 1 - std::pow(1 - options_.weight, seconds * options_.weight_hz);
     case FilterKind::one_euro: {

@@ -25,14 +25,10 @@ constexpr int kLastWait_ms = 100;
 const char* remedy(int error) {
   switch (error) {
     case ENOSPC:
-    case EDQUOT:
-      return "free some space, or write somewhere else";
-    case EPIPE:
-      return "its reader has gone; start it again, or write to a file";
-    case EFBIG:
-      return "raise the limit (ulimit -f), or write to another file";
-    default:
-      return "write somewhere else";
+    case EDQUOT: return "free some space, or write somewhere else";
+    case EPIPE: return "its reader has gone; start it again, or write to a file";
+    case EFBIG: return "raise the limit (ulimit -f), or write to another file";
+    default: return "write somewhere else";
   }
 }
 

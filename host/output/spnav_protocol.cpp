@@ -110,15 +110,9 @@ std::span<const std::uint8_t> SpnavDialogue::answer(const SpnavDevice* device,
       return {};  // libspnav waits for no answer to a text, and would take it for an event
     case kSetSensitivity:
       return reply(set_sensitivity(std::bit_cast<float>(request_[1])) ? 0 : kFailed);
-    case kGetSensitivity:
-      request_[1] = std::bit_cast<std::int32_t>(sensitivity_);
-      return reply(0);
-    case kSetEventMask:
-      event_mask_ = static_cast<std::uint32_t>(request_[1]);
-      return reply(0);
-    case kGetEventMask:
-      request_[1] = static_cast<std::int32_t>(event_mask_);
-      return reply(0);
+    case kGetSensitivity: request_[1] = std::bit_cast<std::int32_t>(sensitivity_); return reply(0);
+    case kSetEventMask: event_mask_ = static_cast<std::uint32_t>(request_[1]); return reply(0);
+    case kGetEventMask: request_[1] = static_cast<std::int32_t>(event_mask_); return reply(0);
     default:
       // The rest are settings of spacenavd; here a profile has them.
       return device != nullptr ? answer_device(request, *device, path) : reply(kFailed);
@@ -130,23 +124,15 @@ std::span<const std::uint8_t> SpnavDialogue::answer_device(int request, const Sp
   switch (request) {
     case kDeviceName:
       return reply_text({device.name.data(), ::strnlen(device.name.data(), device.name.size())});
-    case kDevicePath:
-      return reply_text(path);
-    case kAxes:
-      request_[1] = 6;
-      break;
-    case kButtons:
-      request_[1] = kSpnavButtons;
-      break;
+    case kDevicePath: return reply_text(path);
+    case kAxes: request_[1] = 6; break;
+    case kButtons: request_[1] = kSpnavButtons; break;
     case kUsbId:
       request_[1] = device.vendor;
       request_[2] = device.product;
       break;
-    case kDeviceType:
-      request_[1] = device_type(device);
-      break;
-    default:
-      return reply(kFailed);
+    case kDeviceType: request_[1] = device_type(device); break;
+    default: return reply(kFailed);
   }
   return reply(0);
 }

@@ -339,9 +339,7 @@ void RecordingWriter::take(const Item& item) {
       sink_->frame(item.id, frame.row, frame.bytes());
       break;
     }
-    case ItemKind::track:
-      sink_->track(item.id, static_cast<const Filled<Track>&>(item).row);
-      break;
+    case ItemKind::track: sink_->track(item.id, static_cast<const Filled<Track>&>(item).row); break;
     case ItemKind::sample:
       sink_->sample(item.id, static_cast<const Filled<Sample>&>(item).row);
       break;

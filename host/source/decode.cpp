@@ -91,13 +91,10 @@ std::uint32_t fourcc_of(PixelFormat format) noexcept {
 int row_bytes(PixelFormat format, int width) noexcept {
   switch (format) {
     case PixelFormat::grey:
-    case PixelFormat::nv12:
-      return width;
+    case PixelFormat::nv12: return width;
     case PixelFormat::yuyv:
-    case PixelFormat::uyvy:
-      return 2 * width;
-    case PixelFormat::mjpg:
-      break;
+    case PixelFormat::uyvy: return 2 * width;
+    case PixelFormat::mjpg: break;
   }
   return 0;
 }

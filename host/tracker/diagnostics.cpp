@@ -370,8 +370,7 @@ void TrackingDiagnostics::add(const FrameFacts& facts, Track& track) {
 
 std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& d) {
   switch (diagnostic) {
-    case Diagnostic::none:
-      return {};
+    case Diagnostic::none: return {};
     case Diagnostic::image_looks_mirrored:
       return "the image looks mirrored (tags decode only when it is flipped left to right); set "
              "camera.mirrored: true in sensor.yaml, unless the tags themselves are printed "
@@ -379,8 +378,7 @@ std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& d) {
     case Diagnostic::image_looks_unmirrored:
       return "the image does not look mirrored, but sensor.yaml says so; set camera.mirrored: "
              "false in sensor.yaml";
-    case Diagnostic::rest_learned:
-      return "rest pose learned; the wrench counts from here";
+    case Diagnostic::rest_learned: return "rest pose learned; the wrench counts from here";
     case Diagnostic::moved_while_learning:
       return "the platform moved while its rest pose was learned; let it rest for a moment";
     case Diagnostic::appearance_does_not_fit:

@@ -119,8 +119,7 @@ void Features::reset() noexcept {
 void Features::update(const Vector6& displacement, double dt) noexcept {
   values_.head<6>() = displacement;
   switch (spec_.kind) {
-    case FeatureKind::linear:
-      return;
+    case FeatureKind::linear: return;
     case FeatureKind::quadratic: {
       int row = 6;
       for (int j = 0; j < 6; ++j) {

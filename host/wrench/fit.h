@@ -99,12 +99,9 @@ enum class AxisState : std::uint8_t {
 
 constexpr const char* name(AxisState state) {
   switch (state) {
-    case AxisState::calibrated:
-      return "calibrated";
-    case AxisState::spring_model:
-      return "from the spring model";
-    case AxisState::not_determined:
-      return "not determined";
+    case AxisState::calibrated: return "calibrated";
+    case AxisState::spring_model: return "from the spring model";
+    case AxisState::not_determined: return "not determined";
   }
   return "?";
 }

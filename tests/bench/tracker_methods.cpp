@@ -14,12 +14,9 @@ namespace {
 
 cv::aruco::PREDEFINED_DICTIONARY_NAME dictionary_of(TagFamily family) {
   switch (family) {
-    case TagFamily::aruco_original:
-      return cv::aruco::DICT_ARUCO_ORIGINAL;
-    case TagFamily::apriltag_36h11:
-      return cv::aruco::DICT_APRILTAG_36h11;
-    default:
-      throw std::invalid_argument("tracker benchmark: no OpenCV dictionary for this family");
+    case TagFamily::aruco_original: return cv::aruco::DICT_ARUCO_ORIGINAL;
+    case TagFamily::apriltag_36h11: return cv::aruco::DICT_APRILTAG_36h11;
+    default: throw std::invalid_argument("tracker benchmark: no OpenCV dictionary for this family");
   }
 }
 

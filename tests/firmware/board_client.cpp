@@ -73,28 +73,17 @@ void BoardClient::take_frame(VirtualTime end) {
   }
   heard_sequence_ = reader_.sequence();
   switch (static_cast<link::Kind>(reader_.kind())) {
-    case link::Kind::hello:
-      return keep<link::Hello>(end);
-    case link::Kind::capabilities:
-      return keep<link::Capabilities>(end);
-    case link::Kind::cell_sample:
-      return keep<link::CellSample>(end);
-    case link::Kind::adc_sample:
-      return keep<link::AdcSample>(end);
-    case link::Kind::button_event:
-      return keep<link::ButtonEvent>(end);
-    case link::Kind::time_reply:
-      return keep<link::TimeReply>(end);
-    case link::Kind::status:
-      return keep<link::Status>(end);
-    case link::Kind::answer:
-      return keep<link::Answer>(end);
-    case link::Kind::tare_result:
-      return keep<link::TareResult>(end);
-    case link::Kind::fault:
-      return keep<link::Fault>(end);
-    default:
-      ++undecodable_;
+    case link::Kind::hello: return keep<link::Hello>(end);
+    case link::Kind::capabilities: return keep<link::Capabilities>(end);
+    case link::Kind::cell_sample: return keep<link::CellSample>(end);
+    case link::Kind::adc_sample: return keep<link::AdcSample>(end);
+    case link::Kind::button_event: return keep<link::ButtonEvent>(end);
+    case link::Kind::time_reply: return keep<link::TimeReply>(end);
+    case link::Kind::status: return keep<link::Status>(end);
+    case link::Kind::answer: return keep<link::Answer>(end);
+    case link::Kind::tare_result: return keep<link::TareResult>(end);
+    case link::Kind::fault: return keep<link::Fault>(end);
+    default: ++undecodable_;
   }
 }
 

@@ -203,18 +203,10 @@ std::string help_on_orders() {
 void wire(EmulatedBoard& board, const board::CellOption& option) {
   Hx711& cell = board.cell(option.channel);
   switch (option.cell.model) {
-    case board::CellModel::constant:
-      board.set_force(option.channel, option.cell.force_n);
-      break;
-    case board::CellModel::sine:
-      apply_sine(cell, option.cell.force_n, option.cell.hz);
-      break;
-    case board::CellModel::none:
-      cell.set_wiring(Hx711::Wiring::disconnected);
-      break;
-    case board::CellModel::stuck:
-      cell.set_wiring(Hx711::Wiring::stuck_low);
-      break;
+    case board::CellModel::constant: board.set_force(option.channel, option.cell.force_n); break;
+    case board::CellModel::sine: apply_sine(cell, option.cell.force_n, option.cell.hz); break;
+    case board::CellModel::none: cell.set_wiring(Hx711::Wiring::disconnected); break;
+    case board::CellModel::stuck: cell.set_wiring(Hx711::Wiring::stuck_low); break;
   }
 }
 

@@ -49,18 +49,10 @@ void Hx711::set_wiring(Wiring wiring) {
 void Hx711::set_data(bool level) {
   data_ = level;
   switch (wiring_) {
-    case Wiring::connected:
-      core_.drive('C', channel_, level);
-      break;
-    case Wiring::disconnected:
-      core_.release('C', channel_);
-      break;
-    case Wiring::stuck_low:
-      core_.drive('C', channel_, false);
-      break;
-    case Wiring::stuck_high:
-      core_.drive('C', channel_, true);
-      break;
+    case Wiring::connected: core_.drive('C', channel_, level); break;
+    case Wiring::disconnected: core_.release('C', channel_); break;
+    case Wiring::stuck_low: core_.drive('C', channel_, false); break;
+    case Wiring::stuck_high: core_.drive('C', channel_, true); break;
   }
 }
 

@@ -98,17 +98,10 @@ TEST_F(LedAbuseTest, ALongRunOfLightOrderedAgainAndAgainIsLimitedByItsTrueLight)
 TEST_F(LedAbuseTest, ModesInQuickTurnAreLimitedByTheirTrueLight) {
   abuse(milliseconds(10), [&](int i) {
     switch (i % 4) {
-      case 0:
-        client.send(steady(1000));
-        break;
-      case 1:
-        client.send(strobe(22000, 19000, microseconds(1500)));
-        break;
-      case 2:
-        client.send(pattern(20000, kMaxLight, microseconds(1500)));
-        break;
-      default:
-        client.send(strobe(1000000, 20000, microseconds(1500)));
+      case 0: client.send(steady(1000)); break;
+      case 1: client.send(strobe(22000, 19000, microseconds(1500))); break;
+      case 2: client.send(pattern(20000, kMaxLight, microseconds(1500))); break;
+      default: client.send(strobe(1000000, 20000, microseconds(1500)));
     }
   });
 }

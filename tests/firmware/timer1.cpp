@@ -70,18 +70,12 @@ void Timer1::reset() {
 
 Cycle Timer1::prescale() {
   switch (core_.data(reg::kTccr1b) & 7) {
-    case 1:
-      return 1;
-    case 2:
-      return 8;
-    case 3:
-      return 64;
-    case 4:
-      return 256;
-    case 5:
-      return 1024;
-    default:
-      return 0;
+    case 1: return 1;
+    case 2: return 8;
+    case 3: return 64;
+    case 4: return 256;
+    case 5: return 1024;
+    default: return 0;
   }
 }
 
@@ -144,17 +138,10 @@ void Timer1::match(std::uint8_t vector, Cycle when) {
 
 void Timer1::act_on_a(Cycle when) {
   switch (core_.data(reg::kTccr1a) >> 6) {
-    case 1:
-      latch_ = !latch_;
-      break;
-    case 2:
-      latch_ = false;
-      break;
-    case 3:
-      latch_ = true;
-      break;
-    default:
-      return;
+    case 1: latch_ = !latch_; break;
+    case 2: latch_ = false; break;
+    case 3: latch_ = true; break;
+    default: return;
   }
   if (output_changed_) output_changed_(when);
 }

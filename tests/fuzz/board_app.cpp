@@ -42,12 +42,9 @@ class Play {
       case 0:
         for (std::uint8_t n = input_.byte() % 100; n > 0; --n) receive(input_.byte());
         return;
-      case 1:
-        return receive_frame();
-      case 2:
-        return run(input_.byte() * 20u);
-      case 3:
-        return run(input_.byte() * 20000u);
+      case 1: return receive_frame();
+      case 2: return run(input_.byte() * 20u);
+      case 3: return run(input_.byte() * 20000u);
       case 4:
         board_.conversions.push_back({static_cast<std::uint8_t>(input_.byte() % 4),
                                       static_cast<std::int32_t>(input_.number()) >> 8,
@@ -58,8 +55,7 @@ class Play {
                                        static_cast<std::uint16_t>(input_.byte() * 4), board_.now_us,
                                        input_.byte()});
         return;
-      case 6:
-        return board_.change(input_.byte() % 2, input_.byte() % 2 == 1, board_.now_us);
+      case 6: return board_.change(input_.byte() % 2, input_.byte() % 2 == 1, board_.now_us);
       default:
         board_.room = input_.byte();
         board_.departed = input_.byte() % 2 == 1;

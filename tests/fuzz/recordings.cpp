@@ -118,20 +118,13 @@ struct Row {
 Value value(Bytes& bytes, std::int64_t& last) {
   using Given = fuzz::Value;
   switch (static_cast<Given>(bytes.byte() % fuzz::kValues)) {
-    case Given::null:
-      break;
-    case Given::next:
-      return ++last;
-    case Given::same:
-      return last;
-    case Given::small:
-      return std::int64_t{static_cast<std::int8_t>(bytes.byte())};
-    case Given::whole:
-      return bytes.number<std::int64_t>();
-    case Given::real:
-      return bytes.number<double>();
-    case Given::word:
-      return std::string(fuzz::kWords[bytes.byte() % fuzz::kWords.size()]);
+    case Given::null: break;
+    case Given::next: return ++last;
+    case Given::same: return last;
+    case Given::small: return std::int64_t{static_cast<std::int8_t>(bytes.byte())};
+    case Given::whole: return bytes.number<std::int64_t>();
+    case Given::real: return bytes.number<double>();
+    case Given::word: return std::string(fuzz::kWords[bytes.byte() % fuzz::kWords.size()]);
     case Given::text: {
       const auto text = bytes.some();
       return std::string(text.begin(), text.end());
@@ -146,8 +139,7 @@ Value value(Bytes& bytes, std::int64_t& last) {
       if (!blob.empty()) std::memcpy(blob.data(), reals.data(), blob.size());
       return blob;
     }
-    case Given::edge:
-      return fuzz::kEdges[bytes.byte() % fuzz::kEdges.size()];
+    case Given::edge: return fuzz::kEdges[bytes.byte() % fuzz::kEdges.size()];
   }
   return std::monostate{};
 }

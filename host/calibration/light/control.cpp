@@ -274,8 +274,7 @@ std::string light_text(const LightReport& report) {
       return line + "; too dark with everything at its end: is the LED wired, and the lens free?";
     case LightControl::State::too_bright:
       return line + "; too bright with everything at its end: keep other light off the tags";
-    case LightControl::State::settled:
-      break;
+    case LightControl::State::settled: break;
   }
   if (report.ambient_fraction > 0.9) return line + "; the LED hardly shows: is it wired?";
   if (report.ambient_fraction > kMuchAmbient) line += "; keep other light off the tags";

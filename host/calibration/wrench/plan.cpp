@@ -25,22 +25,19 @@ std::string axis_words(const Eigen::Vector3d& direction) {
 
 std::string load_words(const WrenchPlan& plan, const PlanStep& step) {
   switch (step.kind) {
-    case StepKind::rest:
-      return "rest";
+    case StepKind::rest: return "rest";
     case StepKind::mass:
       return fmt::format("{:g} g at {}", step.mass * 1e3, plan.point_of(step).name);
     case StepKind::push:
       return fmt::format("push {} along {}", plan.point_of(step).name, axis_words(step.direction));
-    case StepKind::six_axis:
-      return "moved by hand";
+    case StepKind::six_axis: return "moved by hand";
   }
   return {};
 }
 
 std::string task(const WrenchPlan& plan, const PlanStep& step) {
   switch (step.kind) {
-    case StepKind::rest:
-      return "nothing hangs or presses, hands off";
+    case StepKind::rest: return "nothing hangs or presses, hands off";
     case StepKind::mass:
       return fmt::format("hang {:g} g at {} and let it come to rest", step.mass * 1e3,
                          plan.point_of(step).name);
@@ -108,8 +105,7 @@ PlanStep read_step(YamlReader& node, const WrenchPlan& plan, int mounting) {
   step.kind = static_cast<StepKind>(node.one_of("do", {"rest", "mass", "push", "move"}));
   step.say = node.text_or("say", "");
   switch (step.kind) {
-    case StepKind::rest:
-      break;
+    case StepKind::rest: break;
     case StepKind::mass:
       need(ReferenceKind::masses, "masses");
       step.mass = node.within("mass_g", 0.01, 1e5) * kMilli;

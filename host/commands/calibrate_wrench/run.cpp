@@ -180,19 +180,15 @@ class Runner {
     if (source_.poll_fd() >= 0 && !ready_) return;
     Frame frame;
     switch (source_.read(frame)) {
-      case ReadStatus::frame:
-        break;
-      case ReadStatus::end:
-        end_ = GuideEnd::ended;
-        return;
+      case ReadStatus::frame: break;
+      case ReadStatus::end: end_ = GuideEnd::ended; return;
       case ReadStatus::disconnected:
         tell_event(record::EventKind::disconnected, source_.detail());
         return;
       case ReadStatus::reconnected:
         tell_event(record::EventKind::reconnected, source_.detail());
         return;
-      default:
-        return;
+      default: return;
     }
     const Region decoded = frame.readable();
     Track track = tracker_.track(frame);

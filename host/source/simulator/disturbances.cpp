@@ -129,20 +129,14 @@ void DisturbancePlayer::add_one(Event event, Random& random, double period_start
     case Event::hair:
     case Event::cable:
     case Event::fingertip:
-    case Event::hand:
-      add(random_occluder(event, own, when.length), h.occluders);
-      break;
-    case Event::glare:
-      add(random_glare(own), h.glare);
-      break;
+    case Event::hand: add(random_occluder(event, own, when.length), h.occluders); break;
+    case Event::glare: add(random_glare(own), h.glare); break;
     case Event::light_step:  // down, or up to clipping
       add(LightChange{when, coin ? own.uniform(0.25, 0.85) : own.uniform(1.15, 2.0),
                       own.uniform() < 0.5 ? 0.0 : 0.2},
           h.light);
       break;
-    case Event::darkness:
-      add(LightChange{when, 0.0, coin ? 0.0 : 0.15}, h.light);
-      break;
+    case Event::darkness: add(LightChange{when, 0.0, coin ? 0.0 : 0.15}, h.light); break;
     case Event::flicker:
       add(Flicker{when, own.uniform(0.03, 0.35), coin ? 50.0 : 60.0}, h.flicker);
       break;

@@ -87,8 +87,7 @@ double strength(const DeskAct& act, double time) {
   const double length = act.end - act.begin;
   switch (act.what) {
     case DeskDoing::rest:
-    case DeskDoing::knock:
-      return 0;
+    case DeskDoing::knock: return 0;
     case DeskDoing::push:
     case DeskDoing::hand:
     case DeskDoing::brush:
@@ -101,8 +100,7 @@ double strength(const DeskAct& act, double time) {
     }
     case DeskDoing::tap:
     case DeskDoing::twist_left:
-    case DeskDoing::twist_right:
-      return beat(since, length, act.sharpness);
+    case DeskDoing::twist_right: return beat(since, length, act.sharpness);
   }
   return 0;
 }
@@ -176,24 +174,17 @@ Vector6 TrajectoryPlayer::applied_wrench(double absolute_time) const noexcept {
   const double time = absolute_time - trajectory_.rest_time;
   if (time < 0) return Vector6::Zero();
   switch (trajectory_.motion) {
-    case Motion::push:
-      return on_axis(held(time, trajectory_.hold_time));
-    case Motion::steps:
-      return steps(time);
-    case Motion::sweep:
-      return sweep(time);
-    case Motion::tap:
-      return tap(time);
-    case Motion::compound:
-      return compound(time);
-    case Motion::hard:
-      return hard(time);
+    case Motion::push: return on_axis(held(time, trajectory_.hold_time));
+    case Motion::steps: return steps(time);
+    case Motion::sweep: return sweep(time);
+    case Motion::tap: return tap(time);
+    case Motion::compound: return compound(time);
+    case Motion::hard: return hard(time);
     case Motion::hold:
       return 0.5 * held(time, trajectory_.hold_time) * Vector6::Map(trajectory_.amplitude.data());
     case Motion::rest:
     case Motion::drop:
-    case Motion::desk:
-      break;
+    case Motion::desk: break;
   }
   return Vector6::Zero();
 }
@@ -225,17 +216,14 @@ TrajectoryPlayer::HardEvent TrajectoryPlayer::hard_event(double time) const noex
       event.frequency = random.uniform(0.5, 8.0);
       event.wrench *= std::min(1.0, kFullSway / event.frequency);
       break;
-    case Event::shove:
-      event.wrench *= kShoveShare;
-      break;
+    case Event::shove: event.wrench *= kShoveShare; break;
     case Event::tap:
       event.frequency = random.uniform(2.0, 8.0);
       event.wrench = event.wrench.cwiseProduct(Vector6::Map(kHardTapGain));
       break;
     case Event::rest:
     case Event::hold:
-    case Event::drop:
-      break;
+    case Event::drop: break;
   }
   return event;
 }
@@ -247,17 +235,13 @@ Vector6 TrajectoryPlayer::hard(double time) const noexcept {
   if (local < 0 || left < 0) return Vector6::Zero();
   const double eased = smooth_step(local, kRampTime) * smooth_step(left, kRampTime);
   switch (event.what) {
-    case Event::hold:
-      return eased * event.wrench;
-    case Event::sway:
-      return eased * std::sin(2 * pi * event.frequency * local) * event.wrench;
-    case Event::shove:
-      return event.wrench;
+    case Event::hold: return eased * event.wrench;
+    case Event::sway: return eased * std::sin(2 * pi * event.frequency * local) * event.wrench;
+    case Event::shove: return event.wrench;
     case Event::tap:
       return half_sine(std::fmod(local, 1 / event.frequency), kTapTime) * event.wrench;
     case Event::rest:
-    case Event::drop:
-      break;
+    case Event::drop: break;
   }
   return Vector6::Zero();
 }

@@ -236,8 +236,7 @@ void say_system_socket(Report& report, const SpnavFacts& facts) {
                                                           kSpnavSystemSocket));
       return;
     case SpnavServer::none:
-    case SpnavServer::silent:
-      break;
+    case SpnavServer::silent: break;
   }
   if (facts.spacenavd) {
     report.line(Mark::missing,

@@ -81,16 +81,11 @@ int tagwrench_decode(const uint8_t* report, size_t size, tagwrench_sample* sampl
 
 const char* tagwrench_status_name(tagwrench_status status) {
   switch (status) {
-    case TAGWRENCH_OK:
-      return "ok";
-    case TAGWRENCH_ACQUIRING:
-      return "acquiring";
-    case TAGWRENCH_LOST:
-      return "lost";
-    case TAGWRENCH_DOUBTFUL:
-      return "doubtful";
-    case TAGWRENCH_SATURATED:
-      return "saturated";
+    case TAGWRENCH_OK: return "ok";
+    case TAGWRENCH_ACQUIRING: return "acquiring";
+    case TAGWRENCH_LOST: return "lost";
+    case TAGWRENCH_DOUBTFUL: return "doubtful";
+    case TAGWRENCH_SATURATED: return "saturated";
   }
   return "?";
 }
@@ -108,15 +103,10 @@ int64_t tagwrench_now_ns(void) {
 
 const char* tagwrench_error_text(int error) {
   switch (error) {
-    case TAGWRENCH_ERROR_SIZE:
-      return "the report is not 64 bytes long";
-    case TAGWRENCH_ERROR_REPORT:
-      return "the report is of another kind";
-    case TAGWRENCH_ERROR_FIELD:
-      return "the report has a value outside its declared range";
-    case TAGWRENCH_ERROR_GONE:
-      return "the device is gone: unplugged, or the bridge has ended";
-    default:
-      return "no error";
+    case TAGWRENCH_ERROR_SIZE: return "the report is not 64 bytes long";
+    case TAGWRENCH_ERROR_REPORT: return "the report is of another kind";
+    case TAGWRENCH_ERROR_FIELD: return "the report has a value outside its declared range";
+    case TAGWRENCH_ERROR_GONE: return "the device is gone: unplugged, or the bridge has ended";
+    default: return "no error";
   }
 }

@@ -59,13 +59,10 @@ void tagwrench_why_not_open(const char* path, uint16_t vendor, uint16_t product,
   }
   switch (errno) {
     case EACCES:
-    case EPERM:
-      say_rule(path, vendor, product, why, size);
-      break;
+    case EPERM: say_rule(path, vendor, product, why, size); break;
     case ENOENT:
       snprintf(why, size, "%s: not there; `tagwrench read --list` says what is", path);
       break;
-    default:
-      snprintf(why, size, "%s: %s; check it with: ls -l %s", path, strerror(errno), path);
+    default: snprintf(why, size, "%s: %s; check it with: ls -l %s", path, strerror(errno), path);
   }
 }

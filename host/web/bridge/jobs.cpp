@@ -24,14 +24,10 @@ constexpr std::string_view kDigits =
 
 const char* state_name(JobReport::State state) {
   switch (state) {
-    case JobReport::State::running:
-      return "running";
-    case JobReport::State::done:
-      return "done";
-    case JobReport::State::failed:
-      return "failed";
-    case JobReport::State::stopped:
-      return "stopped";
+    case JobReport::State::running: return "running";
+    case JobReport::State::done: return "done";
+    case JobReport::State::failed: return "failed";
+    case JobReport::State::stopped: return "stopped";
   }
   return "?";
 }

@@ -360,14 +360,10 @@ std::string WebBridge::words(const SeenNow& seen, bool fresh) const {
   if (seen.trouble != Diagnostic::none && !carries_numbers(seen.status))
     return diagnostic_text(seen.trouble, seen.details);
   switch (seen.status) {
-    case Status::ok:
-      return "held";
-    case Status::saturated:
-      return "held, but pushed beyond the range that is known";
-    case Status::acquiring:
-      return "looking for the tags, or learning their rest: hands off";
-    case Status::lost:
-      return "the tags are not seen";
+    case Status::ok: return "held";
+    case Status::saturated: return "held, but pushed beyond the range that is known";
+    case Status::acquiring: return "looking for the tags, or learning their rest: hands off";
+    case Status::lost: return "the tags are not seen";
     case Status::doubtful:
       return "seen, but what is seen does not fit: nothing is told until it does";
   }

@@ -101,9 +101,7 @@ class BoardModel {
         leds.push_back(read<Led>());
         led_times.push_back(now);
         return answer(led_result);
-      case Kind::set_id:
-        hello.unique_id = read<SetId>().unique_id;
-        return answer(Result::ok);
+      case Kind::set_id: hello.unique_id = read<SetId>().unique_id; return answer(Result::ok);
       case Kind::tare:
         ++tares;
         answer(Result::ok);
@@ -116,8 +114,7 @@ class BoardModel {
         previous_sent_ = now;  // the model sends at once
         previous_valid_ = true;
         return;
-      default:
-        return answer(Result::unknown_kind);
+      default: return answer(Result::unknown_kind);
     }
   }
   void answer(Result result) { send(Answer{reader_.kind(), reader_.sequence(), result}); }

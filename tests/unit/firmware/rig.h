@@ -121,28 +121,17 @@ class Rig : public testing::Test {
   void keep_report() {
     frame_sequences.push_back(reader_.sequence());
     switch (static_cast<link::Kind>(reader_.kind())) {
-      case link::Kind::hello:
-        return keep<link::Hello>();
-      case link::Kind::capabilities:
-        return keep<link::Capabilities>();
-      case link::Kind::cell_sample:
-        return keep<link::CellSample>();
-      case link::Kind::adc_sample:
-        return keep<link::AdcSample>();
-      case link::Kind::button_event:
-        return keep<link::ButtonEvent>();
-      case link::Kind::time_reply:
-        return keep<link::TimeReply>();
-      case link::Kind::status:
-        return keep<link::Status>();
-      case link::Kind::answer:
-        return keep<link::Answer>();
-      case link::Kind::tare_result:
-        return keep<link::TareResult>();
-      case link::Kind::fault:
-        return keep<link::Fault>();
-      default:
-        ADD_FAILURE() << "a report of unknown kind " << int{reader_.kind()};
+      case link::Kind::hello: return keep<link::Hello>();
+      case link::Kind::capabilities: return keep<link::Capabilities>();
+      case link::Kind::cell_sample: return keep<link::CellSample>();
+      case link::Kind::adc_sample: return keep<link::AdcSample>();
+      case link::Kind::button_event: return keep<link::ButtonEvent>();
+      case link::Kind::time_reply: return keep<link::TimeReply>();
+      case link::Kind::status: return keep<link::Status>();
+      case link::Kind::answer: return keep<link::Answer>();
+      case link::Kind::tare_result: return keep<link::TareResult>();
+      case link::Kind::fault: return keep<link::Fault>();
+      default: ADD_FAILURE() << "a report of unknown kind " << int{reader_.kind()};
     }
   }
 

@@ -229,24 +229,14 @@ std::string mutated(std::string text, std::mt19937& random) {
     const std::size_t at = random() % (text.size() + 1);
     const std::size_t length = std::min<std::size_t>(random() % 12, text.size() - at);
     switch (random() % 6) {
-      case 0:
-        text.insert(at, 1, kLikely[random() % kLikely.size()]);
-        break;
-      case 1:
-        text.insert(at, 1, static_cast<char>(random()));
-        break;
-      case 2:
-        text.erase(at, length);
-        break;
-      case 3:
-        text.insert(at, text.substr(random() % (text.size() + 1), length));
-        break;
+      case 0: text.insert(at, 1, kLikely[random() % kLikely.size()]); break;
+      case 1: text.insert(at, 1, static_cast<char>(random())); break;
+      case 2: text.erase(at, length); break;
+      case 3: text.insert(at, text.substr(random() % (text.size() + 1), length)); break;
       case 4:
         if (at < text.size()) text[at] = kLikely[random() % kLikely.size()];
         break;
-      case 5:
-        text.resize(at);
-        break;
+      case 5: text.resize(at); break;
     }
   }
   return text;

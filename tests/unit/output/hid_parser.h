@@ -157,15 +157,9 @@ class HidDescriptorParser {
 
   void main_item(int tag, std::uint32_t data) {
     switch (tag) {
-      case 0x8:
-        add_fields(HidReportType::input, data);
-        break;
-      case 0x9:
-        add_fields(HidReportType::output, data);
-        break;
-      case 0xb:
-        add_fields(HidReportType::feature, data);
-        break;
+      case 0x8: add_fields(HidReportType::input, data); break;
+      case 0x9: add_fields(HidReportType::output, data); break;
+      case 0xb: add_fields(HidReportType::feature, data); break;
       case 0xa:
         if (data == 1 && !usages_.empty()) application_ = usages_.front();
         ++result_.open_collections;
@@ -174,8 +168,7 @@ class HidDescriptorParser {
         if (result_.open_collections == 0) throw std::runtime_error("collection closed twice");
         --result_.open_collections;
         break;
-      default:
-        throw std::runtime_error("reserved main item");
+      default: throw std::runtime_error("reserved main item");
     }
     usages_.clear();  // local items end with the main item
     usage_min_.reset();
@@ -183,38 +176,17 @@ class HidDescriptorParser {
 
   void global_item(int tag, std::uint32_t data, std::size_t size) {
     switch (tag) {
-      case 0x0:
-        page_ = data;
-        break;
-      case 0x1:
-        now_.logical_min = signed_value(data, size);
-        break;
-      case 0x2:
-        now_.logical_max = signed_value(data, size);
-        break;
-      case 0x3:
-        now_.physical_min = signed_value(data, size);
-        break;
-      case 0x4:
-        now_.physical_max = signed_value(data, size);
-        break;
-      case 0x5:
-        now_.exponent = HidField::signed_nibble(data);
-        break;
-      case 0x6:
-        now_.unit = data;
-        break;
-      case 0x7:
-        now_.size_bits = data;
-        break;
-      case 0x8:
-        now_.report_id = static_cast<std::uint8_t>(data);
-        break;
-      case 0x9:
-        count_ = data;
-        break;
-      default:
-        throw std::runtime_error("push and pop are not supported");
+      case 0x0: page_ = data; break;
+      case 0x1: now_.logical_min = signed_value(data, size); break;
+      case 0x2: now_.logical_max = signed_value(data, size); break;
+      case 0x3: now_.physical_min = signed_value(data, size); break;
+      case 0x4: now_.physical_max = signed_value(data, size); break;
+      case 0x5: now_.exponent = HidField::signed_nibble(data); break;
+      case 0x6: now_.unit = data; break;
+      case 0x7: now_.size_bits = data; break;
+      case 0x8: now_.report_id = static_cast<std::uint8_t>(data); break;
+      case 0x9: count_ = data; break;
+      default: throw std::runtime_error("push and pop are not supported");
     }
   }
 

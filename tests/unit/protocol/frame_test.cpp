@@ -21,14 +21,11 @@ Heard hear(FrameReader& reader, const Bytes& bytes) {
   Heard heard;
   for (const std::uint8_t byte : bytes) {
     switch (reader.take(byte)) {
-      case Received::nothing:
-        break;
+      case Received::nothing: break;
       case Received::frame:
         heard.bodies.emplace_back(reader.body(), reader.body() + reader.body_bytes());
         break;
-      case Received::damaged:
-        ++heard.damaged;
-        break;
+      case Received::damaged: ++heard.damaged; break;
     }
   }
   return heard;

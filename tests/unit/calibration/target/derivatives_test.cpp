@@ -55,14 +55,10 @@ class Derivatives : public testing::Test {
 
 Eigen::Vector3d toward_white(EdgeNormal normal) {
   switch (normal) {
-    case EdgeNormal::plus_x:
-      return {1, 0, 0};
-    case EdgeNormal::minus_x:
-      return {-1, 0, 0};
-    case EdgeNormal::plus_y:
-      return {0, 1, 0};
-    case EdgeNormal::minus_y:
-      return {0, -1, 0};
+    case EdgeNormal::plus_x: return {1, 0, 0};
+    case EdgeNormal::minus_x: return {-1, 0, 0};
+    case EdgeNormal::plus_y: return {0, 1, 0};
+    case EdgeNormal::minus_y: return {0, -1, 0};
   }
   return Eigen::Vector3d::Zero();
 }
