@@ -47,9 +47,8 @@ void end_blas_threads() noexcept {
 
 /// A closed standard stream would give its number to the next file that is opened, a device's say.
 void open_standard_streams() {
-  for (int fd = 0; fd <= 2; ++fd) {
+  for (int fd = 0; fd <= 2; ++fd)
     if (::fcntl(fd, F_GETFD) < 0 && ::open("/dev/null", O_RDWR) != fd) std::abort();
-  }
 }
 
 }  // namespace

@@ -179,21 +179,21 @@ void check_size(const Input& input) {
   const SourceFormat& format = input.source->format();
   const CameraModel& camera = input.sensor.camera;
   if (format.width == camera.width_px && format.height == camera.height_px) return;
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "{}: frames are {}x{}, but sensor.yaml's camera is {}x{}; give the --sensor made for this "
       "mode, or ask the camera for that size",
-      format.description, format.width, format.height, camera.width_px, camera.height_px));
+      format.description, format.width, format.height, camera.width_px, camera.height_px);
 }
 
 void check_appearance(const Input& input) {
   const SensorConfig& sensor = input.sensor;
   const auto mismatch = check_appearance(sensor.camera, sensor.target, sensor.rest);
   if (!mismatch) return;
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "{}: the picture at rest does not show tag {} of {} where the rest pose puts it (likeness "
       "{:.2f}); run `tagwrench calibrate target`, or remove {}",
       sensor.target_from.file, mismatch->id, name(sensor.target.family), mismatch->likeness,
-      sensor.target_from.file == InForce{}.file ? "rest.appearance" : "the file"));
+      sensor.target_from.file == InForce{}.file ? "rest.appearance" : "the file");
 }
 
 Tracker make_tracker(const SensorConfig& sensor) {
@@ -216,11 +216,10 @@ std::span<const SourceRow> source_rows() { return kRows; }
 
 SourceSpec parse_source(const std::string& text) {
   const Spec spec = split_spec(text);
-  for (const SourceRow& row : kRows) {
+  for (const SourceRow& row : kRows)
     if (spec.kind == row.name && (row.stands_alone || !spec.argument.empty()))
       return {&row, spec.argument};
-  }
-  throw ConfigError(fmt::format("--source {}: not a source; use {}", text, all_forms()));
+  throw ConfigError("--source {}: not a source; use {}", text, all_forms());
 }
 
 std::string source_help() {

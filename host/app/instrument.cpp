@@ -33,13 +33,13 @@ std::optional<ControlSocket> control_of(const RunOptions& options, const Outputs
     const std::string path = control_path(options.name);
     if (!on_hid || !listens(path)) return ControlSocket(path);
   } catch (const ConfigError& e) {
-    log_info(fmt::format("running without `tagwrench control`: {}", e.what()));
+    log_info("running without `tagwrench control`: {}", e.what());
     return {};
   }
   // Two devices with one serial number would be mixed up by whoever opens them by it.
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "--name {}: a bridge of this name runs already; stop it, or give this one another name",
-      options.name));
+      options.name);
 }
 
 RunLimits limits_of(const RunSession& session) {
@@ -71,16 +71,15 @@ void say_zero(const ZeroTracking& zero, const Vector6& range, double band) {
   constexpr double kSeen = 5e-4;  // of the range
   const Vector6& moved = zero.moved();
   double most = 0;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (range[i] > 0 && range[i] < kUnknownRange)
       most = std::max(most, std::abs(moved[i]) / range[i]);
-  }
   if (most < kSeen) return;
-  log_info(fmt::format(
+  log_info(
       "the zero followed what read while nobody touched: by {:.3g} {:.3g} {:.3g} N, {:.3g} {:.3g} "
       "{:.3g} mN m, {:.2g} % of the range{}",
       moved[0], moved[1], moved[2], moved[3] * 1e3, moved[4] * 1e3, moved[5] * 1e3, 100 * most,
-      most > 0.9 * band ? ", about as far as it may: run `tagwrench zero`" : ""));
+      most > 0.9 * band ? ", about as far as it may: run `tagwrench zero`" : "");
 }
 
 /// Ends it, and says so. False: something went wrong.
@@ -225,9 +224,9 @@ void Instrument::announce() const {
   for (const std::string& line : in_force(input_.sensor)) log_info(line);
   if (!input_.sensor.completed_axes.empty()) {
     log_info(
-        fmt::format("not calibrated, but as the springs are described: {}; their standard "
-                    "deviations say how little is known",
-                    input_.sensor.completed_axes));
+        "not calibrated, but as the springs are described: {}; their standard deviations say how "
+        "little is known",
+        input_.sensor.completed_axes);
   }
   if (session_.watch) session_.watch->ready(source);
 }

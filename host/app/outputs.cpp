@@ -195,7 +195,7 @@ OutputSpec parse_output(const std::string& text) {
   const Spec spec = split_spec(text);
   for (const OutputRow& row : kRows)
     if (fits(row, spec)) return {&row, spec.argument};
-  throw ConfigError(fmt::format("--output {}: not an output; use {}", text, all_forms()));
+  throw ConfigError("--output {}: not an output; use {}", text, all_forms());
 }
 
 void check_both(const OutputSpec& spec, const OutputSpec& other) {
@@ -216,9 +216,8 @@ void check_file(const OutputSpec& spec) {
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   const bool exists = ::access(path.c_str(), F_OK) == 0;
   if (::access(exists ? path.c_str() : folder.c_str(), W_OK) == 0) return;
-  throw ConfigError(
-      fmt::format("--output {}: cannot be written: {}; choose a file in a folder of yours",
-                  spec.text(), std::strerror(errno)));
+  throw ConfigError("--output {}: cannot be written: {}; choose a file in a folder of yours",
+                    spec.text(), std::strerror(errno));
 }
 
 }  // namespace
@@ -270,10 +269,9 @@ void Outputs::open(OutputSetup setup) {
     return entry.spec.argument == "-";
   });
   std::string last_refusal;
-  for (Entry& entry : entries_) {
+  for (Entry& entry : entries_)
     if (entry.spec.row->open != nullptr && entry.opened.output == nullptr)
       open(entry, setup, last_refusal);
-  }
 }
 
 /// Unasked devices often lack the same thing: it is said once.
@@ -285,7 +283,7 @@ void Outputs::open(Entry& entry, const OutputSetup& setup, std::string& last_ref
     if (entry.asked) throw;
     if (last_refusal == e.what()) return;
     last_refusal = e.what();
-    log_info(fmt::format("running without {}: {}", row.name, last_refusal));
+    log_info("running without {}: {}", row.name, last_refusal);
   }
 }
 

@@ -65,7 +65,7 @@ std::string naming(const std::string& yaml, const char* section, const char* key
     root[section][key] = file;
     return YAML::Dump(root) + "\n";
   } catch (const YAML::Exception& e) {
-    throw ConfigError(fmt::format("its sensor.yaml is no YAML: {}", e.msg));
+    throw ConfigError("its sensor.yaml is no YAML: {}", e.msg);
   }
 }
 
@@ -74,8 +74,8 @@ class TemporaryFolder {
   TemporaryFolder() {
     std::string name = (fs::temp_directory_path() / "tagwrench-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) {
-      throw ConfigError(fmt::format("{}: cannot be made: {}; set TMPDIR to a folder of yours", name,
-                                    std::strerror(errno)));
+      throw ConfigError("{}: cannot be made: {}; set TMPDIR to a folder of yours", name,
+                        std::strerror(errno));
     }
     path_ = name;
   }
@@ -97,14 +97,13 @@ void check_recording(const RecordOptions& options, std::string_view option) {
   const fs::path path = options.file;
   std::error_code error;
   if (fs::exists(fs::symlink_status(path, error))) {
-    throw ConfigError(
-        fmt::format("{} {}: exists, and a recording replaces nothing; choose another name", option,
-                    options.file));
+    throw ConfigError("{} {}: exists, and a recording replaces nothing; choose another name",
+                      option, options.file);
   }
   const fs::path folder = path.has_parent_path() ? path.parent_path() : ".";
   if (::access(folder.c_str(), W_OK) != 0) {
-    throw ConfigError(fmt::format("{} {}: cannot be written: {}; choose a folder of yours", option,
-                                  options.file, std::strerror(errno)));
+    throw ConfigError("{} {}: cannot be written: {}; choose a folder of yours", option,
+                      options.file, std::strerror(errno));
   }
 }
 
@@ -249,8 +248,8 @@ SensorConfig recorded_sensor(const record::Head& head, const std::string& record
     write_recorded_sensor(head, folder.path());
     return load_sensor(folder.path() / "sensor.yaml", use);
   } catch (const std::exception& e) {
-    throw ConfigError(fmt::format(
-        "{}: its sensor cannot be used: {}; give another one with --sensor", recording, e.what()));
+    throw ConfigError("{}: its sensor cannot be used: {}; give another one with --sensor",
+                      recording, e.what());
   }
 }
 

@@ -37,19 +37,18 @@ void check_board(const RunOptions& options, std::span<const OutputSpec> outputs)
     if (!options.cells.empty())
       throw ConfigError("--cells: the load cells are a board's; name its port with --board");
     if (reference != nullptr) {
-      throw ConfigError(
-          fmt::format("--output {}: the load cells are a board's; name its port with --board",
-                      reference->text()));
+      throw ConfigError("--output {}: the load cells are a board's; name its port with --board",
+                        reference->text());
     }
     return;
   }
   if (options.fast)
     throw ConfigError("--fast: a board has its own time; leave it out, or leave out --board");
   if (!options.source.empty() && parse_source(options.source).row->own_time) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--source {}: these pictures are of another time than what the board says now; leave out "
         "--board",
-        options.source));
+        options.source);
   }
 }
 
@@ -59,8 +58,7 @@ void check_name(const std::string& name) {
                         return std::isalnum(c) != 0 || c == '-' || c == '_';
                       });
   if (!usable)
-    throw ConfigError(
-        fmt::format("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name));
+    throw ConfigError("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name);
 }
 
 /// In the browser of the desktop, where there is one; the shell leaves it to itself, and Ctrl-C in
@@ -107,11 +105,10 @@ std::unique_ptr<WebBridge> open_web(const RunOptions& options, std::span<const O
   if (const std::string folder = config_folder(); !folder.empty())
     web.own_profiles = fs::path(folder) / "profiles";
   auto bridge = std::make_unique<WebBridge>(web, stop.get());
-  log_info(
-      fmt::format("pages: {}{}", token_made ? bridge->url_with_token() : bridge->url(),
-                  web.server.token.empty() || token_made
-                      ? ""
-                      : fmt::format("#token=... (the token is in {})", options.web.token_file)));
+  log_info("pages: {}{}", token_made ? bridge->url_with_token() : bridge->url(),
+           web.server.token.empty() || token_made
+               ? ""
+               : fmt::format("#token=... (the token is in {})", options.web.token_file));
   bridge->start();
   if (options.web.open) open_in_browser(bridge->url_with_token());
   return bridge;

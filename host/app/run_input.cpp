@@ -69,11 +69,10 @@ std::optional<Input> find_camera(const RunOptions& options, int& cameras) {
 Input find_input(const RunOptions& options) {
   int cameras = 0;
   if (std::optional<Input> input = find_camera(options, cameras)) return std::move(*input);
-  log_info(cameras == 0
-               ? "no camera found: showing the simulated sensor (--source v4l2:/dev/videoN "
-                 "picks a camera)"
-               : "no camera sees the tags: showing the simulated sensor (--source "
-                 "v4l2:/dev/videoN insists)");
+  log_info(cameras == 0 ? "no camera found: showing the simulated sensor (--source "
+                          "v4l2:/dev/videoN picks a camera)"
+                        : "no camera sees the tags: showing the simulated sensor (--source "
+                          "v4l2:/dev/videoN insists)");
   return open_input({"", "sim", options.fast});  // --sensor describes the camera that is not there
 }
 

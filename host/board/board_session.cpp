@@ -28,9 +28,8 @@ bool is_periodic(const Led& led) {
 Led moved_on(Led led, std::int64_t periods) {
   led.start_us += static_cast<std::uint32_t>(periods * led.period_us);
   if (led.mode != LedMode::pattern) return led;
-  for (periods %= kPatternBits; periods > 0; --periods) {
+  for (periods %= kPatternBits; periods > 0; --periods)
     led.pattern_seed = next_pattern_state(led.pattern_seed);
-  }
   return led;
 }
 
@@ -47,9 +46,8 @@ constexpr unsigned kQuickRequests = 20;     ///< at the start, for the clock to 
 
 /// The board's words are a stranger's bytes: no control codes to a terminal.
 void make_printable(char* text) {
-  for (; *text != 0; ++text) {
+  for (; *text != 0; ++text)
     if (*text < 0x20 || *text > 0x7E) *text = '?';
-  }
 }
 
 HostTime arrival_only(TimePoint arrival) { return {arrival, milliseconds(50), milliseconds(50)}; }

@@ -36,10 +36,10 @@ void check_span(const std::vector<CellPoint>& points) {
   const double sigma = std::hypot(std::max(most->sigma_counts, kMinSigma_counts),
                                   std::max(least->sigma_counts, kMinSigma_counts));
   if (difference < kMinSpan * sigma) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "calibrate-cell: {:g} kg changed the counts by {:.0f} only, with an uncertainty of {:.0f}; "
         "take a larger mass, or check that it rests on this cell",
-        most->mass_kg - least->mass_kg, difference, sigma));
+        most->mass_kg - least->mass_kg, difference, sigma);
   }
 }
 
@@ -110,20 +110,19 @@ struct Source {
 };
 
 [[noreturn]] void refuse(const Source& source, const std::string& why) {
-  throw ConfigError(fmt::format("{}: {}; {}", source.path, why, source.remedy));
+  throw ConfigError("{}: {}; {}", source.path, why, source.remedy);
 }
 
 [[noreturn]] void not_readable(const std::string& path, const std::string& why) {
-  throw ConfigError(fmt::format(
-      "{}: cannot be read: {}; make it readable, or give another file with --cells", path, why));
+  throw ConfigError("{}: cannot be read: {}; make it readable, or give another file with --cells",
+                    path, why);
 }
 
 /// A stranger's words: no control codes to a terminal.
 std::string printable(const std::string& text) {
   std::string out = text.substr(0, kMaxShown);
-  for (char& c : out) {
+  for (char& c : out)
     if (c < 0x20 || c > 0x7E) c = '?';
-  }
   return text.size() > kMaxShown ? out + "..." : out;
 }
 
@@ -210,10 +209,10 @@ CellCalibrations load_cells(const std::string& path, const std::string& board_id
   const json owner = root.value("board", json());
   if (!owner.is_null() && !owner.is_string()) refuse(source, "\"board\" is no text");
   if (!board_id.empty() && owner.is_string() && owner != "" && owner != board_id) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: belongs to the board {}, this one is {}; calibrate this board's cells, or give "
         "another --cells",
-        path, printable(owner.get<std::string>()), board_id));
+        path, printable(owner.get<std::string>()), board_id);
   }
   const json cells = root.value("cells", json());
   if (!cells.is_array()) refuse(source, "\"cells\" is missing");
@@ -238,8 +237,8 @@ void save_cells(const std::string& path, const std::string& board_id,
         path,
         dump_json(json({{"format", kFormat}, {"board", board_id}, {"cells", list}}), 2) + "\n");
   } catch (const std::runtime_error&) {
-    throw ConfigError(fmt::format("{}: cannot be written: {}; give another file with --cells", path,
-                                  std::strerror(errno)));
+    throw ConfigError("{}: cannot be written: {}; give another file with --cells", path,
+                      std::strerror(errno));
   }
 }
 

@@ -144,9 +144,8 @@ ClockSync::RoundTrip ClockSync::least_round_trip() const noexcept {
   for (std::size_t i = 0; i < count_; ++i) {
     double trip = round_trip(entry(i));
     if (trip >= fastest.back()) continue;
-    for (double& place : fastest) {
+    for (double& place : fastest)
       if (trip < place) std::swap(trip, place);
-    }
   }
   const double beyond_zero = std::max(-fastest[0], 0.0);
   if (count_ < kFewForRoundTrip) return {0, 0, beyond_zero};

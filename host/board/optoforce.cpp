@@ -31,10 +31,10 @@ TimePoint clock_now() { return std::chrono::steady_clock::now(); }
 
 std::array<double, OptoforceFrame::kMaxAxes> scale_of(const std::vector<double>& counts_per_unit) {
   if (counts_per_unit.size() != 3 && counts_per_unit.size() != 6) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--counts-per-unit: {} numbers, but a sensor has 3 (Fx,Fy,Fz) or 6 (and Tx,Ty,Tz); they "
         "stand in its data sheet",
-        counts_per_unit.size()));
+        counts_per_unit.size());
   }
   std::array<double, OptoforceFrame::kMaxAxes> out{};
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -61,9 +61,8 @@ std::string status_text(std::uint16_t status) {
   if (fields.sensor_error != 0) add(fmt::format("sensor error {}", fields.sensor_error));
   if (fields.overload != 0) {
     std::string axes = "overload";
-    for (unsigned i = 0; i < 6; ++i) {
+    for (unsigned i = 0; i < 6; ++i)
       if ((fields.overload >> (5 - i) & 1) != 0) axes += fmt::format(" {}", kAxes[i]);
-    }
     add(axes);
   }
   return out;
@@ -163,15 +162,13 @@ std::array<std::uint8_t, 9> optoforce_command(int rate_hz, double filter_hz, boo
   constexpr double kFilters[] = {0, 500, 150, 50, 15, 5, 1.5};
   const auto* rate =
       std::find_if(std::begin(kRates), std::end(kRates), [&](Rate r) { return r.hz == rate_hz; });
-  if (rate == std::end(kRates)) {
-    throw ConfigError(
-        fmt::format("OptoForce: it has no rate of {} Hz; use 1000, 333, 100, 30 or 10", rate_hz));
-  }
+  if (rate == std::end(kRates))
+    throw ConfigError("OptoForce: it has no rate of {} Hz; use 1000, 333, 100, 30 or 10", rate_hz);
   const auto* filter = std::find(std::begin(kFilters), std::end(kFilters), filter_hz);
   if (filter == std::end(kFilters)) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "OptoForce: it has no filter of {} Hz; use 500, 150, 50, 15, 5, 1.5 or 0 for none",
-        filter_hz));
+        filter_hz);
   }
   std::array<std::uint8_t, 9> out{0xAA,
                                   0x00,

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 
 namespace tagwrench::link {
 namespace {
@@ -38,9 +37,8 @@ void SampleHistory::add(TimePoint time, Duration time_sigma, double value, doubl
 void SampleHistory::watch_noise() noexcept {
   const std::size_t n = samples_.size();
   if (n < 4) return;
-  for (std::size_t i = n - 3; i < n; ++i) {
+  for (std::size_t i = n - 3; i < n; ++i)
     if (samples_[i].after_gap) return;
-  }
   const double third = samples_[n - 1].value - 3 * samples_[n - 2].value +
                        3 * samples_[n - 3].value - samples_[n - 4].value;
   ++thirds_;
@@ -53,10 +51,10 @@ double SampleHistory::noise() const noexcept {
 }
 
 std::size_t SampleHistory::first_after(TimePoint time) const noexcept {
-  const auto places = std::views::iota(0U, static_cast<unsigned>(samples_.size()));
-  const auto after = std::ranges::upper_bound(
-      places, time, {}, [this](unsigned place) { return samples_[place].time; });
-  return static_cast<std::size_t>(after - places.begin());
+  // The newest is what is asked about: few steps back from the end.
+  std::size_t first = samples_.size();
+  while (first > 0 && samples_[first - 1].time > time) --first;
+  return first;
 }
 
 /// Mean size of the second differences on either side of the interval that ends at `right`.

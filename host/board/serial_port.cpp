@@ -90,9 +90,8 @@ fs::path usb_device_above(const fs::path& tty, const fs::path& root) {
   std::error_code error;
   fs::path folder = fs::canonical(tty / "device", error);
   if (error) return {};
-  for (; folder.has_relative_path() && folder != root; folder = folder.parent_path()) {
+  for (; folder.has_relative_path() && folder != root; folder = folder.parent_path())
     if (fs::exists(folder / "idVendor", error)) return folder;
-  }
   return {};
 }
 
@@ -148,9 +147,8 @@ bool is_pseudo(const struct stat& device) {
 }
 
 speed_t speed_of(unsigned baud) {
-  for (const auto& [rate, speed] : kBauds) {
+  for (const auto& [rate, speed] : kBauds)
     if (rate == baud) return speed;
-  }
   return B0;
 }
 
@@ -253,11 +251,10 @@ std::string only_port(const std::string& option, const std::string& folder) {
   const std::vector<std::string> ports = stable_ports(folder);
   if (ports.size() == 1) return ports.front();
   if (ports.empty())
-    throw ConfigError(fmt::format(
-        "board: no USB serial port is plugged in here; plug the board in, or give {} PATH",
-        option));
-  throw ConfigError(fmt::format("board: {} serial ports are plugged in; pick one with {}: {}",
-                                ports.size(), option, fmt::join(ports, ", ")));
+    throw ConfigError(
+        "board: no USB serial port is plugged in here; plug the board in, or give {} PATH", option);
+  throw ConfigError("board: {} serial ports are plugged in; pick one with {}: {}", ports.size(),
+                    option, fmt::join(ports, ", "));
 }
 
 std::optional<UsbIdentity> parse_usb_identity(const std::string& text, const std::string& option) {
@@ -272,10 +269,9 @@ std::optional<UsbIdentity> parse_usb_identity(const std::string& text, const std
           : hex16(rest.substr(first + 1,
                               second == std::string_view::npos ? second : second - first - 1));
   if (!vendor || !product) {
-    throw ConfigError(fmt::format(
-        "{} '{}': not usb:VENDOR:PRODUCT[:SERIAL] in hex; for example usb:2341:0043, see "
-        "`lsusb`",
-        option, text));
+    throw ConfigError(
+        "{} '{}': not usb:VENDOR:PRODUCT[:SERIAL] in hex; for example usb:2341:0043, see `lsusb`",
+        option, text);
   }
   UsbIdentity out{*vendor, *product, {}};
   if (second != std::string_view::npos) out.serial = rest.substr(second + 1);
@@ -283,9 +279,8 @@ std::optional<UsbIdentity> parse_usb_identity(const std::string& text, const std
 }
 
 std::string_view usb_board_name(std::uint16_t vendor, std::uint16_t product) {
-  for (const KnownBoard& board : kKnown) {
+  for (const KnownBoard& board : kKnown)
     if (board.vendor == vendor && board.product == product) return board.name;
-  }
   return {};
 }
 
@@ -310,23 +305,22 @@ std::string find_usb_port(const UsbIdentity& identity, const std::string& option
       described(identity.vendor, identity.product) +
       (identity.serial.empty() ? std::string() : " with serial number " + identity.serial);
   if (nodes.size() > 1) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: {} of them are plugged in ({}); add the serial number, usb:VENDOR:PRODUCT:SERIAL",
-        wanted, nodes.size(), fmt::join(nodes, ", ")));
+        wanted, nodes.size(), fmt::join(nodes, ", "));
   }
   const Bus bus = look_at_bus(identity);
   if (bus.has_it && identity.serial.empty()) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: is plugged in, but has no serial port; load its driver (cdc_acm, ch341, ftdi_sio or "
         "cp210x)",
-        wanted));
+        wanted);
   }
   if (bus.boards.empty())
-    throw ConfigError(fmt::format(
-        "{}: is not plugged in, nor is any other board that is known; plug it in", wanted));
-  throw ConfigError(
-      fmt::format("{}: is not plugged in; plug it in, or give {} one that is there: {}", wanted,
-                  option, fmt::join(bus.boards, ", ")));
+    throw ConfigError("{}: is not plugged in, nor is any other board that is known; plug it in",
+                      wanted);
+  throw ConfigError("{}: is not plugged in; plug it in, or give {} one that is there: {}", wanted,
+                    option, fmt::join(bus.boards, ", "));
 }
 
 SerialPort::SerialPort(const std::string& path, unsigned baud, const std::string& option) {

@@ -38,7 +38,7 @@ char known_separator(const std::string& text) {
   if (text == "tab" || text == "\\t") return '\t';
   if (text.size() == 1 && std::string_view(";,|:\t ").find(text[0]) != std::string_view::npos)
     return text[0];
-  throw ConfigError(fmt::format("--separator: '{}' is none; use ; , tab or auto", text));
+  throw ConfigError("--separator: '{}' is none; use ; , tab or auto", text);
 }
 
 /// That `out` can be written, is none of the files that are read, and replaces nothing unasked.
@@ -46,15 +46,13 @@ void check_output(const char* option, const std::filesystem::path& out, bool for
                   const std::vector<std::filesystem::path>& inputs) {
   for (const std::filesystem::path& input : inputs) {
     std::error_code none;
-    if (std::filesystem::equivalent(out, input, none)) {
-      throw ConfigError(
-          fmt::format("{} {}: is what is to be read; name another file", option, out.string()));
-    }
+    if (std::filesystem::equivalent(out, input, none))
+      throw ConfigError("{} {}: is what is to be read; name another file", option, out.string());
   }
   std::error_code none;
   if (!force && std::filesystem::exists(std::filesystem::symlink_status(out, none))) {
-    throw ConfigError(fmt::format("{} {}: is there already; name another file, or --force", option,
-                                  out.string()));
+    throw ConfigError("{} {}: is there already; name another file, or --force", option,
+                      out.string());
   }
   check_replaceable(out);
 }
@@ -136,7 +134,7 @@ int analyze(const AnalyzeOptions& o) {
   if (!o.json.empty() && o.json != "-") check_output("--json", o.json, o.force, inputs);
   if (!o.data.empty()) check_output("--data", o.data, o.force, inputs);
   if (!o.data.empty() && o.json == o.data)
-    throw ConfigError(fmt::format("--data {}: is where --json goes; name another file", o.data));
+    throw ConfigError("--data {}: is where --json goes; name another file", o.data);
 
   std::vector<study::Trial> trials;
   std::vector<std::string> notes;

@@ -83,27 +83,26 @@ Record open_record(const CalibrateCameraOptions& options) {
   record.sensor = parse_sensor(paper_sensor_yaml(), "the built-in sensor");
   std::error_code error;
   if (fs::is_regular_file(record.fresh, error)) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: is there already, and --out makes a whole new sensor.yaml; measure the camera for it "
         "with --sensor {}, or name a new file",
-        record.fresh, record.fresh));
+        record.fresh, record.fresh);
   }
   check_replaceable(record.fresh);
   const fs::path folder = measured_folder(record.fresh);
   if (fs::exists(folder, error)) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--out {}: the folder {} is that of another sensor; name a file in another folder",
-        record.fresh, folder.string()));
+        record.fresh, folder.string());
   }
   return record;
 }
 
 void write(const Record& record, const CameraFit& fit) {
-  if (record.known()) {
+  if (record.known())
     record.measured->make({});
-  } else {
+  else
     write_atomically(record.fresh, paper_sensor_yaml(fit.camera));
-  }
   const fs::path file = record.file();
   write_measured(measured_folder(file) / kMeasuredCamera,
                  camera_yaml(camera_file(file, fit), file.stem().string()));
@@ -114,10 +113,10 @@ CameraModel camera_for(const Record& record, const SourceFormat& format) {
   CameraModel camera = record.sensor.camera;
   if (record.known()) {
     if (camera.width_px == format.width && camera.height_px == format.height) return camera;
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: frames are {}x{}, but sensor.yaml's camera is {}x{}; ask the camera for that size, or "
         "set width and height in sensor.yaml",
-        format.description, format.width, format.height, camera.width_px, camera.height_px));
+        format.description, format.width, format.height, camera.width_px, camera.height_px);
   }
   camera = {};
   camera.width_px = format.width;
@@ -138,9 +137,9 @@ std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& opt
     const SourceFormat& first = sources.front()->format();
     const SourceFormat& format = sources.back()->format();
     if (format.width != first.width || format.height != first.height) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "{}: its pictures are {}x{}, those of {} are {}x{}; give pictures of one camera and size",
-          folder, format.width, format.height, folders.front(), first.width, first.height));
+          folder, format.width, format.height, folders.front(), first.width, first.height);
     }
   }
   auto collector =
@@ -157,12 +156,11 @@ std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& opt
         collector->look(frame.image, source->path_of(frame.sequence));
       if (Clock::now() - said < kSayEvery) continue;
       said = Clock::now();
-      log_info(fmt::format("{} of {} pictures, {} views", seen, all, collector->views().size()));
+      log_info("{} of {} pictures, {} views", seen, all, collector->views().size());
     }
     if (const std::string bad = source->unusable(); !bad.empty()) log_info(bad);
   }
-  log_info(
-      fmt::format("{} pictures, {} different views of the board", seen, collector->views().size()));
+  log_info("{} pictures, {} different views of the board", seen, collector->views().size());
   collector->thin_out(options.views.value_or(kViewsFromFolders));
   return collector;
 }
@@ -310,33 +308,31 @@ void report(const CameraFit& fit, const std::vector<CameraView>& views, const Co
   const auto& s = fit.sigma;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!fit.views[i].used) {
-      log_info(fmt::format("dropped {}: reprojection error {:.3f} px stands out from the others'",
-                           views[i].name, fit.views[i].rms_px));
+      log_info("dropped {}: reprojection error {:.3f} px stands out from the others'",
+               views[i].name, fit.views[i].rms_px);
     }
   }
-  log_info(fmt::format(
-      "fx {:.2f} +- {:.2f}, fy {:.2f} +- {:.2f}, cx {:.2f} +- {:.2f}, cy {:.2f} +- {:.2f} px",
-      now.fx_px, s[0], now.fy_px, s[1], now.cx_px, s[2], now.cy_px, s[3]));
+  log_info("fx {:.2f} +- {:.2f}, fy {:.2f} +- {:.2f}, cx {:.2f} +- {:.2f}, cy {:.2f} +- {:.2f} px",
+           now.fx_px, s[0], now.fy_px, s[1], now.cx_px, s[2], now.cy_px, s[3]);
   const auto& [k1, k2, p1, p2, k3] = now.distortion;
-  log_info(fmt::format(
-      "distortion k1 {:.4f} +- {:.4f}, k2 {:.4f} +- {:.4f}, p1 {:.5f} +- {:.5f}, p2 {:.5f} "
-      "+- {:.5f}, k3 {:.4f}{}",
+  log_info(
+      "distortion k1 {:.4f} +- {:.4f}, k2 {:.4f} +- {:.4f}, p1 {:.5f} +- {:.5f}, p2 {:.5f} +- "
+      "{:.5f}, k3 {:.4f}{}",
       k1, s[4], k2, s[5], p1, s[6], p2, s[7], k3,
-      k3 == 0 ? " (fixed: it does not help)" : fmt::format(" +- {:.4f}", s[8])));
-  log_info(fmt::format(
+      k3 == 0 ? " (fixed: it does not help)" : fmt::format(" +- {:.4f}", s[8]));
+  log_info(
       "reprojection error {:.3f} px RMS over {} views, {} dropped; corners in {} of 9 regions, "
       "tilts to {:.0f} degrees",
       fit.rms_px, fit.used, views.size() - static_cast<std::size_t>(fit.used), coverage.regions(),
-      coverage.largest_tilt() * 57.29578));
+      coverage.largest_tilt() * 57.29578);
   if (const std::vector<std::string> missing = coverage.missing(); !missing.empty())
     log_info("it would be better still with " + listed(missing));
   if (!record.known()) return;
-  log_info(
-      fmt::format("before: fx {:.2f} ({:+.2f} %), fy {:.2f} ({:+.2f} %), cx {:.2f}, cy {:.2f} px",
-                  old.fx_px, 100 * (now.fx_px / old.fx_px - 1), old.fy_px,
-                  100 * (now.fy_px / old.fy_px - 1), old.cx_px, old.cy_px));
+  log_info("before: fx {:.2f} ({:+.2f} %), fy {:.2f} ({:+.2f} %), cx {:.2f}, cy {:.2f} px",
+           old.fx_px, 100 * (now.fx_px / old.fx_px - 1), old.fy_px,
+           100 * (now.fy_px / old.fy_px - 1), old.cx_px, old.cy_px);
   if (const std::string parts = stale(record); !parts.empty())
-    log_info(fmt::format("of the camera before: {}; run `tagwrench calibrate target`", parts));
+    log_info("of the camera before: {}; run `tagwrench calibrate target`", parts);
 }
 
 std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
@@ -366,9 +362,8 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   if (!collector) return stopped_unwritten();
   collector->check();
   if (collector->mirrored() != record.sensor.camera.mirrored) {
-    log_info(fmt::format("the camera's image is {}: writing mirrored: {}",
-                         collector->mirrored() ? "mirrored" : "not mirrored",
-                         collector->mirrored()));
+    log_info("the camera's image is {}: writing mirrored: {}",
+             collector->mirrored() ? "mirrored" : "not mirrored", collector->mirrored());
   }
   const std::vector<CameraView>& views = collector->views();
   check_views(views, collector->coverage());
@@ -377,16 +372,15 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   CameraFit fit = fit_camera(views, width, height);
   fit.camera.mirrored = collector->mirrored();
   Coverage coverage(width, height);
-  for (std::size_t i = 0; i < views.size(); ++i) {
+  for (std::size_t i = 0; i < views.size(); ++i)
     if (fit.views[i].used) coverage.add(views[i].corners, fit.views[i].pose);
-  }
   check_fit(fit, coverage);
   if (termination_requested()) return stopped_unwritten();
   write(record, fit);
   report(fit, views, coverage, record);
   const fs::path folder = measured_folder(record.file());
-  log_info(fmt::format("written: {}{}", record.known() ? "" : record.fresh + " and ",
-                       (folder / kMeasuredCamera).string()));
+  log_info("written: {}{}", record.known() ? "" : record.fresh + " and ",
+           (folder / kMeasuredCamera).string());
   if (!record.sensor.calibration.empty() || is_measured(folder, kMeasuredWrench))
     log_info(
         "the calibration in newtons was made with the lens as it was described; run `tagwrench "
@@ -401,8 +395,7 @@ void calibrate_camera_command(command_line::Command family) {
   auto verb = family.add_subcommand(
       "camera", "the lens, from a printed board shown to the camera (tagwrench tags --board)");
   auto source = verb.add_option("--source", o->source,
-                                "the camera: v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or "
-                                "images:DIR");
+                                "the camera: v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or images:DIR");
   auto images = verb.add_option("--images", o->folders, "folders of pictures of the board");
   source.excludes(images);
   verb.add_option("--board", o->board,
@@ -411,8 +404,8 @@ void calibrate_camera_command(command_line::Command family) {
       .required();
   verb.add_option("--sensor", o->sensor, "sensor.yaml whose camera this is");
   verb.add_option("--out", o->out,
-                  "a new sensor.yaml to make; what is found goes into measured/ beside it, "
-                  "without --out beside --sensor");
+                  "a new sensor.yaml to make; what is found goes into measured/ beside it, without "
+                  "--out beside --sensor");
   verb.add_option("--views", o->views,
                   "views of the board to use: as many at least from a camera, at most from folders")
       .check(command_line::range(kMinCameraViews, kMaxCameraViews));

@@ -52,17 +52,16 @@ class MotionGuide {
     if (Clock::now() - said_ < kAdviseEvery) return;
     said_ = Clock::now();
     if (!record.rest_known()) {
-      log_info(fmt::format("{} frames; waiting for all tags, at rest", record.counts().frames));
+      log_info("{} frames; waiting for all tags, at rest", record.counts().frames);
       return;
     }
     const Vector6 range = record.range();
-    log_info(fmt::format(
+    log_info(
         "{} frames, {} different pictures; x {:.2f} y {:.2f} z {:.2f} mm, about x {:.1f} y {:.1f} "
-        "z "
-        "{:.1f} degrees{}",
+        "z {:.1f} degrees{}",
         record.counts().frames, record.keyframes().size(), range[0] * 1e3, range[1] * 1e3,
         range[2] * 1e3, range[3] * 57.29578, range[4] * 57.29578, range[5] * 57.29578,
-        track.status == Status::ok ? "" : "; the tags are not held"));
+        track.status == Status::ok ? "" : "; the tags are not held");
   }
 
  private:
@@ -144,18 +143,18 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   Events events(options.events);
   TargetRecorder record(sensor.camera, sensor.target, sensor.rest, kMaxKeyframes);
   log_info("source: " + input.source->format().description);
-  log_info(fmt::format("hands off until {} frames at rest are taken", sensor.rest.frames));
+  log_info("hands off until {} frames at rest are taken", sensor.rest.frames);
   if (!watch(*input.source, options, stop, record, events)) return stopped_unwritten();
   check_record(record, sensor.target, sensor.rest);
 
-  log_info(fmt::format("adjusting to {} pictures", record.keyframes().size()));
+  log_info("adjusting to {} pictures", record.keyframes().size());
   TimePoint said = Clock::now();
   const TargetEstimate estimate =
       adjust_target(record.at_rest(), record.keyframes(), [&](double share) {
         events.progress(kSeeingFraction + (1 - kSeeingFraction) * share);
         if (Clock::now() - said >= kAdviseEvery) {
           said = Clock::now();
-          log_info(fmt::format("{:.0f} %", 100 * share));
+          log_info("{:.0f} %", 100 * share);
         }
         return !termination_requested();
       });
@@ -168,8 +167,8 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   for (const std::string& line : describe(record, estimate, sensor.target, sensor.camera))
     log_info(line);
   if (readout_is_clear(estimate)) log_info("the shutter rolls: readout_ms is written too");
-  log_info(fmt::format("written: {} and {}", (measured.folder() / kMeasuredTarget).string(),
-                       (measured.folder() / kMeasuredPicture).string()));
+  log_info("written: {} and {}", (measured.folder() / kMeasuredTarget).string(),
+           (measured.folder() / kMeasuredPicture).string());
   if (!sensor.calibration.empty() || is_measured(measured.folder(), kMeasuredWrench))
     log_info(
         "the calibration in newtons was made with the target as it was; run `tagwrench calibrate "
@@ -192,9 +191,9 @@ void calibrate_target_command(command_line::Command family) {
                   "beside it, without --out beside --sensor");
   verb.add_option("--frames", o->frames, "use no more than N frames")
       .check(command_line::range(1, 2'000'000'000));
-  verb.add_option("--seconds", o->seconds,
-                  "use no more than S seconds; without it a folder is used up and anything else "
-                  "for 30 s")
+  verb.add_option(
+          "--seconds", o->seconds,
+          "use no more than S seconds; without it a folder is used up and anything else for 30 s")
       .check(calibration_seconds());
   add_events_option(verb, o->events);
   verb.runs([o] { return calibrate_target(*o); });

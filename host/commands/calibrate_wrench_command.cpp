@@ -74,11 +74,11 @@ Vector6 full_load(const SensorConfig& sensor) {
 Matrix6 known_stiffness(const SensorConfig& sensor, const std::string& file) {
   if (sensor.spring_stiffness) return *sensor.spring_stiffness;
   if (!sensor.calibration.empty()) return load_sensor(file).wrench.K;
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "{}: wrench: has no springs, so that nobody knows what a load should do; describe them "
       "roughly, wrench: {{springs: {{centres_mm: ..., axial_n_per_mm: ..., lateral_n_per_mm: "
       "...}}}}",
-      file));
+      file);
 }
 
 // What is refused before anything is measured; all throw ConfigError.
@@ -90,57 +90,52 @@ void check_plan(const WrenchPlan& plan, const Vector6& range, bool require_all) 
   for (const std::string& line : coverage_of(plan, range).missing())
     missing += (missing.empty() ? "" : "; ") + line;
   if (missing.empty()) return;
-  if (require_all) throw ConfigError(fmt::format("--plan {}: {}; add steps", plan.name, missing));
+  if (require_all) throw ConfigError("--plan {}: {}; add steps", plan.name, missing);
   log_info(
-      fmt::format("--plan {}: {}; that stays as the spring model has it and is marked so "
-                  "(--require-all refuses)",
-                  plan.name, missing));
+      "--plan {}: {}; that stays as the spring model has it and is marked so (--require-all "
+      "refuses)",
+      plan.name, missing);
 }
 
 /// What is in the way of the files to be written.
 void check_files(const CalibrationFiles& files, const CalibrateWrenchOptions& options) {
   std::error_code none;
   const fs::path folder = files.calibration.parent_path();
-  if (folder.filename() == kMeasuredFolder && !fs::exists(folder, none)) {
+  if (folder.filename() == kMeasuredFolder && !fs::exists(folder, none))
     check_measurable(folder, {});
-  } else {
+  else
     for (const fs::path& file : {files.calibration, files.data, files.progress, files.before})
       check_replaceable(file);
-  }
   const bool waits = fs::exists(files.progress, none);
   if (options.resume && !waits) {
-    throw ConfigError(fmt::format("--resume: there is no {} to go on from; leave it out",
-                                  files.progress.string()));
+    throw ConfigError("--resume: there is no {} to go on from; leave it out",
+                      files.progress.string());
   }
   if (options.resume || options.force) return;
   if (waits) {
-    throw ConfigError(
-        fmt::format("{}: a calibration was stopped here; --resume goes on, --force begins anew",
-                    files.progress.string()));
+    throw ConfigError("{}: a calibration was stopped here; --resume goes on, --force begins anew",
+                      files.progress.string());
   }
   if (!fs::exists(files.calibration, none)) return;
   try {
     read_calibration(files.calibration);
   } catch (const ConfigError&) {
-    throw ConfigError(
-        fmt::format("--out {}: is there, but is no calibration; name another file, "
-                    "or --force",
-                    files.calibration.string()));
+    throw ConfigError("--out {}: is there, but is no calibration; name another file, or --force",
+                      files.calibration.string());
   }
 }
 
 /// Pictures cannot be asked to hang a weight, and a person before a camera needs no pipe.
 void check_source(const CalibrateWrenchOptions& options) {
   if (!options.emulated_cell.empty() && !parse_source(options.source).is(SourceKind::simulator)) {
-    throw ConfigError(
-        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
-                    options.source));
+    throw ConfigError("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
+                      options.source);
   }
   if (parse_source(options.source).is(SourceKind::images)) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--source {}: nobody is there who could do what the plan asks; give a camera, sim, or the "
         "recording of a calibration",
-        options.source));
+        options.source);
   }
   if (!options.record) return;
   check_recording(*options.record, "--record");
@@ -178,10 +173,10 @@ void check_resumable(const SensorConfig& sensor, const WrenchPlan& plan, const P
   if (next == static_cast<int>(plan.steps.size()) ||
       plan.steps[static_cast<std::size_t>(next)].mounting == plan.steps.front().mounting)
     return;
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "--resume: this sensor's rest is learned anew at every start, and now it lies otherwise than "
       "when {} was begun; run `tagwrench calibrate target`, then begin again with --force",
-      partial.string()));
+      partial.string());
 }
 
 std::string now_utc() {
@@ -261,13 +256,12 @@ void fit_and_write(const CalibrateWrenchOptions& options, const Subject& subject
        describe(plan, data, fit, subject.range, subject.sensor.wrench.range))
     log_info(line);
   if (!poorer.empty()) log_info(poorer);
-  log_info(fmt::format("written: {} and {}", subject.files.calibration.string(),
-                       subject.files.data.string()));
+  log_info("written: {} and {}", subject.files.calibration.string(), subject.files.data.string());
   if (is_in_force(options, subject.files)) {
     void_zero(options.sensor);
   } else {
-    log_info(fmt::format("it is in force as soon as it is {}, or {} names it as wrench.calibration",
-                         measured_wrench(options).string(), options.sensor));
+    log_info("it is in force as soon as it is {}, or {} names it as wrench.calibration",
+             measured_wrench(options).string(), options.sensor);
   }
 }
 
@@ -291,14 +285,12 @@ int say_stopped(GuideEnd end, const WrenchGuide& guide, const fs::path& progress
 bool end_recording(CalibrationRecorder& recorder, const std::string& file) {
   const std::string trouble = recorder.finish();
   const record::WriterState state = recorder.state();
-  log_info(
-      fmt::format("recording {}: {} frames, {:.3g} MB{}", file, state.frames,
-                  1e-6 * static_cast<double>(state.bytes),
-                  state.lost_frames > 0
-                      ? fmt::format("; the disk was too slow for {} of them; --keep region keeps "
-                                    "less",
-                                    state.lost_frames)
-                      : ""));
+  log_info("recording {}: {} frames, {:.3g} MB{}", file, state.frames,
+           1e-6 * static_cast<double>(state.bytes),
+           state.lost_frames > 0
+               ? fmt::format("; the disk was too slow for {} of them; --keep region keeps less",
+                             state.lost_frames)
+               : "");
   if (!trouble.empty()) log_info(trouble);
   return trouble.empty() && state.lost_frames == 0 && state.lost_others == 0;
 }
@@ -325,7 +317,7 @@ int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles
     const Progress progress = load_progress(files.progress, of, plan);
     check_resumable(sensor, plan, progress, files.progress);
     guide.resume(progress.records, progress.skipped);
-    log_info(fmt::format("going on: {} steps are done", progress.records.size()));
+    log_info("going on: {} steps are done", progress.records.size());
   }
   const std::unique_ptr<Reference> reference =
       open_reference(plan, options, at.bench.get(), at.time_zero);
@@ -367,10 +359,10 @@ int calibrate_live(const CalibrateWrenchOptions& options, const CalibrationFiles
 WrenchPlan plan_of_recording(const CalibrateWrenchOptions& options,
                              const RecordedCalibration& recorded) {
   if (recorded.plan_yaml.empty()) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--source {}: holds no calibration; record one with `tagwrench calibrate wrench --record "
         "FILE`",
-        options.source));
+        options.source);
   }
   WrenchPlan its = parse_plan(recorded.plan_yaml, recorded.plan);
   if (options.plan.empty()) return its;
@@ -381,10 +373,10 @@ WrenchPlan plan_of_recording(const CalibrateWrenchOptions& options,
                                  return a.kind == b.kind && a.visit == b.visit;
                                });
   if (!same) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--plan {}: asks for other steps than the recording's plan, {}; correct its numbers only, "
         "or leave --plan out",
-        options.plan, recorded.plan));
+        options.plan, recorded.plan);
   }
   return ours;
 }
@@ -412,13 +404,11 @@ int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFile
       recorded_sensor(recording.head(), recording.path().string(), WrenchCalibration::ignore);
   const std::string other = difference(identity_of(then.camera, then.target, then.rest),
                                        identity_of(sensor.camera, sensor.target, sensor.rest));
-  if (!other.empty())
-    log_info(fmt::format("recorded with another sensor.yaml ({}); --sensor counts", other));
+  if (!other.empty()) log_info("recorded with another sensor.yaml ({}); --sensor counts", other);
   const Subject subject{files, sensor, stiffness_before(sensor, recording), full_load(sensor)};
   check_plan(plan, subject.range, options.require_all);
   log_info("source: " + input.source->format().description);
-  log_info(fmt::format("plan {}, {}: {} steps were accepted", plan.name, recorded.reference,
-                       steps.size()));
+  log_info("plan {}, {}: {} steps were accepted", plan.name, recorded.reference, steps.size());
   if (const std::string missing = not_recorded(steps, plan); !missing.empty())
     log_info("not in the recording: " + missing);
 
@@ -454,13 +444,13 @@ void calibrate_wrench_command(command_line::Command family) {
   verb.add_flag("--list-plans", o->list_plans, "name the ready-made plans");
   verb.add_option("--show-plan", o->show_plan, "print a plan, to be changed and given as a file");
   verb.add_option("--sensor", o->sensor, "sensor.yaml of this sensor");
-  verb.add_option("--source", o->source,
-                  "sim | sim:SCENARIO.yaml, which loads itself, or "
-                  "v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or recording:FILE of --record, whose "
-                  "loads are fitted once more");
-  verb.add_option("--plan", o->plan,
-                  "a ready-made plan (--list-plans) or a plan file; of a recording, without it "
-                  "its own");
+  verb.add_option(
+      "--source", o->source,
+      "sim | sim:SCENARIO.yaml, which loads itself, or v4l2:/dev/videoN[,WxH[@FPS][,FOURCC]]; or "
+      "recording:FILE of --record, whose loads are fitted once more");
+  verb.add_option(
+      "--plan", o->plan,
+      "a ready-made plan (--list-plans) or a plan file; of a recording, without it its own");
   verb.add_option("--out", o->out,
                   "file to write; without it measured/wrench.json beside --sensor");
   verb.add_option("--notes", o->notes, "temperature, place, who: goes into the record");
@@ -490,9 +480,9 @@ void calibrate_wrench_command(command_line::Command family) {
       .needs(record);
   verb.add_flag("--resume", o->resume, "go on with a calibration that was stopped");
   verb.add_flag("--force", o->force, "begin anew, whatever is there");
-  verb.add_flag("--require-all", o->require_all,
-                "refuse unless all six axes are measured, in place of completing them from the "
-                "spring model");
+  verb.add_flag(
+      "--require-all", o->require_all,
+      "refuse unless all six axes are measured, in place of completing them from the spring model");
   verb.add_option("--seconds", o->seconds, "stop after S seconds of frames; --resume goes on")
       .check(calibration_seconds());
   add_events_option(verb, o->events);

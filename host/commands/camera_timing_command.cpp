@@ -60,10 +60,10 @@ struct Bench {
 Bench simulated_bench(const std::string& sensor, const std::string& source, bool fast) {
   const SourceSpec spec = parse_source(source);
   if (!spec.is(SourceKind::simulator)) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--port sim: the simulated lamp lights the simulated sensor alone; use --source sim or "
         "--source sim:SCENARIO.yaml with it, not {}",
-        source));
+        source);
   }
   const sim::Scenario scenario =
       spec.argument.empty() ? sim::Scenario{} : load_scenario(spec.argument);
@@ -85,10 +85,10 @@ Bench board_bench(const std::string& sensor, const std::string& source, const st
                   bool fast) {
   if (fast) throw ConfigError("--fast: a board has its own time; leave it out, or use --port sim");
   if (!parse_source(source).is(SourceKind::camera)) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--port {}: a board lights cameras; use --source v4l2:/dev/videoN with it, or --port sim "
         "for the simulated sensor",
-        port));
+        port);
   }
   Bench bench;
   bench.board = std::make_unique<BoardLoop>(port, link::new_session());
@@ -112,8 +112,7 @@ void check_report_file(const std::string& file) {
   try {
     check_replaceable(file);
   } catch (const ConfigError&) {
-    throw ConfigError(
-        fmt::format("--json {}: cannot be written; name a file in a folder of yours", file));
+    throw ConfigError("--json {}: cannot be written; name a file in a folder of yours", file);
   }
 }
 
@@ -125,7 +124,7 @@ class Processing {
     try {
       device_ = std::make_unique<WrenchHidOutput>(WrenchHidOptions{});
     } catch (const ConfigError& e) {
-      log_info(fmt::format("measured up to the wrench, without HID device: {}", e.what()));
+      log_info("measured up to the wrench, without HID device: {}", e.what());
     }
   }
   void take(Frame& frame) noexcept {
@@ -153,8 +152,8 @@ class Processing {
 void check_screen(const TimingOptions& o) {
   const std::string kind = split_spec(o.screen).kind;
   if (!o.screen.empty() && o.screen != "window" && kind != "web") {
-    throw ConfigError(fmt::format(
-        "--screen {}: is no screen; use --screen, or --screen web, or web:ADDRESS:PORT", o.screen));
+    throw ConfigError(
+        "--screen {}: is no screen; use --screen, or --screen web, or web:ADDRESS:PORT", o.screen);
   }
   if (kind != "web" && !o.web_token.empty())
     throw ConfigError("--web-token: is for a page; use it with --screen web:ADDRESS:PORT");
@@ -273,10 +272,9 @@ int measure_camera(const TimingOptions& o) {
 
 void camera_timing_command(command_line::Command program) {
   const auto o = std::make_shared<TimingOptions>();
-  auto verb = program.add_subcommand(
-      "camera-timing",
-      "measure the camera with the LED: true frame rate, latency, jitter, read-out, stale and "
-      "missing frames");
+  auto verb = program.add_subcommand("camera-timing",
+                                     "measure the camera with the LED: true frame rate, latency, "
+                                     "jitter, read-out, stale and missing frames");
   verb.footer(
       "With a board, its LED lights the picture: steadily for 3 s, not at all for 1 s, then in a\n"
       "pattern. Hands off, and little light from elsewhere. Without a board, --screen shows a "

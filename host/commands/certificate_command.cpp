@@ -33,8 +33,8 @@ constexpr std::size_t kNumberLength = 12;     // hexadecimal digits
 fs::path calibration_of(const std::string& sensor) {
   fs::path file = load_sensor(sensor).calibration;
   if (file.empty()) {
-    throw ConfigError(fmt::format(
-        "{}: there is no calibration in newtons; run `tagwrench calibrate wrench` first", sensor));
+    throw ConfigError(
+        "{}: there is no calibration in newtons; run `tagwrench calibrate wrench` first", sensor);
   }
   return file;
 }
@@ -132,8 +132,8 @@ void add_calibration(const CalibrationRecord& record, study::Analysis& analysis)
       const std::string why =
           report.excitation < study::kMinExcitation
               ? fmt::format(
-                    "the scores on held-out readings hold the reference's own noise, which "
-                    "the load exceeds {:.0f} times only",
+                    "the scores on held-out readings hold the reference's own noise, which the "
+                    "load exceeds {:.0f} times only",
                     report.excitation)
               : "but it was never loaded without the others, so that its scores are theirs too";
       remarks.push_back(fmt::format("{}: calibrated, its answer known to {:.1f} %; {}",
@@ -142,11 +142,10 @@ void add_calibration(const CalibrationRecord& record, study::Analysis& analysis)
   }
   for (const std::string& line : axis_warnings(analysis)) remarks.push_back(line);
   analysis.warnings.insert(analysis.warnings.begin(), remarks.begin(), remarks.end());
-  for (const std::string& warning : record.warnings) {
+  for (const std::string& warning : record.warnings)
     if (std::find(analysis.warnings.begin(), analysis.warnings.end(), warning) ==
         analysis.warnings.end())
       analysis.warnings.push_back(warning);
-  }
 }
 
 struct CertificateOptions {
@@ -177,14 +176,14 @@ Subject subject_of(const CertificateOptions& o) {
   }
   const CalibrationRecord& record = subject.calibration->record;
   if (record.data_file.empty()) {
-    throw ConfigError(fmt::format("{}: does not say which data it was made of; name FILE.data.csv",
-                                  file.string()));
+    throw ConfigError("{}: does not say which data it was made of; name FILE.data.csv",
+                      file.string());
   }
   const fs::path data = file.parent_path() / fs::path(record.data_file).filename();
   if (sha256_hex(read_text(data)) != record.data_sha256) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: is not the data that {} was made of (SHA-256 differs); find those or calibrate again",
-        data.string(), file.string()));
+        data.string(), file.string());
   }
   subject.data.push_back(data);
   return subject;
@@ -233,16 +232,14 @@ bool may_replace(const CertificateOptions& o, const std::vector<fs::path>& files
   if (o.force) return true;
   for (const fs::path& file : files) {
     if (!fs::exists(fs::symlink_status(file))) continue;
-    if (::isatty(STDIN_FILENO) != 1 || ::isatty(STDERR_FILENO) != 1) {
-      throw ConfigError(
-          fmt::format("{}: is there already; give another --out, or --force", file.string()));
-    }
+    if (::isatty(STDIN_FILENO) != 1 || ::isatty(STDERR_FILENO) != 1)
+      throw ConfigError("{}: is there already; give another --out, or --force", file.string());
     std::cerr << fmt::format("tagwrench: {} is there already. Replace it? [y/N] ", file.string())
               << std::flush;
     std::string answer;
     std::getline(std::cin, answer);
     if (answer != "y" && answer != "Y" && answer != "yes")
-      throw ConfigError(fmt::format("{}: stays as it is; give another --out", file.string()));
+      throw ConfigError("{}: stays as it is; give another --out", file.string());
     return true;
   }
   return false;
@@ -254,22 +251,19 @@ int certify(const CertificateOptions& o) {
   const fs::path folder = files[0].has_parent_path() ? files[0].parent_path() : fs::path(".");
   std::error_code error;
   if (!fs::is_directory(folder, error))
-    throw ConfigError(
-        fmt::format("{}: is no folder; --out needs one that is there", folder.string()));
+    throw ConfigError("{}: is no folder; --out needs one that is there", folder.string());
   const bool replace = may_replace(o, files);
   const Certificate contents = certificate_of(o);
   const RenderedCertificate rendered = render_certificate(contents);
   write_together({{files[0], rendered.html}, {files[1], rendered.pdf}, {files[2], rendered.json}},
                  replace);
   if (rendered.pages > 1)
-    log_info(fmt::format("{}: {} pages; shorter texts would fit one", files[1].string(),
-                         rendered.pages));
+    log_info("{}: {} pages; shorter texts would fit one", files[1].string(), rendered.pages);
   for (std::size_t i = 0; i < 6; ++i) {
     const study::AxisReport& axis = contents.analysis.axis[i];
-    if (!axis.calibrated)
-      log_info(fmt::format("{} is not calibrated: {}", kWrenchAxes[i], axis.reason));
+    if (!axis.calibrated) log_info("{} is not calibrated: {}", kWrenchAxes[i], axis.reason);
   }
-  log_info(fmt::format("certificate {}: {}.html .pdf .json", contents.number, base));
+  log_info("certificate {}: {}.html .pdf .json", contents.number, base);
   return 0;
 }
 
@@ -287,10 +281,9 @@ void certificate_command(command_line::Command program) {
       "--sensor", o->sensor, "sensor.yaml: its calibration, after a check that it belongs to it");
   verb.add_option("--calibration", o->calibration, "its file, such as measured/wrench.json")
       .excludes(sensor);
-  verb.add_option(
-      "data", o->data,
-      "FILE.data.csv ... as calibrations and `analyze --data` leave them, or recordings "
-      "with a six-axis reference");
+  verb.add_option("data", o->data,
+                  "FILE.data.csv ... as calibrations and `analyze --data` leave them, or "
+                  "recordings with a six-axis reference");
   verb.add_option("--environment", o->environment,
                   "in place of what the calibration noted: temperature, place, who");
   verb.add_flag("--force", o->force, "replace files that are there");

@@ -121,8 +121,8 @@ bool by_mass(const CheckOptions& options, BenchInput& at, const UniqueFd& stop,
   load.range = at.input.sensor.wrench.range;
   const Vector6 before = static_measurement.result().wrench;
   static_measurement.wait_for_change(least_change(options, load.range));
-  log_info(fmt::format("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest",
-                       *options.mass_g, options.at_mm[0], options.at_mm[1], options.at_mm[2]));
+  log_info("now hang {:g} g at ({:g}, {:g}, {:g}) mm, and let it come to rest", *options.mass_g,
+           options.at_mm[0], options.at_mm[1], options.at_mm[2]);
   if (at.bench) at.bench->hang(*options.mass_g * 1e-3, vector3(options.at_mm) * 1e-3);
   const Seen loaded = watch(*at.input.source, stop, static_measurement, events);
   InSituFinding scale{.subject = Subject::scale, .fault = Fault::not_known};
@@ -178,15 +178,13 @@ int check(const CheckOptions& options) {
   if (board && !board->connected()) return stopped();
   BenchInput at;
   const InputOptions from{options.sensor, options.source, /*fast=*/!board};
-  if (board && options.emulated_cell.empty()) {
+  if (board && options.emulated_cell.empty())
     at.input = open_input(from);  // a board has its own time
-  } else {
+  else
     at = open_at_bench(from);
-  }
   if (!options.emulated_cell.empty() && !at.bench) {
-    throw ConfigError(
-        fmt::format("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
-                    options.source));
+    throw ConfigError("--emulated-cell: is for the simulated sensor, --source is {}; leave it out",
+                      options.source);
   }
   Input& input = at.input;
   check_size(input);

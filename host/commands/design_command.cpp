@@ -73,10 +73,8 @@ std::pair<double, double> size_px(const std::string& option, const std::string& 
     width = command_line::to_number(text.substr(0, x));
     height = command_line::to_number(text.substr(x + 1));
   }
-  if (!width || !height || !(*width >= 1 && *height >= 1 && *width <= 1e5 && *height <= 1e5)) {
-    throw ConfigError(
-        fmt::format("{}: '{}' is not WIDTHxHEIGHT in px; use 640x480 say", option, text));
-  }
+  if (!width || !height || !(*width >= 1 && *height >= 1 && *width <= 1e5 && *height <= 1e5))
+    throw ConfigError("{}: '{}' is not WIDTHxHEIGHT in px; use 640x480 say", option, text);
   return {*width, *height};
 }
 
@@ -115,7 +113,7 @@ Eigen::Vector2d size_in_picture(const study::Instrument& instrument) {
 
 void place_tags(const DesignOptions& o, study::Instrument& instrument) {
   const std::optional<TagFamily> family = family_from_name(o.family);
-  if (!family) throw ConfigError(fmt::format("--family: there is no family '{}'", o.family));
+  if (!family) throw ConfigError("--family: there is no family '{}'", o.family);
   if (o.ids.empty() || o.ids.size() > 2) throw ConfigError("--ids: give one tag or two");
   TargetDescription target;
   target.family = *family;
@@ -124,7 +122,7 @@ void place_tags(const DesignOptions& o, study::Instrument& instrument) {
   instrument.origin = {0, 0, o.lens_distance_mm * kMm};
   for (std::size_t i = 0; i < o.ids.size(); ++i) {
     if (o.ids[i] < 0 || o.ids[i] >= id_count(*family))
-      throw ConfigError(fmt::format("--ids: {} has ids 0 to {}", o.family, id_count(*family) - 1));
+      throw ConfigError("--ids: {} has ids 0 to {}", o.family, id_count(*family) - 1);
     Eigen::Isometry3d pose = on_roof(i, o.ids.size(), target.tag_size, target.border);
     pose.pretranslate(instrument.origin);
     instrument.tags.push_back(seen_tag(target, {o.ids[i], {}, Vector6::Zero()}, pose));
@@ -144,16 +142,14 @@ void take_target(const std::string& file, const TargetDescription& target,
   for (std::size_t i = 0; i < target.tags.size(); ++i) {
     const Tag& tag = target.tags[i];
     if (!tag.platform_T_tag && target.tags.size() > 2) {
-      throw ConfigError(fmt::format(
-          "{}: does not say where its tags are; run `tagwrench calibrate target`", file));
+      throw ConfigError("{}: does not say where its tags are; run `tagwrench calibrate target`",
+                        file);
     }
     const Eigen::Isometry3d pose =
         rest *
         tag.platform_T_tag.value_or(on_roof(i, target.tags.size(), target.tag_size, target.border));
-    if (pose.translation().z() < target.tag_size) {
-      throw ConfigError(
-          fmt::format("{}: tag {} would touch the lens; check rest and tags", file, tag.id));
-    }
+    if (pose.translation().z() < target.tag_size)
+      throw ConfigError("{}: tag {} would touch the lens; check rest and tags", file, tag.id);
     instrument.tags.push_back(seen_tag(target, tag, pose));
   }
   count_pixels(size_in_picture(instrument), target.tag_size, target.border, instrument);
@@ -164,17 +160,15 @@ void take_sensor(const DesignOptions& o, study::Instrument& instrument) {
   std::vector<command_line::Option> said{o.tag_px_given, o.size_given, o.paper_given,
                                          o.camera_given, o.image_given};
   if (sensor.rest.camera_T_platform) said.push_back(o.distance_given);
-  for (command_line::Option option : said) {
+  for (command_line::Option option : said)
     if (option.count() > 0)
-      throw ConfigError(
-          fmt::format("{}: {} says that already; leave one of them out", option.name(), o.sensor));
-  }
+      throw ConfigError("{}: {} says that already; leave one of them out", option.name(), o.sensor);
   // A calibrated matrix is symmetric but for its errors.
   instrument.stiffness = 0.5 * (sensor.wrench.K + sensor.wrench.K.transpose());
   if (Eigen::LLT<Matrix6>(instrument.stiffness).info() != Eigen::Success) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: its stiffness is not that of springs (not positive definite); calibrate again",
-        o.sensor));
+        o.sensor);
   }
   take_lens(sensor.camera, instrument.picture);
   const Eigen::Isometry3d rest(Eigen::Translation3d(0, 0, o.lens_distance_mm * kMm));
@@ -235,11 +229,11 @@ study::Instrument instrument_of(const DesignOptions& o) {
     take_sensor(o, result);
   }
   if (counted.travel_x_px() <= 0 || counted.travel_y_px() <= 0)
-    throw ConfigError(fmt::format(
-        "the tags' image of {:.0f}x{:.0f} px leaves no way to move in {:.0f}x{:.0f} px; "
-        "take smaller tags or a longer way to the lens",
+    throw ConfigError(
+        "the tags' image of {:.0f}x{:.0f} px leaves no way to move in {:.0f}x{:.0f} px; take "
+        "smaller tags or a longer way to the lens",
         counted.image_width_px, counted.image_height_px, counted.frame_width_px,
-        counted.frame_height_px));
+        counted.frame_height_px);
   mount_springs(o, result);
   result.platform.mass = 1e-3 * o.mass_g;
   result.platform.centre_of_mass = {0, 0, o.mass_height_mm * kMm};
@@ -336,11 +330,9 @@ std::string row(const DesignRow& r, const std::string& name) {
 std::string table(const Design& d) {
   std::string text =
       "\n  range        springs, N/mm   travel, mm   counted, mN      bound, mN                "
-      "bound, "
-      "mN m                    modes\n"
+      "bound, mN m                    modes\n"
       "  +- N      lateral   axial    lat    ax      x      y        Fx      Fy      Fz        Mx  "
-      " "
-      "    My       Mz     Hz\n";
+      "     My       Mz     Hz\n";
   for (std::size_t i = 0; i < d.rows.size(); ++i) {
     const DesignRow& r = d.rows[i];
     if (i > 0 && r.range == d.rows[0].range && std::abs(r.scale - 1) < kSameSprings) continue;
@@ -393,11 +385,10 @@ void add_design_options(command_line::Command verb, DesignOptions& o) {
       "a file of hardware/sensors: the sensor as it will be printed, instead of the options below");
   auto check = verb.add_option(
       "--check", o.check, "a file of hardware/sensors: only whether it can be built, and why not");
-  auto folder =
-      verb.add_option("--export", o.export_to,
-                      "folder for what follows from --hardware: parameters.scad for the parts, "
-                      "sensor.yaml, plan.yaml, scenario.yaml for the simulator")
-          .needs(hardware);
+  auto folder = verb.add_option("--export", o.export_to,
+                                "folder for what follows from --hardware: parameters.scad for the "
+                                "parts, sensor.yaml, plan.yaml, scenario.yaml for the simulator")
+                    .needs(hardware);
   verb.add_flag("--force", o.force, "what --export finds there and has been changed is replaced")
       .needs(folder);
   check.excludes(hardware);

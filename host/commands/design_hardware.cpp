@@ -63,9 +63,9 @@ void check_unchanged(const std::filesystem::path& path, const std::string& text)
   if (!std::filesystem::exists(std::filesystem::symlink_status(path, error))) return;
   if (std::filesystem::is_regular_file(path, error) && read_text(path) == text) return;
   throw ConfigError(
-      fmt::format("{}: is there already and holds something else (another design or a person "
-                  "may have changed it); name another folder, or replace it with --force",
-                  path.string()));
+      "{}: is there already and holds something else (another design or a person may have changed "
+      "it); name another folder, or replace it with --force",
+      path.string());
 }
 
 constexpr std::array<std::string_view, 4> kBolts{"the right bolt", "the left bolt",
@@ -193,19 +193,17 @@ void export_hardware(const std::string& file, const std::string& folder, bool fo
                                    quoted(fs::absolute(file).lexically_normal().string()) + "\n"},
       {into / "parameters.scad", hardware::scad_parameters(p, g, patterns_of(p, g))},
   }};
-  for (const auto& [path, text] : files) {
+  for (const auto& [path, text] : files)
     if (!force) check_unchanged(path, text);
-  }
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
-    throw ConfigError(fmt::format("{}: cannot be made a folder ({}): choose another --export",
-                                  folder, error.message()));
+    throw ConfigError("{}: cannot be made a folder ({}): choose another --export", folder,
+                      error.message());
   }
   tell_of_mirror(g);
   for (const auto& [path, text] : files) write_atomically(path, text);
-  log_info(fmt::format(
-      "design: wrote parameters.scad, scenario.yaml, sensor.yaml and plan.yaml to {}", folder));
+  log_info("design: wrote parameters.scad, scenario.yaml, sensor.yaml and plan.yaml to {}", folder);
 }
 
 }  // namespace tagwrench

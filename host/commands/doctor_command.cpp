@@ -75,9 +75,8 @@ class FocusView {
     }
     other_ids_ = finding.other_ids;
     for (FoundTag& tag : finding.tags) {
-      if (camera_.mirrored) {
+      if (camera_.mirrored)
         for (Eigen::Vector2d& corner : tag.corners_px) corner.x() = image.width - 1 - corner.x();
-      }
       tags_[tag.index].corners_px = tag.corners_px;
     }
     measure(image, frame.capture_time);
@@ -134,11 +133,10 @@ class FocusView {
       seen_ |= 1U << i;
     }
     quality_.reset();
-    if (count > 0) {
+    if (count > 0)
       guide_.add(time, sum_px / count, seen_);
-    } else {
+    else
       quality_ = picture_quality(image);
-    }
   }
 
   static std::string tag_text(const Tag& tag) {
@@ -183,8 +181,8 @@ class FocusView {
     if (!q.blur_px)
       return "no edges at all: turn the lens, a turn or more, until tags begin to show";
     return fmt::format(
-        "tags cannot be read; the sharpest edges of the image are about {:.0f} px "
-        "wide: turn the lens the way this gets less",
+        "tags cannot be read; the sharpest edges of the image are about {:.0f} px wide: turn the "
+        "lens the way this gets less",
         *q.blur_px);
   }
 

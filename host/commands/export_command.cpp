@@ -51,16 +51,12 @@ class ExportFile {
       return;
     }
     std::error_code error;
-    if (!force && fs::exists(fs::symlink_status(path, error))) {
-      throw ConfigError(
-          fmt::format("{}: exists; choose another name, or replace it with --force", path));
-    }
+    if (!force && fs::exists(fs::symlink_status(path, error)))
+      throw ConfigError("{}: exists; choose another name, or replace it with --force", path);
     partial_ = path + ".partial";
     file_.open(partial_, std::ios::binary | std::ios::trunc);
-    if (!file_) {
-      throw ConfigError(
-          fmt::format("{}: cannot be written; choose a file in a folder of yours", path));
-    }
+    if (!file_)
+      throw ConfigError("{}: cannot be written; choose a file in a folder of yours", path);
   }
   ExportFile(const ExportFile&) = delete;
   ExportFile& operator=(const ExportFile&) = delete;
@@ -106,7 +102,7 @@ void export_rows(const ExportOptions& o, const std::string& path, std::string_vi
   std::uint64_t count = 0;
   for (Record record; reader.next(record); ++count) file.out() << line(record);
   file.finish();
-  if (path != "-") log_info(fmt::format("{} in {}", count_text(count, one), path));
+  if (path != "-") log_info("{} in {}", count_text(count, one), path);
 }
 
 /// NaN is an empty field.
@@ -200,9 +196,8 @@ std::optional<TagPose> pose_of(const TagCorners& corners, const SensorConfig& se
   cv::Mat turn;
   cv::Mat position;
   if (!cv::solvePnP(square, pixels, lens.matrix, lens.distortion, turn, position, false,
-                    cv::SOLVEPNP_IPPE_SQUARE)) {
+                    cv::SOLVEPNP_IPPE_SQUARE))
     return std::nullopt;
-  }
   cv::Mat rotation;
   cv::Rodrigues(turn, rotation);
   return TagPose{{position.at<double>(0), position.at<double>(1), position.at<double>(2)},
@@ -220,9 +215,9 @@ std::size_t export_tags(const std::string& recording, const std::string& path, b
   record::RecordingReader reader(recording);
   const SensorConfig sensor = recorded_sensor(reader.head(), recording, WrenchCalibration::ignore);
   if (sensor.target.tags.size() != 2) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: the paper's columns are those of two tags, and this sensor has {}; use --csv",
-        recording, sensor.target.tags.size()));
+        recording, sensor.target.tags.size());
   }
   const Lens lens = lens_of(sensor.camera);
   ExportFile file(path, force);
@@ -255,19 +250,15 @@ std::size_t export_tags(const std::string& recording, const std::string& path, b
     }
     const auto append = [&line](double value) { line += fmt::format("; {}", value); };
     for (const auto* both_tags : {&position, &smooth}) {
-      for (const Vector3& of_tag : *both_tags) {
+      for (const Vector3& of_tag : *both_tags)
         for (const double value : of_tag) append(value);
-      }
     }
-    for (const auto* both_tags : {&position, &smooth}) {
+    for (const auto* both_tags : {&position, &smooth})
       for (std::size_t i = 0; i < 3; ++i) append(0.5 * ((*both_tags)[0][i] + (*both_tags)[1][i]));
-    }
     file.out() << line << ";" << kWeight << " \n";
   }
-  if (rows == 0) {
-    throw ConfigError(
-        fmt::format("{}: the tags were never held in it; there is nothing to export", recording));
-  }
+  if (rows == 0)
+    throw ConfigError("{}: the tags were never held in it; there is nothing to export", recording);
   file.finish();
   return rows;
 }
@@ -301,9 +292,9 @@ std::size_t export_reference(const std::string& recording, const std::string& pa
 void export_paper(const std::string& recording, const std::string& prefix, bool force) {
   const std::size_t tags = export_tags(recording, prefix + "_arucotagData.csv", force);
   const std::size_t readings = export_reference(recording, prefix + "_optoforceData.csv", force);
-  log_info(fmt::format("{} of tags, {}", count_text(tags, "row"),
-                       readings > 0 ? fmt::format("{} of the reference", readings)
-                                    : "none of a reference: no six-axis sensor was recorded"));
+  log_info("{} of tags, {}", count_text(tags, "row"),
+           readings > 0 ? fmt::format("{} of the reference", readings)
+                        : "none of a reference: no six-axis sensor was recorded");
 }
 
 // Pictures of a recording, for images:DIR.
@@ -355,14 +346,12 @@ class PartialFolder {
   explicit PartialFolder(const fs::path& final_place) : final_(final_place) {
     std::error_code error;
     if (fs::exists(final_, error) &&
-        !(fs::is_directory(final_, error) && fs::is_empty(final_, error))) {
-      throw ConfigError(
-          fmt::format("{}: exists; give --frames an empty or a new folder", final_.string()));
-    }
+        !(fs::is_directory(final_, error) && fs::is_empty(final_, error)))
+      throw ConfigError("{}: exists; give --frames an empty or a new folder", final_.string());
     std::string name = final_.string() + ".partial-XXXXXX";
     if (::mkdtemp(name.data()) == nullptr) {
-      throw ConfigError(fmt::format("{}: cannot be made: {}; give --frames a folder of yours",
-                                    final_.string(), std::strerror(errno)));
+      throw ConfigError("{}: cannot be made: {}; give --frames a folder of yours", final_.string(),
+                        std::strerror(errno));
     }
     path_ = name;
     fs::permissions(path_, fs::perms(0755), error);
@@ -402,7 +391,7 @@ void export_frames(const std::string& recording, const std::string& folder) {
   for (ReadStatus status; (status = source.read(frame)) != ReadStatus::end;) {
     if (status != ReadStatus::frame) continue;
     if (count == kMaxFrames)
-      throw ConfigError(fmt::format("{}: has more than {} frames", recording, kMaxFrames));
+      throw ConfigError("{}: has more than {} frames", recording, kMaxFrames);
     source.complete(frame);
     const Picture picture = picture_of(source.raw(), frame);
     const std::string name = fmt::format("{:06}{}", count++, picture.extension);
@@ -412,11 +401,10 @@ void export_frames(const std::string& recording, const std::string& folder) {
   write(partial.path() / "frames.csv", times, nullptr, 0);
   write_recorded_sensor(head, partial.path());
   partial.finish();
-  log_info(
-      fmt::format("{} in {}{}", count_text(static_cast<std::uint64_t>(count), "frame"), folder,
-                  head.keep == record::Keep::region
-                      ? ", black where nothing was kept: replay the recording itself for samples"
-                      : ""));
+  log_info("{} in {}{}", count_text(static_cast<std::uint64_t>(count), "frame"), folder,
+           head.keep == record::Keep::region
+               ? ", black where nothing was kept: replay the recording itself for samples"
+               : "");
   if (const std::string unusable = source.unusable(); !unusable.empty()) log_info(unusable);
 }
 
@@ -427,7 +415,7 @@ int export_all(const ExportOptions& o) {
         "export: nothing was asked for; give --csv, --paper, --frames, --references or --events");
   }
   if (const record::RecordingReader reader(o.recording); !reader.unclosed().empty())
-    log_info(fmt::format("{} {}", o.recording, reader.unclosed()));
+    log_info("{} {}", o.recording, reader.unclosed());
   LineBuffer line{};
   export_rows<Sample>(o, o.csv, kCsvHeader, "sample",
                       [&](const Sample& sample) { return csv_line(line, sample); });

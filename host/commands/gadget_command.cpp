@@ -43,10 +43,8 @@ GadgetSpec spec_of(const std::string& name, const std::string& face, const std::
   spec.self_powered = self_powered;
   if (id.empty()) return spec;
   const std::optional<UsbId> given = parse_usb_id(id);
-  if (!given) {
-    throw ConfigError(
-        fmt::format("--id {}: not vendor:product in hexadecimal; write it as in 256f:c62e", id));
-  }
+  if (!given)
+    throw ConfigError("--id {}: not vendor:product in hexadecimal; write it as in 256f:c62e", id);
   spec.id = *given;
   return spec;
 }
@@ -60,10 +58,9 @@ bool same(const GadgetFound& found, const GadgetSpec& spec, const Controller& co
 /// Before anything is rested or half undone.
 void need_root(const KernelPlaces& places, const char* verb, const std::string& name) {
   if (::access(places.gadgets().c_str(), W_OK) == 0) return;
-  throw ConfigError(fmt::format(
-      "gadget {}{}: {} cannot be written; run it as root: sudo tagwrench "
-      "gadget {}{}",
-      kGadgetPrefix, name, places.gadgets(), verb, name == "sensor" ? "" : " --name " + name));
+  throw ConfigError("gadget {}{}: {} cannot be written; run it as root: sudo tagwrench gadget {}{}",
+                    kGadgetPrefix, name, places.gadgets(), verb,
+                    name == "sensor" ? "" : " --name " + name);
 }
 
 std::string run_command_of(const std::string& name) {
@@ -86,15 +83,15 @@ int bring_up(const GadgetCommandOptions& o) {
   spec.udc = controller.name;
   if (const std::optional<GadgetFound> found = tree.find(o.name)) {
     if (same(*found, spec, controller)) {
-      log_info(fmt::format("gadget {}: is up already on {}; feed it: {}", ours, found->udc,
-                           run_command_of(o.name)));
+      log_info("gadget {}: is up already on {}; feed it: {}", ours, found->udc,
+               run_command_of(o.name));
       return 0;
     }
     rest(files, o.places, tree, *found);
   }
   tree.up(spec);
-  log_info(fmt::format("gadget {}: up on {} as {}; feed it: {}", ours, spec.udc,
-                       described(tree.find(o.name).value()), run_command_of(o.name)));
+  log_info("gadget {}: up on {} as {}; feed it: {}", ours, spec.udc,
+           described(tree.find(o.name).value()), run_command_of(o.name));
   return 0;
 }
 
@@ -103,7 +100,7 @@ int take_down(const GadgetCommandOptions& o) {
   GadgetTree tree(files, o.places.gadgets());
   const std::string ours = std::string(kGadgetPrefix) + o.name;
   if (!tree.find(o.name)) {
-    log_info(fmt::format("gadget {}: is not up", ours));
+    log_info("gadget {}: is not up", ours);
     return 0;
   }
   need_root(o.places, "down", o.name);
@@ -111,7 +108,7 @@ int take_down(const GadgetCommandOptions& o) {
   if (const std::optional<GadgetFound> found = tree.find(o.name))
     rest(files, o.places, tree, *found);
   tree.down(o.name);
-  log_info(fmt::format("gadget {}: taken down", ours));
+  log_info("gadget {}: taken down", ours);
   return 0;
 }
 

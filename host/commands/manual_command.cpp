@@ -29,8 +29,8 @@ void write_pages(command_line::Command program, const std::string& folder) {
     file << page.text;
     file.close();
     if (!file)
-      throw ConfigError(
-          fmt::format("{}: cannot be written; choose a folder of yours with --out", path.string()));
+      throw ConfigError("{}: cannot be written; choose a folder of yours with --out",
+                        path.string());
   }
 }
 

@@ -48,17 +48,16 @@ MeasuredSensor::MeasuredSensor(const std::string& sensor, const std::string& out
   if (to_ != from_ && !fs::equivalent(to_, from_, error)) {
     check_replaceable(to_);
     if (fs::exists(to_, error) && read_text(to_) != text) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "{}: is there already and says something else than {}; no sensor.yaml is written over: "
           "measure it with --sensor {}, or name a new file with --out",
-          to_.string(), sensor, to_.string()));
+          to_.string(), sensor, to_.string());
     }
     if (fs::weakly_canonical(folder(), error) ==
         fs::weakly_canonical(measured_folder(from_), error)) {
       throw ConfigError(
-          fmt::format("--out {}: the folder {}/ beside it is that of {}; name a file "
-                      "in another folder",
-                      out, kMeasuredFolder, sensor));
+          "--out {}: the folder {}/ beside it is that of {}; name a file in another folder", out,
+          kMeasuredFolder, sensor);
     }
   }
   check_measurable(folder(), files);

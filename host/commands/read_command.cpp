@@ -21,9 +21,9 @@ void read_command(command_line::Command program) {
       "Forces are in N, torques in N m; pucks have counts. Rate, jitter (standard deviation and "
       "longest of the intervals), missing frames and latency (capture to arrival here, for a live "
       "sensor on this computer) come with each line and in the summary.");
-  verb.add_option("device", o->device,
-                  "serial, VID:PID or path; without it the only wrench sensor, or else the only "
-                  "6-DOF device");
+  verb.add_option(
+      "device", o->device,
+      "serial, VID:PID or path; without it the only wrench sensor, or else the only 6-DOF device");
   auto list = verb.add_flag("--list", o->list, "list what is plugged in, and end");
   auto seconds =
       verb.add_option("--seconds", o->end, "end after S seconds").check(command_line::seconds());

@@ -70,10 +70,8 @@ Table read_tracks(record::RecordingReader& recording, TimePoint origin, const st
                               track.covariance.diagonal().cwiseSqrt()))
       ++without;
   }
-  if (table.time.size() < 2) {
-    throw ConfigError(
-        fmt::format("{}: the target was never held in it; see `tagwrench doctor`", name));
-  }
+  if (table.time.size() < 2)
+    throw ConfigError("{}: the target was never held in it; see `tagwrench doctor`", name);
   if (without > 0)
     notes.push_back(
         fmt::format("{}: {} without the target left out", name, count_text(without, "frame")));
@@ -92,28 +90,25 @@ Table read_references(record::RecordingReader& recording, TimePoint origin, cons
       continue;
     }
     const Vector6 value = vector(record.value);
-    if (record.saturated) {
+    if (record.saturated)
       ++saturated;
-    } else if (!believable(value) ||
-               !table.add(seconds_since(origin, record.time), value, vector(record.sigma))) {
+    else if (!believable(value) ||
+             !table.add(seconds_since(origin, record.time), value, vector(record.sigma)))
       ++useless;
-    }
   }
   if (table.time.size() < 2) {
-    throw ConfigError(fmt::format(
-        "{}: no six-axis reference in newtons in it{}", name,
-        single > 0 ? "; a load cell's line of action is not recorded: use `tagwrench calibrate "
-                     "wrench` with a plan of load_cell"
-                   : "; record with one, or analyze a calibration's data file"));
+    throw ConfigError("{}: no six-axis reference in newtons in it{}", name,
+                      single > 0 ? "; a load cell's line of action is not recorded: use `tagwrench "
+                                   "calibrate wrench` with a plan of load_cell"
+                                 : "; record with one, or analyze a calibration's data file");
   }
   if (saturated > 0)
     notes.push_back(fmt::format("{}: {} of the reference left out", name,
                                 count_text(saturated, "saturated row")));
   if (useless > 0) {
-    notes.push_back(
-        fmt::format("{}: {} of the reference without newtons, or not later than "
-                    "the one before, left out",
-                    name, count_text(useless, "row")));
+    notes.push_back(fmt::format(
+        "{}: {} of the reference without newtons, or not later than the one before, left out", name,
+        count_text(useless, "row")));
   }
   return table;
 }
@@ -152,8 +147,7 @@ bool is_recording(const std::filesystem::path& file) {
 study::Trial recorded_trial(const std::filesystem::path& file, std::vector<std::string>& notes) {
   record::RecordingReader recording(file);
   const std::string name = file.string();
-  if (recording.frame_times().empty())
-    throw ConfigError(fmt::format("{}: no frames in it; record anew", name));
+  if (recording.frame_times().empty()) throw ConfigError("{}: no frames in it; record anew", name);
   if (!recording.unclosed().empty())
     notes.push_back(fmt::format("{} {}", name, recording.unclosed()));
   const TimePoint origin = recording.frame_times().front();

@@ -25,7 +25,7 @@ void sim_command(command_line::Command program) {
   verb.runs([o] {
     sim::export_folder(o->scenario.empty() ? sim::Scenario{} : load_scenario(o->scenario),
                        o->folder, o->frames);
-    log_info(fmt::format("{} frames with truth and sensor.yaml in {}", o->frames, o->folder));
+    log_info("{} frames with truth and sensor.yaml in {}", o->frames, o->folder);
     return 0;
   });
 }

@@ -24,10 +24,9 @@ SpnavSockets make_sockets(const std::string& path) {
   std::optional<SpnavSockets> sockets = listen_spnav(path);
   if (!sockets) {
     throw ConfigError(
-        fmt::format("spnav socket {}: it is served already, by `tagwrench spnav` or for `tagwrench "
-                    "run`; choose "
-                    "another path with --socket, or use that one",
-                    path));
+        "spnav socket {}: it is served already, by `tagwrench spnav` or for `tagwrench run`; "
+        "choose another path with --socket, or use that one",
+        path);
   }
   return std::move(*sockets);
 }
@@ -47,8 +46,7 @@ int serve_spnav(const SpnavOptions& o) {
       inherited ? inherited_spnav(path, o.inherited[0], o.inherited[1]) : make_sockets(path);
   SpnavDaemonOptions options;
   if (inherited) options.idle_end = kIdle;
-  log_info(fmt::format("spnav: serving {}; programs find it when started with SPNAV_SOCKET={}",
-                       path, path));
+  log_info("spnav: serving {}; programs find it when started with SPNAV_SOCKET={}", path, path);
   const std::unique_ptr<ServiceWatch> watch = inherited ? nullptr : ServiceWatch::open();
   if (watch != nullptr) watch->ready("serving " + path);
   run_spnav_daemon(std::move(sockets), options, stop.get());
@@ -63,8 +61,7 @@ void spnav_command(command_line::Command program) {
       "spnav", "hold the socket that CAD programs connect to, whatever becomes of `tagwrench run`");
   verb.footer(
       "`tagwrench run --output spnav[:PATH]` feeds it, and starts one by itself where there is "
-      "none. "
-      "Programs that use libspnav find it when started with SPNAV_SOCKET=PATH.");
+      "none. Programs that use libspnav find it when started with SPNAV_SOCKET=PATH.");
   verb.add_option("--socket", o->socket,
                   "PATH; without it tagwrench/spnav.sock in $XDG_RUNTIME_DIR, and for root "
                   "/var/run/spnav.sock if no spacenavd has it");

@@ -55,12 +55,11 @@ bool rest_is_calibrated(const SensorConfig& sensor) {
 
 void check_calibrated_rest(const SensorConfig& sensor, const std::string& verb) {
   if (rest_is_calibrated(sensor)) return;
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "--sensor: its rest is learned anew at every start, so `tagwrench {}` has nothing to compare "
       "with; run `tagwrench calibrate target` once, which writes measured/target.yaml with rest "
-      "and "
-      "places, and its picture; newtons are calibrated after it",
-      verb));
+      "and places, and its picture; newtons are calibrated after it",
+      verb);
 }
 
 StaticMeasurement::StaticMeasurement(const SensorConfig& sensor, Duration wanted, Duration patience)
@@ -269,8 +268,7 @@ std::string wrong(const InSituFinding& f) {
     case Fault::too_dark:
       return fmt::format(
           "too dark: the tags' white is at {:.0f} of 255, at {:.0f} when calibrated: mend the "
-          "light, "
-          "or let `run --board` set it",
+          "light, or let `run --board` set it",
           f.amount, f.expected);
     case Fault::too_bright:
       return fmt::format(
@@ -301,8 +299,7 @@ std::string wrong(const InSituFinding& f) {
     case Fault::residual_grown:
       return fmt::format(
           "{:.1f} % of tag {}'s contrast is not explained by the picture at rest (up to {:.0f} % "
-          "is "
-          "fine): clean tag and lens, look for glare; if it stays, {}",
+          "is fine): clean tag and lens, look for glare; if it stays, {}",
           100 * f.amount, f.tag, 100 * f.expected, kAgain);
     case Fault::zero_drifted:
       return fmt::format("reads {:+.1f} % of the range on {} with hands off: `tagwrench zero`",
@@ -310,8 +307,7 @@ std::string wrong(const InSituFinding& f) {
     case Fault::rest_elsewhere:
       return fmt::format(
           "reads {:+.0f} % of the range on {} with hands off, too far for drift: take off what "
-          "lies "
-          "on it; in another mounting, {}",
+          "lies on it; in another mounting, {}",
           100 * f.amount, kWrenchAxes[f.axis], kAgain);
     case Fault::scale_wrong:
       return fmt::format(

@@ -52,19 +52,17 @@ TagFamily known_family(const std::string& option, const std::string& text) {
   const std::optional<TagFamily> family = family_from_name(text);
   if (!family) {
     throw ConfigError(
-        fmt::format("{}: there is no family '{}'; use aruco_original, aruco_4x4_50 "
-                    "... aruco_7x7_1000, apriltag_16h5 ... apriltag_36h11 or "
-                    "grid_10x10",
-                    option, text));
+        "{}: there is no family '{}'; use aruco_original, aruco_4x4_50 ... aruco_7x7_1000, "
+        "apriltag_16h5 ... apriltag_36h11 or grid_10x10",
+        option, text);
   }
   return *family;
 }
 
 Paper known_paper(const std::string& text) {
-  for (const Paper& paper : {kA4, kLetter}) {
+  for (const Paper& paper : {kA4, kLetter})
     if (paper.name == text) return paper;
-  }
-  throw ConfigError(fmt::format("--paper: no paper '{}'; use a4 or letter", text));
+  throw ConfigError("--paper: no paper '{}'; use a4 or letter", text);
 }
 
 void add_tag_options(command_line::Command verb, TagsOptions& o) {
@@ -75,10 +73,10 @@ void add_tag_options(command_line::Command verb, TagsOptions& o) {
       "--hardware", o.hardware,
       "a file of hardware/sensors: the tags of this sensor to be built; options below overrule it");
   o.sensor_given.excludes(o.hardware_given);
-  o.family_given = verb.add_option(
-      "--family", o.family,
-      "aruco_original (default), aruco_4x4_50 ... aruco_7x7_1000, apriltag_16h5 ... "
-      "apriltag_36h11, grid_10x10 (finest measurement)");
+  o.family_given =
+      verb.add_option("--family", o.family,
+                      "aruco_original (default), aruco_4x4_50 ... aruco_7x7_1000, apriltag_16h5 "
+                      "... apriltag_36h11, grid_10x10 (finest measurement)");
   o.ids_given = verb.add_option("--ids", o.ids, "for example 5,2 (default)").delimiter(',');
   o.size_given = verb.add_option("--size-mm", o.size_mm, "edge of the black square, default 3.8");
   o.border_given = verb.add_option("--border-mm", o.border_mm,
@@ -88,9 +86,8 @@ void add_tag_options(command_line::Command verb, TagsOptions& o) {
       "charuco or checkerboard, for `calibrate camera`; or all of it in one word: "
       "charuco:COLUMNSxROWS:SQUAREmm:MARKERmm:DICTIONARY, checkerboard:COLUMNSxROWS:SQUAREmm");
   for (command_line::Option tags : {o.sensor_given, o.hardware_given, o.family_given, o.ids_given,
-                                    o.size_given, o.border_given}) {
+                                    o.size_given, o.border_given})
     o.board_given.excludes(tags);
-  }
 }
 
 void add_board_options(command_line::Command verb, TagsOptions& o) {
@@ -104,9 +101,8 @@ void add_board_options(command_line::Command verb, TagsOptions& o) {
                                    "edge of a charuco marker; without it 0.75 of a square");
   auto dictionary = verb.add_option("--dictionary", o.dictionary, "family of the charuco markers")
                         .capture_default_str();
-  for (command_line::Option option : {columns, rows, square, o.marker_given, dictionary}) {
+  for (command_line::Option option : {columns, rows, square, o.marker_given, dictionary})
     option.needs(o.board_given);
-  }
 }
 
 Sheet tags(const TagsOptions& o) {
@@ -161,11 +157,11 @@ int print_tags(const TagsOptions& o) {
   write_vector_file(asked.drawing, o.out);
   if (asked.cell_mm < kFinestCell_mm) {
     log_info(
-        fmt::format("{}: cells of {:.3f} mm are finer than most printers print; use larger tags, "
-                    "or fewer cells",
-                    o.out, asked.cell_mm));
+        "{}: cells of {:.3f} mm are finer than most printers print; use larger tags, or fewer "
+        "cells",
+        o.out, asked.cell_mm);
   }
-  log_info(fmt::format("{}: print at 100 %, then measure the two bars of 50.0 mm", o.out));
+  log_info("{}: print at 100 %, then measure the two bars of 50.0 mm", o.out);
   return 0;
 }
 
@@ -185,12 +181,11 @@ void tags_command(command_line::Command program) {
   add_tag_options(verb, *o);
   add_board_options(verb, *o);
   auto published = verb.add_flag("--paper-sheet", o->published,
-                                 "the published design's sheet: aruco_original, ids 0 to 9, "
-                                 "3.0 to 5.0 mm; its sensor carries ids 5 and 2 of 3.8 mm");
+                                 "the published design's sheet: aruco_original, ids 0 to 9, 3.0 to "
+                                 "5.0 mm; its sensor carries ids 5 and 2 of 3.8 mm");
   for (command_line::Option other : {o->family_given, o->ids_given, o->size_given, o->border_given,
-                                     o->copies_given, o->board_given}) {
+                                     o->copies_given, o->board_given})
     published.excludes(other);
-  }
   verb.runs([o] { return print_tags(*o); });
 }
 

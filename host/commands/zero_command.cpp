@@ -70,12 +70,12 @@ int set_zero(const ZeroCommandOptions& options) {
   write_measured(file, zero_yaml({stamp_for(options.sensor), zero,
                                   sha256_of(identity_of(sensor.camera, sensor.target, sensor.rest)),
                                   sha256_of(sensor.wrench)}));
-  log_info(fmt::format("zero was {}{}", in_words(sensor.zero.set),
-                       sensor.zero.date.empty() ? "" : ", since " + sensor.zero.date));
-  log_info(fmt::format(
-      "zero is  {}, from {} frames in {:.1f} s; no thermometer is read: let it warm up "
-      "before, and zero again after",
-      in_words(zero), static_measurement.result().frames, static_measurement.seconds()));
+  log_info("zero was {}{}", in_words(sensor.zero.set),
+           sensor.zero.date.empty() ? "" : ", since " + sensor.zero.date);
+  log_info(
+      "zero is  {}, from {} frames in {:.1f} s; no thermometer is read: let it warm up before, and "
+      "zero again after",
+      in_words(zero), static_measurement.result().frames, static_measurement.seconds());
   log_info("written: " + file.string());
   return 0;
 }
@@ -84,10 +84,9 @@ int set_zero(const ZeroCommandOptions& options) {
 
 void zero_command(command_line::Command program) {
   const auto o = std::make_shared<ZeroCommandOptions>();
-  auto verb = program.add_subcommand(
-      "zero",
-      "hands off: what the sensor reads now becomes its zero, written to measured/zero.yaml beside "
-      "its sensor.yaml");
+  auto verb = program.add_subcommand("zero",
+                                     "hands off: what the sensor reads now becomes its zero, "
+                                     "written to measured/zero.yaml beside its sensor.yaml");
   verb.add_option("--sensor", o->sensor, "sensor.yaml of this sensor").required();
   verb.add_option("--source", o->source,
                   source_forms({SourceKind::simulator, SourceKind::camera, SourceKind::images}))

@@ -2,13 +2,19 @@
 // with 2.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <stdexcept>
+#include <utility>
 
 namespace tagwrench {
 
 class ConfigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+  template <typename First, typename... Rest>
+  ConfigError(fmt::format_string<First, Rest...> text, First&& first, Rest&&... rest)
+      : runtime_error(fmt::format(text, std::forward<First>(first), std::forward<Rest>(rest)...)) {}
 };
 
 }  // namespace tagwrench

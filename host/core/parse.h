@@ -37,9 +37,8 @@ inline std::size_t utf8_length(std::string_view text) noexcept {
                              : first >= 0xf0 && first < 0xf5 ? 4
                                                              : 0;
   if (length == 0 || length > text.size()) return 0;
-  for (std::size_t i = 1; i < length; ++i) {
+  for (std::size_t i = 1; i < length; ++i)
     if ((byte(i) & 0xc0) != 0x80) return 0;
-  }
   // Overlong forms, halves of surrogate pairs, and what lies beyond the last character.
   const unsigned char second = byte(1);
   const bool none = (first == 0xe0 && second < 0xa0) || (first == 0xed && second >= 0xa0) ||

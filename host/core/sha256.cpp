@@ -53,8 +53,8 @@ FileSha256 sha256_of_file(const std::filesystem::path& path) {
     out.bytes += got;
   }
   if (!file.eof()) {
-    throw ConfigError(fmt::format(
-        "{}: cannot be read; check the path and that it is a readable file", path.string()));
+    throw ConfigError("{}: cannot be read; check the path and that it is a readable file",
+                      path.string());
   }
   Digest digest{};
   unsigned int length = 0;

@@ -139,9 +139,8 @@ class I3Focus : public FocusWatch {
     if (size <= 0 || !stream_.put({bytes.data(), static_cast<std::size_t>(size)}))
       return Focus{.ended = true};
     std::optional<Focus> last;
-    while (const std::optional<I3Message> message = stream_.next()) {
+    while (const std::optional<I3Message> message = stream_.next())
       if (std::optional<Focus> focus = focus_in(*message)) last = std::move(focus);
-    }
     return last;
   }
 

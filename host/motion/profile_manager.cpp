@@ -62,11 +62,10 @@ ProfileManager::ProfileManager(ProfileFiles files, std::optional<ControlSocket> 
 void ProfileManager::shape(Sample& sample) noexcept {
   if (last_program_) take_program();
   const GestureResult gesture = gestures_.feel(sample);
-  if (gesture.hold_motion) {
+  if (gesture.hold_motion)
     shaping_.suppress(sample);
-  } else {
+  else
     shaping_.shape(sample);
-  }
   if (carries_numbers(sample.status)) sample.buttons |= gesture.buttons;
   if (gesture.command == GestureCommand::zero) zero_wanted_ = true;
   if (gesture.command == GestureCommand::next_profile)
@@ -105,11 +104,10 @@ void ProfileManager::take_focus() {
 /// Where the focus is not known, the program decides that connected last.
 void ProfileManager::follow_focus(bool told, std::string_view program) {
   focus_told_ = told;
-  if (told) {
+  if (told)
     use_for(program);
-  } else if (!program_.empty()) {
+  else if (!program_.empty())
     use_for(program_);
-  }
 }
 
 void ProfileManager::take_program() noexcept {
@@ -118,11 +116,10 @@ void ProfileManager::take_program() noexcept {
   if (program_.empty()) before_programs_ = current_;
   program_ = now;
   if (focus_told_) return;
-  if (!program_.empty()) {
+  if (!program_.empty())
     use_for(program_);
-  } else {
+  else
     use(before_programs_, "the program has gone");
-  }
 }
 
 void ProfileManager::use(std::size_t profile, std::string_view because) noexcept {
@@ -289,9 +286,8 @@ std::optional<LiveReading> parse_live(std::string_view text) {
   std::string status, more;
   LiveReading reading;
   words >> status;
-  for (Vector6* six : {&reading.wrench, &reading.motion}) {
+  for (Vector6* six : {&reading.wrench, &reading.motion})
     for (double& value : *six) words >> value;
-  }
   words >> reading.buttons >> reading.on_trial;
   constexpr std::array kStatuses = {Status::ok, Status::acquiring, Status::lost, Status::doubtful,
                                     Status::saturated};

@@ -172,11 +172,10 @@ void Shaping::shape(Sample& sample) noexcept {
   const bool near_rest = (raw.cwiseAbs().array() <= kNearRest * rest_edge().array()).all();
   noise_.add(seconds, raw, felt_sigma(sample.wrench_sigma), near_rest);
   raw = meant(seconds, raw);
-  if (first) {
+  if (first)
     filter_.start(raw);
-  } else {
+  else
     filter_.step(seconds, raw);
-  }
   sample.deflection = deflection(raw);
   if (options_.dominant.on) keep_strongest(sample.deflection);
   fill_.add(sample.capture_time, sample.deflection);
@@ -189,9 +188,8 @@ Vector6 Shaping::meant(double seconds, const Vector6& raw) noexcept {
       raw.cwiseQuotient(options_.full_scale).cwiseMin(kMaxPushed).cwiseMax(-kMaxPushed);
   swing_.add(seconds, push);
   Vector6 meant = raw.cwiseMin(options_.full_scale).cwiseMax(-options_.full_scale);
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (std::abs(push[i]) <= swing_.size()) meant[i] = 0;
-  }
   return meant;
 }
 
@@ -217,9 +215,8 @@ void Shaping::keep_strongest(Vector6& motion) noexcept {
   const double most = motion.cwiseAbs().maxCoeff(&strongest);
   const double kept = strongest_ < 0 ? 0 : std::abs(motion[strongest_]);
   if (kept == 0 || most > options_.dominant.ratio * kept) strongest_ = most > 0 ? strongest : -1;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (i != strongest_) motion[i] = 0;
-  }
 }
 
 Vector6 Shaping::motion_at(TimePoint time) const noexcept {

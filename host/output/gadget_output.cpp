@@ -329,26 +329,25 @@ std::string up_command(const GadgetOptions& options) {
 }
 
 [[noreturn]] void no_daemon(const char* what, const char* why) {
-  throw ConfigError(fmt::format("gadget: {}: {}; end other programs", what, why));
+  throw ConfigError("gadget: {}: {}; end other programs", what, why);
 }
 
 [[noreturn]] void cannot_open(const GadgetOptions& options, const OpenedNode& node) {
   const std::string which = std::string(kGadgetPrefix) + options.name;
   if (node.error == EWOULDBLOCK) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "gadget {}: another bridge writes to {}; stop it, or give this one a gadget of its own",
-        which, node.path));
+        which, node.path);
   }
   if (node.error == EACCES || node.error == EPERM) {
     throw ConfigError(
-        fmt::format("gadget {}: {}: permission denied; install 70-tagwrench.rules in "
-                    "/etc/udev/rules.d and join the group input, or run as root",
-                    which, node.path));
+        "gadget {}: {}: permission denied; install 70-tagwrench.rules in /etc/udev/rules.d and "
+        "join the group input, or run as root",
+        which, node.path);
   }
-  throw ConfigError(fmt::format("gadget {}: {}: {}; make it anew: {}", which,
-                                node.path.empty() ? "no device node" : node.path,
-                                std::strerror(node.error == 0 ? ENOENT : node.error),
-                                up_command(options)));
+  throw ConfigError("gadget {}: {}: {}; make it anew: {}", which,
+                    node.path.empty() ? "no device node" : node.path,
+                    std::strerror(node.error == 0 ? ENOENT : node.error), up_command(options));
 }
 
 }  // namespace
@@ -363,9 +362,9 @@ UniqueFd watch_nodes(const std::string& folder) {
   constexpr std::uint32_t kEvents = IN_CREATE | IN_DELETE | IN_ATTRIB;
   if (!watch || ::inotify_add_watch(watch.get(), folder.c_str(), kEvents) < 0) {
     throw ConfigError(
-        fmt::format("gadget: {} cannot be watched: {}; more may be allowed with: sudo sysctl "
-                    "fs.inotify.max_user_instances=512",
-                    folder, std::strerror(errno)));
+        "gadget: {} cannot be watched: {}; more may be allowed with: sudo sysctl "
+        "fs.inotify.max_user_instances=512",
+        folder, std::strerror(errno));
   }
   return watch;
 }
@@ -384,11 +383,10 @@ void rest_gadget(int node, GadgetFace face) noexcept {
   };
   while (reports.owed()) {
     const std::span<const std::uint8_t> report = reports.next();
-    if (uninterrupted([&] { return ::write(node, report.data(), report.size()); }) >= 0) {
+    if (uninterrupted([&] { return ::write(node, report.data(), report.size()); }) >= 0)
       reports.taken();
-    } else if (errno != EAGAIN || !wait_for_room()) {
+    else if (errno != EAGAIN || !wait_for_room())
       return;
-    }
   }
   wait_for_room();
 }
@@ -409,13 +407,11 @@ GadgetPort find_gadget(const GadgetOptions& options) {
   const GadgetTree tree(files, options.places.gadgets());
   const std::optional<GadgetFound> found = tree.find(options.name);
   const std::string which = std::string(kGadgetPrefix) + options.name;
-  if (!found || !found->whole || !found->face) {
-    throw ConfigError(
-        fmt::format("gadget {}: it is not up; make it: {}", which, up_command(options)));
-  }
+  if (!found || !found->whole || !found->face)
+    throw ConfigError("gadget {}: it is not up; make it: {}", which, up_command(options));
   if (options.face && options.face != found->face) {
-    throw ConfigError(fmt::format("gadget {}: it is up with the face {}; use that one, or: {}",
-                                  which, face_name(*found->face), up_command(options)));
+    throw ConfigError("gadget {}: it is up with the face {}; use that one, or: {}", which,
+                      face_name(*found->face), up_command(options));
   }
   GadgetPort port;
   port.face = *found->face;

@@ -63,9 +63,8 @@ std::string_view face_name(GadgetFace face) noexcept {
 }
 
 std::optional<GadgetFace> face_of(std::string_view name) noexcept {
-  for (const GadgetFace face : {GadgetFace::spacemouse, GadgetFace::wrench}) {
+  for (const GadgetFace face : {GadgetFace::spacemouse, GadgetFace::wrench})
     if (face_name(face) == name) return face;
-  }
   return {};
 }
 
@@ -132,9 +131,8 @@ std::string GadgetFiles::line(const std::string& path) const {
   if (got <= 0) return {};
   const std::string_view text(bytes.data(), static_cast<std::size_t>(got));
   std::string line(text.substr(0, text.find('\n')));
-  for (char& c : line) {
+  for (char& c : line)
     if (std::isprint(static_cast<unsigned char>(c)) == 0) c = '?';
-  }
   return line;
 }
 
@@ -197,7 +195,7 @@ void GadgetTree::need(int error, const std::string& what) const {
     remedy = "this kernel has no HID function (CONFIG_USB_CONFIGFS_F_HID): sudo modprobe usb_f_hid";
   if (error == EBUSY && what.ends_with("/UDC"))
     remedy = "something else has taken the controller; see: tagwrench gadget status";
-  throw ConfigError(fmt::format("gadget {}: {}; {}", what, std::strerror(error), remedy));
+  throw ConfigError("gadget {}: {}; {}", what, std::strerror(error), remedy);
 }
 
 void GadgetTree::make(const GadgetSpec& spec) {
@@ -285,9 +283,9 @@ void GadgetTree::down(std::string_view name) {
   if (!files_.exists(gadget)) return;
   if (const int error = remove(gadget); error != 0 && files_.exists(gadget)) {
     const bool denied = error == EACCES || error == EPERM;
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "gadget {}: cannot be taken away: {}; {}", gadget, std::strerror(error),
-        denied ? "run it as root: sudo tagwrench gadget down" : "end what uses it and try again"));
+        denied ? "run it as root: sudo tagwrench gadget down" : "end what uses it and try again");
   }
 }
 
@@ -297,8 +295,7 @@ void check_gadget_name(std::string_view name) {
                         return std::isalnum(c) != 0 || c == '-' || c == '_';
                       });
   if (usable) return;
-  throw ConfigError(
-      fmt::format("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name));
+  throw ConfigError("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name);
 }
 
 std::optional<UsbId> parse_usb_id(std::string_view text) noexcept {
@@ -341,15 +338,15 @@ Controller choose_controller(const std::vector<Controller>& all, const std::stri
     busy = &one;
   }
   if (busy == nullptr) {
-    throw ConfigError(
-        fmt::format("--udc {}: no such USB device controller; there is {}", wanted, names_of(all)));
+    throw ConfigError("--udc {}: no such USB device controller; there is {}", wanted,
+                      names_of(all));
   }
   const bool is_ours = busy->owner.starts_with(kGadgetPrefix);
-  throw ConfigError(
-      fmt::format("gadget: USB device controller {} belongs to {}; {}", busy->name, busy->owner,
-                  is_ours ? fmt::format("take that one down: sudo tagwrench gadget down --name {}",
-                                        busy->owner.substr(kGadgetPrefix.size()))
-                          : "end what made that, or choose another one with --udc"));
+  throw ConfigError("gadget: USB device controller {} belongs to {}; {}", busy->name, busy->owner,
+                    is_ours
+                        ? fmt::format("take that one down: sudo tagwrench gadget down --name {}",
+                                      busy->owner.substr(kGadgetPrefix.size()))
+                        : "end what made that, or choose another one with --udc");
 }
 
 bool run_program(const std::vector<std::string>& arguments) {
@@ -361,40 +358,35 @@ bool run_program(const std::vector<std::string>& arguments) {
   if (::posix_spawnp(&process, pointers[0], nullptr, nullptr, pointers.data(), environ) != 0)
     return false;
   int status = 0;
-  while (::waitpid(process, &status, 0) < 0) {
+  while (::waitpid(process, &status, 0) < 0)
     if (errno != EINTR) return false;
-  }
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
 void prepare_kernel(const GadgetFiles& files, const KernelPlaces& places, const RunProgram& run) {
   if (files.exists(places.gadgets())) return;
   if (::geteuid() != 0) {
-    throw ConfigError(
-        fmt::format("gadget: {} is not there and only root can make it: sudo tagwrench gadget up",
-                    places.gadgets()));
+    throw ConfigError("gadget: {} is not there and only root can make it: sudo tagwrench gadget up",
+                      places.gadgets());
   }
-  if (!run({"modprobe", "libcomposite"}) && !files.exists(places.configfs)) {
-    throw ConfigError(
-        fmt::format("gadget: this kernel has no USB gadget support (libcomposite): {}", kLoad));
-  }
+  if (!run({"modprobe", "libcomposite"}) && !files.exists(places.configfs))
+    throw ConfigError("gadget: this kernel has no USB gadget support (libcomposite): {}", kLoad);
   if (files.exists(places.gadgets())) return;  // systemd mounts configfs when it comes
   const int mounted = ::mount("none", places.configfs.c_str(), "configfs", 0, nullptr);
   if (!files.exists(places.gadgets())) {
-    throw ConfigError(fmt::format("gadget: {} is not there{}; try: {} && {}", places.gadgets(),
-                                  mounted == 0 ? "" : fmt::format(" ({})", std::strerror(errno)),
-                                  kLoad, kMount));
+    throw ConfigError("gadget: {} is not there{}; try: {} && {}", places.gadgets(),
+                      mounted == 0 ? "" : fmt::format(" ({})", std::strerror(errno)), kLoad,
+                      kMount);
   }
 }
 
 UniqueFd lock_gadgets(const KernelPlaces& places) {
   UniqueFd folder(::open(places.gadgets().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  while (folder && ::flock(folder.get(), LOCK_EX) != 0) {
+  while (folder && ::flock(folder.get(), LOCK_EX) != 0)
     if (errno != EINTR) folder.reset();
-  }
   if (!folder) {
-    throw ConfigError(fmt::format("gadget: {} cannot be locked: {}; check it with: ls -ld {}",
-                                  places.gadgets(), std::strerror(errno), places.gadgets()));
+    throw ConfigError("gadget: {} cannot be locked: {}; check it with: ls -ld {}", places.gadgets(),
+                      std::strerror(errno), places.gadgets());
   }
   return folder;
 }
@@ -442,16 +434,15 @@ OpenedNode open_gadget_node(const GadgetFiles& files, const KernelPlaces& places
   node.path = places.devices + "/" + *name;
   UniqueFd fd(::open(node.path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
   struct stat file {};
-  if (!fd || ::fstat(fd.get(), &file) != 0) {
+  if (!fd || ::fstat(fd.get(), &file) != 0)
     node.error = errno;
-  } else if (!S_ISCHR(file.st_mode) ||
-             file.st_rdev != parse_device_number(files.line(function + "/dev"))) {
+  else if (!S_ISCHR(file.st_mode) ||
+           file.st_rdev != parse_device_number(files.line(function + "/dev")))
     node.error = ENXIO;
-  } else if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {
+  else if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0)
     node.error = errno;
-  } else {
+  else
     node.fd = std::move(fd);
-  }
   return node;
 }
 

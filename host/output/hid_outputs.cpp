@@ -38,8 +38,8 @@ bool printable(const std::string& text) {
 template <std::size_t Size>
 void copy_text(const std::string& text, std::uint8_t (&field)[Size], const char* what) {
   if (text.size() >= Size || !printable(text)) {
-    throw ConfigError(
-        fmt::format("HID {}: must be printable and shorter than {} bytes; shorten it", what, Size));
+    throw ConfigError("HID {}: must be printable and shorter than {} bytes; shorten it", what,
+                      Size);
   }
   std::memcpy(field, text.data(), text.size());
 }
@@ -54,10 +54,9 @@ constexpr std::uint16_t kLogitech = 0x046d;
 
 const UhidIdentity& checked(const UhidIdentity& identity) {
   if (identity.vendor != kLogitech) return identity;
-  throw ConfigError(
-      "spacemouse id " + hex_id(identity.vendor, identity.product) +
-      ": the kernel's hid-logitech driver refuses virtual devices of this vendor; use "
-      "256f:c62e or an id of your own");
+  throw ConfigError("spacemouse id " + hex_id(identity.vendor, identity.product) +
+                    ": the kernel's hid-logitech driver refuses virtual devices of this vendor; "
+                    "use 256f:c62e or an id of your own");
 }
 
 constexpr const char* kPath = "/dev/uinput";
@@ -76,10 +75,8 @@ bool order(int fd, unsigned long request, Argument... argument) {
 
 uinput_setup setup_of(const JoystickOptions& options) {
   uinput_setup setup{};
-  if (options.name.empty() || options.name.size() >= sizeof setup.name ||
-      !printable(options.name)) {
+  if (options.name.empty() || options.name.size() >= sizeof setup.name || !printable(options.name))
     throw ConfigError("joystick name: must be 1 to 79 printable bytes; change it");
-  }
   std::memcpy(setup.name, options.name.data(), options.name.size());
   // Games that look for a bus, vendor and product skip devices without them.
   setup.id = {BUS_USB, options.vendor, options.product, 0x0100};
@@ -98,8 +95,7 @@ std::string cannot_open_node(const std::string& path, const char* module, int er
     case EPERM:
       return fmt::format(
           "{}: permission denied; install 70-tagwrench.rules in /etc/udev/rules.d and join the "
-          "group "
-          "input, or run as root",
+          "group input, or run as root",
           path);
     case ENOENT:
     case ENODEV:
@@ -141,9 +137,8 @@ void UhidDevice::create(const UhidIdentity& identity, std::span<const std::uint8
   copy_text(identity.name, request.name, "name");
   copy_text("tagwrench", request.phys, "location");
   copy_text(identity.serial, request.uniq, "serial");
-  if (descriptor.size() > sizeof request.rd_data) {
+  if (descriptor.size() > sizeof request.rd_data)
     throw ConfigError(label_ + ": report descriptor too long; shorten it");
-  }
   std::memcpy(request.rd_data, descriptor.data(), descriptor.size());
   request.rd_size = static_cast<std::uint16_t>(descriptor.size());
   // hidapi before 0.16 does not list BUS_VIRTUAL.
@@ -152,8 +147,8 @@ void UhidDevice::create(const UhidIdentity& identity, std::span<const std::uint8
   request.product = identity.product;
   request.version = 0x0100;
   if (write_event(uhid_, event_.get(), sizeof(uhid_event)) < 0) {
-    throw ConfigError(fmt::format("{}: the kernel refused the device: {}; see dmesg", label_,
-                                  std::strerror(errno)));
+    throw ConfigError("{}: the kernel refused the device: {}; see dmesg", label_,
+                      std::strerror(errno));
   }
 }
 
@@ -172,9 +167,9 @@ void UhidDevice::wait_for_start(const UhidIdentity& identity, std::chrono::milli
     if ((waiting.revents & POLLIN) == 0 && (waiting.revents & (POLLHUP | POLLERR)) != 0) break;
   }
   throw ConfigError(
-      fmt::format("{}: the kernel did not start a device with id {}; load its driver: sudo "
-                  "modprobe hid-generic",
-                  label_, hex_id(identity.vendor, identity.product)));
+      "{}: the kernel did not start a device with id {}; load its driver: sudo modprobe "
+      "hid-generic",
+      label_, hex_id(identity.vendor, identity.product));
 }
 
 SendStatus UhidDevice::send(std::span<const std::uint8_t> report) noexcept {
@@ -301,11 +296,9 @@ SendStatus SpacemouseOutput::move(const Sample& sample) noexcept {
 
 std::string_view SpacemouseOutput::service() noexcept {
   const bool before = led_;
-  while (const auto report = device_.next_output()) {
-    if (report->size >= 2 && report->bytes[0] == kSpacemouseLedReportId) {
+  while (const auto report = device_.next_output())
+    if (report->size >= 2 && report->bytes[0] == kSpacemouseLedReportId)
       led_ = (report->bytes[1] & 1) != 0;
-    }
-  }
   if (led_ == before) return {};
   return led_ ? "spacemouse: LED on" : "spacemouse: LED off";
 }

@@ -150,9 +150,8 @@ class ReportWriter {
  public:
   explicit ReportWriter(std::span<std::uint8_t> bytes) : bytes_(bytes) {}
   void put(std::uint32_t value, std::size_t size) {
-    for (std::size_t i = 0; i < size; ++i) {
+    for (std::size_t i = 0; i < size; ++i)
       bytes_[at_++] = static_cast<std::uint8_t>(value >> (8 * i));
-    }
   }
 
  private:
@@ -241,9 +240,8 @@ WrenchReport wrench_report(const Sample& sample) noexcept {
   ReportWriter out(report);
   out.put(kWrenchReportId, 1);
   for (int i = 0; i < 6; ++i) out.put(numbers ? micro(sample.wrench[i]) : 0, 4);
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     out.put(numbers ? micro(std::max(sample.wrench_sigma[i], 0.0)) : 0, 4);
-  }
   out.put(static_cast<std::uint32_t>(std::min<std::uint64_t>(time_us / 1'000'000, kMax31)), 4);
   out.put(static_cast<std::uint32_t>(time_us % 1'000'000), 4);
   out.put(static_cast<std::uint32_t>(sample.sequence & kMax31), 4);

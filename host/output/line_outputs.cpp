@@ -40,10 +40,7 @@ constexpr std::string_view kJson =
     "\n";
 
 constexpr std::string_view kCsv =
-    "{},{},{},"
-    "{},{},{},{},{},{},{},{},{},{},{},{},"
-    "{},{},{},{},{},{},{},{},{},{},{},{},"
-    "{},{}\n";
+    "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n";
 
 template <typename Format>
 std::string_view line(LineBuffer& buffer, Format format, const Sample& sample) noexcept {
@@ -80,8 +77,7 @@ TextSink::TextSink(const std::string& path, bool lossless)
   if (!fd) {
     const char* what = errno == ENXIO ? "start the reader of the named pipe first"
                                       : "choose a file that can be written";
-    throw ConfigError(
-        fmt::format("{}: cannot be written: {}; {}", path, std::strerror(errno), what));
+    throw ConfigError("{}: cannot be written: {}; {}", path, std::strerror(errno), what);
   }
   adopt(fd.get());
 }
@@ -97,10 +93,8 @@ TextSink::~TextSink() {
 
 void TextSink::adopt(int fd) {
   struct stat about {};
-  if (fstat(fd, &about) != 0) {
-    throw ConfigError(
-        fmt::format("{}: not open: {}; redirect it somewhere", label_, std::strerror(errno)));
-  }
+  if (fstat(fd, &about) != 0)
+    throw ConfigError("{}: not open: {}; redirect it somewhere", label_, std::strerror(errno));
   if (S_ISREG(about.st_mode)) kind_ = Kind::file;
   if (S_ISSOCK(about.st_mode)) kind_ = Kind::socket;
   if (kind_ == Kind::stream) {
@@ -111,8 +105,8 @@ void TextSink::adopt(int fd) {
   }
   if (!fd_) fd_.reset(fcntl(fd, F_DUPFD_CLOEXEC, 0));
   if (!fd_) {
-    throw ConfigError(fmt::format("{}: cannot be written: {}; redirect it somewhere", label_,
-                                  std::strerror(errno)));
+    throw ConfigError("{}: cannot be written: {}; redirect it somewhere", label_,
+                      std::strerror(errno));
   }
 }
 

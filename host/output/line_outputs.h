@@ -72,12 +72,9 @@ using LineBuffer = std::array<char, 1536>;
 /// The CSV columns are the JSON keys, flattened; displacement and wrench are named as in truth.csv
 /// of the simulator.
 inline constexpr std::string_view kCsvHeader =
-    "seq,t_ns,status,"
-    "dx_m,dy_m,dz_m,rx_rad,ry_rad,rz_rad,"
-    "sigma_dx_m,sigma_dy_m,sigma_dz_m,sigma_rx_rad,sigma_ry_rad,sigma_rz_rad,"
-    "fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,"
-    "sigma_fx_n,sigma_fy_n,sigma_fz_n,sigma_mx_nm,sigma_my_nm,sigma_mz_nm,"
-    "dropped,latency_us\n";
+    "seq,t_ns,status,dx_m,dy_m,dz_m,rx_rad,ry_rad,rz_rad,sigma_dx_m,sigma_dy_m,sigma_dz_m,sigma_rx_"
+    "rad,sigma_ry_rad,sigma_rz_rad,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,sigma_fx_n,sigma_fy_n,sigma_fz_"
+    "n,sigma_mx_nm,sigma_my_nm,sigma_mz_nm,dropped,latency_us\n";
 
 /// A status that carries no numbers has zeros in all of them. The view is into `buffer` and ends
 /// with a newline.

@@ -55,9 +55,9 @@ bool served(const std::string& path) noexcept {
 }
 
 [[noreturn]] void fail(const std::string& path, const char* what, int error) {
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "spnav socket {}: {}: {}; choose a path in a folder of yours, as in --output spnav:PATH",
-      path, what, std::strerror(error)));
+      path, what, std::strerror(error));
 }
 
 /// Holds the folder while sockets come and go in it, so that two daemons do not take each other's.
@@ -65,9 +65,8 @@ UniqueFd lock_folder(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!fd) fail(path, "its folder does not open", errno);
-  while (::flock(fd.get(), LOCK_EX) != 0) {
+  while (::flock(fd.get(), LOCK_EX) != 0)
     if (errno != EINTR) fail(path, "its folder cannot be locked", errno);
-  }
   return fd;
 }
 
@@ -78,9 +77,9 @@ void remove_left_over(const std::string& path) {
   const bool worthless = S_ISSOCK(file.st_mode) || (S_ISREG(file.st_mode) && file.st_size == 0);
   if (!worthless) {
     throw ConfigError(
-        fmt::format("spnav socket {}: something else is there, not a socket; move it away or "
-                    "choose another path",
-                    path));
+        "spnav socket {}: something else is there, not a socket; move it away or choose another "
+        "path",
+        path);
   }
   if (::unlink(path.c_str()) != 0) fail(path, "the left-over socket cannot be removed", errno);
 }
@@ -162,8 +161,8 @@ std::string spnav_socket_path(const std::string& given) {
   const std::string path =
       given.empty() ? default_path() : std::filesystem::absolute(given).lexically_normal().string();
   if (bridge_path(path).size() >= sizeof sockaddr_un::sun_path) {
-    throw ConfigError(fmt::format("spnav socket {}: longer than {} bytes; choose a shorter path",
-                                  path, sizeof sockaddr_un::sun_path - 1 - 7));
+    throw ConfigError("spnav socket {}: longer than {} bytes; choose a shorter path", path,
+                      sizeof sockaddr_un::sun_path - 1 - 7);
   }
   return path;
 }
@@ -173,10 +172,9 @@ std::optional<SpnavSockets> listen_spnav(const std::string& path) {
   if (connect_spnav_bridge(path)) return {};
   if (served(path)) {
     throw ConfigError(
-        fmt::format("spnav socket {}: another server has it, spacenavd perhaps; end it, or choose "
-                    "another path, "
-                    "as in --output spnav:PATH",
-                    path));
+        "spnav socket {}: another server has it, spacenavd perhaps; end it, or choose another "
+        "path, as in --output spnav:PATH",
+        path);
   }
   remove_left_over(path);
   remove_left_over(bridge_path(path));
@@ -198,7 +196,7 @@ SpnavSockets inherited_spnav(const std::string& path, int programs, int bridge) 
     int is_listening = 0;
     socklen_t size = sizeof is_listening;
     if (::getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &is_listening, &size) != 0 || is_listening == 0)
-      throw ConfigError(fmt::format("spnav socket {}: {} is no listening socket", path, fd));
+      throw ConfigError("spnav socket {}: {} is no listening socket", path, fd);
     ::fcntl(fd, F_SETFD, FD_CLOEXEC);
     ::fcntl(fd, F_SETFL, O_NONBLOCK);
   }
@@ -417,13 +415,12 @@ class SpnavDaemon {
       read_bridge();
     } else {
       auto& client = *static_cast<SpnavClient*>(event.data.ptr);
-      if ((event.events & (EPOLLHUP | EPOLLERR)) != 0) {
+      if ((event.events & (EPOLLHUP | EPOLLERR)) != 0)
         client.hang_up();
-      } else if ((event.events & EPOLLOUT) != 0) {
+      else if ((event.events & EPOLLOUT) != 0)
         client.resume(state_, device(), steady_clock::now());
-      } else {
+      else
         client.read(device(), sockets_.path);
-      }
     }
   }
 

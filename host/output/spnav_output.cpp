@@ -57,15 +57,14 @@ SpnavOutput::SpnavOutput(const SpnavOptions& options)
       intervals_{milliseconds(40), milliseconds(40), milliseconds(40)} {
   programs_.reserve(kMaxPrograms);
   // A daemon that is just about to end, or to start, takes another attempt.
-  for (int i = 0; i < kAttempts && !welcome_ && !other_bridge_; ++i) {
+  for (int i = 0; i < kAttempts && !welcome_ && !other_bridge_; ++i)
     if (reach_daemon()) await_greeting();
-  }
   if (other_bridge_) throw ConfigError(failure());
   if (!welcome_) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "spnav socket {}: its daemon does not answer; `tagwrench spnav --socket {}` in another "
         "terminal says why",
-        path_, path_));
+        path_, path_);
   }
 }
 
@@ -94,9 +93,9 @@ void SpnavOutput::start_daemon(const SpnavSockets& sockets) {
   if (failed == 0) return;
   sockets.remove();
   throw ConfigError(
-      fmt::format("spnav socket {}: its daemon {} cannot be started: {}; end other "
-                  "programs, or run without the output spnav",
-                  path_, options_.program, std::strerror(failed)));
+      "spnav socket {}: its daemon {} cannot be started: {}; end other programs, or run without "
+      "the output spnav",
+      path_, options_.program, std::strerror(failed));
 }
 
 void SpnavOutput::await_greeting() {
@@ -152,8 +151,7 @@ std::string SpnavOutput::failure() const {
   const std::int32_t pid = other_bridge_.value_or(0);
   return fmt::format(
       "spnav socket {}: another bridge{} feeds it already; end that one, or choose another path, "
-      "as "
-      "in --output spnav:PATH",
+      "as in --output spnav:PATH",
       path_, pid > 0 ? fmt::format(" (process {})", pid) : "");
 }
 
@@ -171,9 +169,9 @@ std::string_view SpnavOutput::service() noexcept {
   if (const auto greeting = spnav_message<SpnavGreeting>(received.bytes)) return take(*greeting);
   if (const auto program = spnav_message<SpnavProgram>(received.bytes)) return take(*program);
   lost_daemon();
-  return write_line(status_line_,
-                    "spnav: the daemon is of another version of tagwrench; end it with `pkill "
-                    "tw-spnav`");
+  return write_line(
+      status_line_,
+      "spnav: the daemon is of another version of tagwrench; end it with `pkill tw-spnav`");
 }
 
 std::string_view SpnavOutput::lost_daemon() noexcept {

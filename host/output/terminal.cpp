@@ -207,15 +207,13 @@ std::size_t draw_view(Screen& screen, const TerminalOptions& options, const Samp
     view.print("{:.1f} Hz   latency {:.1f} ms   dropped {}   Ctrl-C ends", figures.rate_hz,
                figures.latency_ms, figures.dropped);
   }
-  for (int i = 0; i < 6 && view.next_line(); ++i) {
+  for (int i = 0; i < 6 && view.next_line(); ++i)
     draw_axis(view, i, options, sample, carries_numbers(status), width);
-  }
   const bool zero_is_of_use = sample.zero_state != ZeroState::off || !sample.zero.isZero();
   if (zero_is_of_use && view.next_line()) draw_zero(view, options, sample);
   if (!options.source.empty() && view.next_line()) view.print("source  {}", options.source);
-  for (const std::string& device : options.devices) {
+  for (const std::string& device : options.devices)
     if (view.next_line()) view.print("output  {}", device);
-  }
   draw_note(view, notice, width);
   view.finish();
   lines = view.lines();
@@ -227,12 +225,12 @@ std::size_t format_plain_line(Screen& line, const Sample& sample, const Terminal
   const Status status = shown_status(sample);
   static const Vector6 kZero = Vector6::Zero();
   const Vector6& w = carries_numbers(status) ? sample.wrench : kZero;
-  const auto done = fmt::format_to_n(
-      line.data(), line.size(),
-      "t {:.2f} s  {}  F {:6.3f} {:6.3f} {:6.3f} N  M {:6.1f} {:6.1f} {:6.1f} mN m  {:.1f} Hz  "
-      "latency {:.1f} ms  dropped {}\n",
-      t_s, name(status), w[0], w[1], w[2], w[3] * 1e3, w[4] * 1e3, w[5] * 1e3, figures.rate_hz,
-      figures.latency_ms, figures.dropped);
+  const auto done =
+      fmt::format_to_n(line.data(), line.size(),
+                       "t {:.2f} s  {}  F {:6.3f} {:6.3f} {:6.3f} N  M {:6.1f} {:6.1f} {:6.1f} mN "
+                       "m  {:.1f} Hz  latency {:.1f} ms  dropped {}\n",
+                       t_s, name(status), w[0], w[1], w[2], w[3] * 1e3, w[4] * 1e3, w[5] * 1e3,
+                       figures.rate_hz, figures.latency_ms, figures.dropped);
   return std::min(done.size, line.size());
 }
 

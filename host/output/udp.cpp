@@ -21,7 +21,7 @@ struct Place {
 };
 
 [[noreturn]] void refuse(const std::string& place, const std::string& why) {
-  throw ConfigError(fmt::format("--output udp:{}: {}", place, why));
+  throw ConfigError("--output udp:{}: {}", place, why);
 }
 
 /// "host:4242", "[::1]:4242"

@@ -56,9 +56,8 @@ void write_once(int fd, const std::vector<std::uint8_t>& bytes) {
 }
 
 void write_neutral(const std::vector<WatchdogDevice>& devices) {
-  for (const WatchdogDevice& device : devices) {
+  for (const WatchdogDevice& device : devices)
     for (const std::vector<std::uint8_t>& bytes : device.neutral) write_once(device.fd, bytes);
-  }
 }
 
 void leave_terminal() {

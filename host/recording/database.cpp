@@ -116,11 +116,11 @@ std::filesystem::path created(const std::filesystem::path& path) {
   const UniqueFd file(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
   if (file) return path;
   if (errno == EEXIST) {
-    throw ConfigError(fmt::format(
-        "{}: exists, and a recording replaces nothing; choose another name", path.string()));
+    throw ConfigError("{}: exists, and a recording replaces nothing; choose another name",
+                      path.string());
   }
-  throw ConfigError(fmt::format("{}: cannot be made: {}; choose a folder that can be written",
-                                path.string(), std::strerror(errno)));
+  throw ConfigError("{}: cannot be made: {}; choose a folder that can be written", path.string(),
+                    std::strerror(errno));
 }
 
 Database prepared(const std::filesystem::path& path) {
@@ -189,9 +189,8 @@ void Database::fail(int code) const {
   // It may quote what a damaged file holds.
   constexpr std::size_t kMax = 200;
   what = what.substr(0, kMax);
-  for (char& c : what) {
+  for (char& c : what)
     if (static_cast<unsigned char>(c) < ' ' || static_cast<unsigned char>(c) > '~') c = ' ';
-  }
   throw DatabaseError(what, code, of_the_system ? error : 0);
 }
 
@@ -346,9 +345,8 @@ void Sink::frame(std::int64_t id, const FrameRow& row, std::span<const std::uint
 void Sink::track(std::int64_t id, const Track& track) {
   std::array<double, 21> covariance{};
   std::size_t n = 0;
-  for (int row = 0; row < 6; ++row) {
+  for (int row = 0; row < 6; ++row)
     for (int column = row; column < 6; ++column) covariance[n++] = track.covariance(row, column);
-  }
   std::array<double, 9 * std::tuple_size_v<decltype(Track::corners)>> corners{};
   const std::size_t tags = std::min<std::size_t>(track.corner_count, track.corners.size());
   for (std::size_t t = 0; t < tags; ++t) {

@@ -26,19 +26,18 @@ constexpr std::int64_t kMaxStep = 1'000'000;  ///< of a plan
 // What is read below, in the order of events.
 
 constexpr const char* kFrames =
-    "SELECT f.id, f.seq, f.t_ns, f.dropped, f.fourcc, f.stride,"
-    " f.first_x, f.first_y, f.first_width, f.first_height,"
-    " f.all_x, f.all_y, f.all_width, f.all_height,"
-    " s.output_ns - s.origin_ns, s.touched, f.bytes"
-    " FROM frames f LEFT JOIN samples s ON s.id = f.id ORDER BY f.id";
+    "SELECT f.id, f.seq, f.t_ns, f.dropped, f.fourcc, f.stride, f.first_x, f.first_y, "
+    "f.first_width, f.first_height, f.all_x, f.all_y, f.all_width, f.all_height, s.output_ns - "
+    "s.origin_ns, s.touched, f.bytes FROM frames f LEFT JOIN samples s ON s.id = f.id ORDER BY "
+    "f.id";
 constexpr const char* kTroubles =
-    "SELECT e.id, e.kind, e.t_ns, e.text, s.output_ns - s.origin_ns"
-    " FROM events e LEFT JOIN samples s ON s.id = e.id"
-    " WHERE e.kind IN ('missing', 'disconnected', 'reconnected') ORDER BY e.id";
+    "SELECT e.id, e.kind, e.t_ns, e.text, s.output_ns - s.origin_ns FROM events e LEFT JOIN "
+    "samples s ON s.id = e.id WHERE e.kind IN ('missing', 'disconnected', 'reconnected') ORDER BY "
+    "e.id";
 constexpr const char* kTracks =
-    "SELECT t.id, f.t_ns, t.status, t.hint, t.x, t.y, t.z, t.rx, t.ry, t.rz, t.covariance,"
-    " t.residual_px, t.residual_part, t.blur_px2, t.tags_held, t.corners"
-    " FROM tracks t JOIN frames f ON f.id = t.id ORDER BY t.id";
+    "SELECT t.id, f.t_ns, t.status, t.hint, t.x, t.y, t.z, t.rx, t.ry, t.rz, t.covariance, "
+    "t.residual_px, t.residual_part, t.blur_px2, t.tags_held, t.corners FROM tracks t JOIN frames "
+    "f ON f.id = t.id ORDER BY t.id";
 constexpr const char* kSamples = "SELECT * FROM samples ORDER BY id";
 constexpr const char* kReferences = "SELECT * FROM reference ORDER BY id";
 constexpr const char* kEvents = "SELECT id, t_ns, kind, step, value, text FROM events ORDER BY id";
@@ -53,9 +52,8 @@ Duration duration(std::int64_t ns) { return Duration(std::clamp(ns, -kMax_ns, kM
 
 std::optional<Status> status_of(std::string_view text) {
   for (const Status s :
-       {Status::ok, Status::acquiring, Status::lost, Status::doubtful, Status::saturated}) {
+       {Status::ok, Status::acquiring, Status::lost, Status::doubtful, Status::saturated})
     if (text == name(s)) return s;
-  }
   return std::nullopt;
 }
 
@@ -91,10 +89,9 @@ std::vector<double> doubles(std::span<const std::uint8_t> blob) {
 void read_covariance(const std::vector<double>& numbers, Matrix6& covariance) {
   if (numbers.size() != 21) return;
   std::size_t n = 0;
-  for (int row = 0; row < 6; ++row) {
+  for (int row = 0; row < 6; ++row)
     for (int column = row; column < 6; ++column)
       covariance(row, column) = covariance(column, row) = numbers[n++];
-  }
 }
 
 void read_corners(const std::vector<double>& numbers, Track& track) {
@@ -158,9 +155,8 @@ void read(const Statement& row, const Head& head, Entry& entry) {
   const auto area =
       static_cast<std::size_t>(entry.all.width) * static_cast<std::size_t>(entry.all.height);
   if (entry.crop &&
-      (entry.first.empty() || !entry.all.contains(entry.first) || entry.raw.bytes.size() != area)) {
+      (entry.first.empty() || !entry.all.contains(entry.first) || entry.raw.bytes.size() != area))
     entry.raw.bytes = {};
-  }
 }
 
 void read_trouble(const Statement& row, Entry& entry) {
@@ -317,12 +313,12 @@ struct RecordingReader::Cursors {
 RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
-    throw ConfigError(fmt::format("{}: no such file; give one that `tagwrench record --out` made",
-                                  path.string()));
+    throw ConfigError("{}: no such file; give one that `tagwrench record --out` made",
+                      path.string());
   }
   if (!std::filesystem::is_regular_file(path, error)) {
-    throw ConfigError(fmt::format("{}: is not a file; give one that `tagwrench record --out` made",
-                                  path.string()));
+    throw ConfigError("{}: is not a file; give one that `tagwrench record --out` made",
+                      path.string());
   }
   try {
     open();
@@ -331,13 +327,13 @@ RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path
     check_times();
   } catch (const DatabaseError& e) {
     if (e.code() == SQLITE_NOTADB) {
-      throw ConfigError(fmt::format(
-          "{}: is not a recording; give a file that `tagwrench record --out` made", path.string()));
+      throw ConfigError("{}: is not a recording; give a file that `tagwrench record --out` made",
+                        path.string());
     }
     if ((e.code() & 0xff) == SQLITE_CANTOPEN || (e.code() & 0xff) == SQLITE_READONLY) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "{}: cannot be opened: {}; if {}-wal is beside it, copy both to a folder of yours",
-          path.string(), e.what(), path.filename().string()));
+          path.string(), e.what(), path.filename().string());
     }
     damaged(e.what());
   }
@@ -350,9 +346,9 @@ std::string_view RecordingReader::unclosed() const noexcept {
 }
 
 void RecordingReader::damaged(const std::string& what) const {
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "{0}: is damaged: {1}; take a copy that is whole, or `sqlite3 {0} .recover` for what is left",
-      path_.string(), what));
+      path_.string(), what);
 }
 
 void RecordingReader::open() {
@@ -360,15 +356,15 @@ void RecordingReader::open() {
   cursors_ = std::make_unique<Cursors>(path_);
   Database& database = cursors_->database;
   if (database.number("PRAGMA application_id") != kApplicationId) {
-    throw ConfigError(fmt::format(
-        "{}: is not a recording; give a file that `tagwrench record --out` made", path_.string()));
+    throw ConfigError("{}: is not a recording; give a file that `tagwrench record --out` made",
+                      path_.string());
   }
   const std::int64_t version = database.number("PRAGMA user_version");
   if (version != kSchemaVersion) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: is a recording of format {}, and this version reads format {}; use the tagwrench that "
         "made it",
-        path_.string(), version, kSchemaVersion));
+        path_.string(), version, kSchemaVersion);
   }
 }
 
@@ -445,11 +441,10 @@ void RecordingReader::check_times() {
     const TimePoint time = time_point(rows.integer(1));
     if (!times_.empty() && time <= times_.back()) {
       throw ConfigError(
-          fmt::format("{}: is damaged: time runs backwards: frame {} has t_ns {}, and the one "
-                      "before it {}; take a "
-                      "copy that is whole",
-                      path_.string(), rows.integer(0), time.time_since_epoch().count(),
-                      times_.back().time_since_epoch().count()));
+          "{}: is damaged: time runs backwards: frame {} has t_ns {}, and the one before it {}; "
+          "take a copy that is whole",
+          path_.string(), rows.integer(0), time.time_since_epoch().count(),
+          times_.back().time_since_epoch().count());
     }
     times_.push_back(time);
   }

@@ -97,10 +97,10 @@ std::size_t buffer_bytes(const WriterOptions& options, const Head& head) {
 ByteRing taken_ring(const WriterOptions& options, const Head& head) try {
   return ByteRing(buffer_bytes(options, head));
 } catch (const std::bad_alloc&) {
-  throw ConfigError(fmt::format(
-      "{}: no memory for a buffer of {} MB; close other programs, or ask the camera for "
-      "a smaller picture",
-      options.path.string(), buffer_bytes(options, head) >> 20));
+  throw ConfigError(
+      "{}: no memory for a buffer of {} MB; close other programs, or ask the camera for a smaller "
+      "picture",
+      options.path.string(), buffer_bytes(options, head) >> 20);
 }
 
 /// From here on a limit on the size of files is an error, not a signal that kills.
@@ -154,8 +154,8 @@ RecordingWriter::RecordingWriter(const WriterOptions& options, const Head& head)
     thread_ = std::thread([this] { write(); });
   } catch (const std::system_error& e) {
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    throw ConfigError(fmt::format("{}: no thread to write with: {}; close other programs",
-                                  options.path.string(), e.what()));
+    throw ConfigError("{}: no thread to write with: {}; close other programs",
+                      options.path.string(), e.what());
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }

@@ -138,7 +138,7 @@ class CalibrationReader {
   }
 
   [[noreturn]] void fail(const std::string& message) const {
-    throw ConfigError(fmt::format("{}: {}", path_, message));
+    throw ConfigError("{}: {}", path_, message);
   }
 
  private:
@@ -189,9 +189,8 @@ void check_covariance(const CalibrationReader& file, const std::string& key,
   const bool symmetric = (scaled - scaled.transpose()).cwiseAbs().maxCoeff() < 1e-6;
   scaled.diagonal().array() += 1e-6;
   if (!symmetric || !scaled.allFinite() ||
-      Eigen::LLT<Eigen::MatrixXd>(scaled).info() != Eigen::Success) {
+      Eigen::LLT<Eigen::MatrixXd>(scaled).info() != Eigen::Success)
     file.fail(fmt::format("\"{}\" is no covariance: not positive semidefinite", key));
-  }
 }
 
 FeatureSpec read_features(const CalibrationReader& file, const json& node) {
@@ -208,9 +207,8 @@ FeatureSpec read_features(const CalibrationReader& file, const json& node) {
     features.time_constant = file.number(file.at(node, "time_constant_s"), "time_constant_s");
     if (features.time_constant <= 0) file.fail("\"time_constant_s\" must be greater than 0");
   }
-  if (features.kind == FeatureKind::hysteresis) {
+  if (features.kind == FeatureKind::hysteresis)
     features.play = file.non_negative6(file.at(node, "play"), "play");
-  }
   return features;
 }
 
@@ -293,9 +291,8 @@ ModelTrial read_trial(const CalibrationReader& file, const json& node) {
 
 CalibrationRecord read_record(const CalibrationReader& file) {
   CalibrationRecord record;
-  for (const auto& [key, member] : kRecordTexts) {
+  for (const auto& [key, member] : kRecordTexts)
     if (file.has(key)) record.*member = file.text(file.at(key), key);
-  }
   if (file.has("data")) {
     record.data_file = file.text(file.at(file.at("data"), "file"), "file");
     record.data_sha256 = file.text(file.at(file.at("data"), "sha256"), "sha256");
@@ -362,16 +359,14 @@ ordered_json axis_json(const char* axis_name, const AxisFit& axis) {
 }
 
 void add_record(const CalibrationRecord& record, ordered_json& out) {
-  for (const auto& [key, member] : kRecordTexts) {
+  for (const auto& [key, member] : kRecordTexts)
     if (!(record.*member).empty()) out[key] = record.*member;
-  }
   if (!record.data_sha256.empty())
     out["data"] = {{"file", record.data_file}, {"sha256", record.data_sha256}};
   if (record.lag) out["lag_s"] = {{"value", record.lag->value}, {"sigma", record.lag->sigma}};
-  if (record.axis) {
+  if (record.axis)
     for (std::size_t i = 0; i < 6; ++i)
       out["axes"].push_back(axis_json(kWrenchAxes[i], (*record.axis)[i]));
-  }
   if (record.inside_95) out["inside_95"] = *record.inside_95;
   if (record.axis) out["missing"] = record.missing;
   if (!record.warnings.empty()) out["warnings"] = record.warnings;
@@ -401,10 +396,10 @@ CalibrationFacts load_calibration(const std::string& path, const CameraModel& ca
   const CalibrationReader file(path);
   const std::string differs = difference(read_sensor(file), identity_of(camera, target, rest));
   if (!differs.empty()) {
-    file.fail(fmt::format(
-        "was made for another sensor: {}; run `tagwrench calibrate wrench` for this one, or remove "
-        "it",
-        differs));
+    file.fail(
+        fmt::format("was made for another sensor: {}; run `tagwrench calibrate wrench` for this "
+                    "one, or remove it",
+                    differs));
   }
   WrenchModel read;
   read_model(file, read);

@@ -23,10 +23,9 @@ Vector6 optional_pose_sigma(YamlReader& node, bool has_pose) {
   }
   sigma << vector3(node.numbers("position_sigma_mm", 3)) * kMm,
       vector3(node.numbers("rotation_sigma_rad", 3));
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (sigma[i] < 0)
       node.fail(i < 3 ? "position_sigma_mm" : "rotation_sigma_rad", "must not be negative");
-  }
   return sigma;
 }
 
@@ -65,9 +64,8 @@ std::optional<Eigen::Vector2d> fold(const CameraModel& camera) {
     const double part = static_cast<double>(i) / kSides;
     for (const Eigen::Vector2d& border :
          {Eigen::Vector2d(part * right, 0), Eigen::Vector2d(part * right, bottom),
-          Eigen::Vector2d(0, part * bottom), Eigen::Vector2d(right, part * bottom)}) {
+          Eigen::Vector2d(0, part * bottom), Eigen::Vector2d(right, part * bottom)})
       if (const auto found = fold_toward(border)) return found;
-    }
   }
   return std::nullopt;
 }

@@ -72,10 +72,9 @@ void read_lens(YamlReader& root, CameraModel& camera) {
                                              focal));
     }
   }
-  for (const double centre : {k[2], k[5]}) {
+  for (const double centre : {k[2], k[5]})
     if (std::abs(centre) > kFarthestCentre_px)
       root.fail("camera_matrix", fmt::format("a centre at {} px is none of this image", centre));
-  }
   camera.fx_px = k[0];
   camera.cx_px = k[2];
   camera.fy_px = k[4];
@@ -122,9 +121,8 @@ std::string stamp_text(const MeasuredStamp& stamp, const char* indent) {
   std::string text;
   for (const auto& [key, value] :
        {std::pair{"date", &stamp.date}, std::pair{"software", &stamp.software},
-        std::pair{"sensor", &stamp.sensor}}) {
+        std::pair{"sensor", &stamp.sensor}})
     if (!value->empty()) text += fmt::format("{}{}: {}\n", indent, key, yaml_quoted(*value));
-  }
   return text;
 }
 
@@ -140,7 +138,7 @@ constexpr const char* kRemedy =
     "remove rest.appearance, and run `tagwrench calibrate target` for a new one";
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& what) {
-  throw ConfigError(fmt::format("{}: {}; {}", path.string(), what, kRemedy));
+  throw ConfigError("{}: {}; {}", path.string(), what, kRemedy);
 }
 
 /// The header is checked before anything is decoded: a small file may claim gigapixels.
@@ -268,12 +266,12 @@ ReferenceImage read_measured_picture(const fs::path& folder, const PictureName& 
     return picture;
   }
   std::error_code error;
-  throw ConfigError(fmt::format(
-      "{}: {}; run `tagwrench calibrate target`, or remove {}", (folder / name.file).string(),
-      fs::exists(folder / name.file, error)
-          ? "is not the picture that target.yaml was found with (SHA-256 differs)"
-          : "is missing, and target.yaml needs it",
-      (folder / kMeasuredTarget).string()));
+  throw ConfigError("{}: {}; run `tagwrench calibrate target`, or remove {}",
+                    (folder / name.file).string(),
+                    fs::exists(folder / name.file, error)
+                        ? "is not the picture that target.yaml was found with (SHA-256 differs)"
+                        : "is missing, and target.yaml needs it",
+                    (folder / kMeasuredTarget).string());
 }
 
 void check_owner(const fs::path& file, const MeasuredStamp& stamp, const fs::path& sensor) {
@@ -282,10 +280,10 @@ void check_owner(const fs::path& file, const MeasuredStamp& stamp, const fs::pat
   if (stamp.sensor.empty() || stamp.sensor == real.filename()) return;
   if (fs::path(stamp.sensor).filename() != stamp.sensor) return;
   if (!fs::exists(real.parent_path() / stamp.sensor, error)) return;  // it was renamed
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "{}: was measured for {}, which is in this folder too; give each sensor a folder of its own, "
       "with its {}/",
-      file.string(), stamp.sensor, kMeasuredFolder));
+      file.string(), stamp.sensor, kMeasuredFolder);
 }
 
 std::string camera_yaml(const CameraFile& file, const std::string& name) {
@@ -339,8 +337,8 @@ void check_measurable(const fs::path& folder, const std::vector<const char*>& fi
     return;
   }
   if (!fs::is_directory(folder, error)) {
-    throw ConfigError(fmt::format(
-        "{}: is no folder, and what is measured goes there; move it elsewhere", folder.string()));
+    throw ConfigError("{}: is no folder, and what is measured goes there; move it elsewhere",
+                      folder.string());
   }
   for (const char* file : files) {
     check_replaceable(folder / file);
@@ -404,9 +402,8 @@ ReferenceImage load_reference_image(const fs::path& path, const CameraModel& cam
 std::string encode_reference_image(const ReferenceImage& image) {
   if (image.width <= 0 || image.height <= 0 ||
       image.level.size() !=
-          static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
+          static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height))
     throw std::invalid_argument("rest image: size and levels do not agree");
-  }
   std::vector<std::uint16_t> counts(image.level.size());
   std::transform(image.level.begin(), image.level.end(), counts.begin(), [](float level) {
     return static_cast<std::uint16_t>(
@@ -440,10 +437,9 @@ std::string difference(const SensorIdentity& its, const SensorIdentity& ours) {
   if (its.image_px != ours.image_px)
     return say("image_px", list(its.image_px), list(ours.image_px));
   if (its.lens_px && ours.lens_px) {
-    for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t i = 0; i < 4; ++i)
       if (!same((*its.lens_px)[i], (*ours.lens_px)[i]))
         return say("lens (fx,fy,cx,cy)", list(*its.lens_px), list(*ours.lens_px));
-    }
   }
   if (!its.target_sha256.empty() && !ours.target_sha256.empty() &&
       its.target_sha256 != ours.target_sha256) {

@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 std::string shown(const char* file) { return fmt::format("{}/{}", kMeasuredFolder, file); }
 
 [[noreturn]] void refuse(const fs::path& file, const std::string& why, const char* remedy) {
-  throw ConfigError(fmt::format("{}: {}; {}, or remove the file", file.string(), why, remedy));
+  throw ConfigError("{}: {}; {}, or remove the file", file.string(), why, remedy);
 }
 
 /// camera_info speaks of the image as the camera delivers it, we of what it is turned back to.
@@ -198,10 +198,9 @@ TargetDescription read_target(YamlReader node) {
   target.tags.clear();
   for (YamlReader& entry : node.children("tags")) {
     const Tag tag = read_tag(entry, target.family);
-    for (const Tag& other : target.tags) {
+    for (const Tag& other : target.tags)
       if (other.id == tag.id)
         entry.fail("id", fmt::format("tag {} is listed twice; every tag needs its own id", tag.id));
-    }
     target.tags.push_back(tag);
   }
   if (target.tags.size() > static_cast<std::size_t>(kMaxTags))
@@ -298,9 +297,9 @@ WrenchModel read_wrench(YamlReader node, SensorConfig& sensor, const Measured& m
   WrenchModel model;
   const bool named = node.has("calibration");
   if (!named && !node.has("springs") && !measured.has_wrench()) {
-    node.fail("calibration",
-              "give either calibration: FILE or springs: {...}, so that displacement becomes "
-              "newtons");
+    node.fail(
+        "calibration",
+        "give either calibration: FILE or springs: {...}, so that displacement becomes newtons");
   }
   if (node.has("springs")) {
     sensor.spring_stiffness = stiffness(read_springs(node.child("springs")));

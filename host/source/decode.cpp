@@ -66,9 +66,8 @@ std::optional<ImageSize> jpeg_size(std::span<const std::uint8_t> bytes) {
 
 std::optional<PixelFormat> pixel_format(std::uint32_t fourcc) noexcept {
   if (fourcc == code("JPEG")) return PixelFormat::mjpg;
-  for (std::size_t i = 0; i < kNames.size(); ++i) {
+  for (std::size_t i = 0; i < kNames.size(); ++i)
     if (fourcc == code(kNames[i])) return static_cast<PixelFormat>(i);
-  }
   return std::nullopt;
 }
 
@@ -104,9 +103,7 @@ Decoder::Decoder(PixelFormat format, int width, int height, int stride)
       width_(width),
       height_(height),
       stride_(std::max(stride, row_bytes(format, width))) {
-  if (!borrows()) {
-    luma_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  }
+  if (!borrows()) luma_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   if (format == PixelFormat::mjpg) jpeg_.emplace(width, height);
 }
 
@@ -123,9 +120,8 @@ bool Decoder::decode(std::span<const std::uint8_t> buffer, std::size_t bytes_use
   const auto row = static_cast<std::size_t>(row_bytes(format_, width_));
   const auto step = static_cast<std::size_t>(stride_);
   if (format_ != PixelFormat::mjpg &&
-      bytes.size() < step * static_cast<std::size_t>(height_ - 1) + row) {
+      bytes.size() < step * static_cast<std::size_t>(height_ - 1) + row)
     return false;
-  }
   if (borrows()) {
     image = {bytes.data(), width_, height_, stride_};
     decoded = {0, 0, width_, height_};
@@ -165,11 +161,10 @@ bool is_space(std::uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 /// or a larger one than any that a PGM may hold.
 std::optional<std::uint32_t> number(std::span<const std::uint8_t> bytes, std::size_t& at) {
   while (at < bytes.size() && (is_space(bytes[at]) || bytes[at] == '#')) {
-    if (bytes[at] == '#') {
+    if (bytes[at] == '#')
       while (at < bytes.size() && bytes[at] != '\n') ++at;
-    } else {
+    else
       ++at;
-    }
   }
   std::optional<std::uint32_t> value;
   for (; at < bytes.size() && bytes[at] >= '0' && bytes[at] <= '9'; ++at) {
@@ -214,9 +209,8 @@ bool decode_binary(std::span<const std::uint8_t> data, std::uint32_t white,
 
 std::optional<PgmHeader> pgm_header(std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() < 3 || bytes[0] != 'P' || (bytes[1] != '5' && bytes[1] != '2') ||
-      !is_space(bytes[2])) {
+      !is_space(bytes[2]))
     return std::nullopt;
-  }
   std::size_t at = 2;
   const auto width = number(bytes, at);
   const auto height = width ? number(bytes, at) : std::nullopt;
@@ -230,9 +224,8 @@ bool decode_pgm(std::span<const std::uint8_t> bytes, int width, int height,
                 std::vector<std::uint8_t>& grey) {
   const auto header = pgm_header(bytes);
   if (!header || width < 1 || height < 1 || header->width != static_cast<std::uint32_t>(width) ||
-      header->height != static_cast<std::uint32_t>(height)) {
+      header->height != static_cast<std::uint32_t>(height))
     return false;
-  }
   grey.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   const auto pixels = bytes.subspan(header->size);
   return header->plain ? decode_plain(pixels, header->white, grey)
@@ -245,9 +238,8 @@ bool RawDecoder::decode(const RawFrame& raw, const Region& wanted, Frame& frame)
     // Asked first, so that a damaged file cannot make a decoder allocate without bound.
     if (image_size(raw.bytes) != ImageSize{width_, height_}) return false;
     if (!(pgm ? decode_pgm(raw.bytes, width_, height_, grey_)
-              : decode_png(raw.bytes, width_, height_, grey_))) {
+              : decode_png(raw.bytes, width_, height_, grey_)))
       return false;
-    }
     frame.image = {grey_.data(), width_, height_, width_};
     frame.decoded = {};
     return true;

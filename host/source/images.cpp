@@ -33,9 +33,8 @@ std::optional<std::int64_t> nanoseconds(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   // Half the range: differences and sums with a present time must not overflow.
   if (error != std::errc{} || end != text.data() + text.size() || value < 0 ||
-      value > INT64_MAX / 2) {
+      value > INT64_MAX / 2)
     return std::nullopt;
-  }
   return value;
 }
 
@@ -53,20 +52,18 @@ void take_line(std::string_view line, std::size_t number, const std::string& sou
       comma == std::string_view::npos ? std::nullopt : nanoseconds(line.substr(comma + 1));
   if (!time) {
     throw ConfigError(
-        fmt::format("{}:{}: '{}' is not file,t_ns with t_ns in whole nanoseconds; "
-                    "correct the line",
-                    source, number, shown(line)));
+        "{}:{}: '{}' is not file,t_ns with t_ns in whole nanoseconds; correct the line", source,
+        number, shown(line));
   }
   const auto entry = entries.find(line.substr(0, comma));
   if (entry == entries.end()) {
     throw ConfigError(
-        fmt::format("{}:{}: there is no picture '{}' in the folder; remove the line "
-                    "or add the file",
-                    source, number, shown(line.substr(0, comma))));
+        "{}:{}: there is no picture '{}' in the folder; remove the line or add the file", source,
+        number, shown(line.substr(0, comma)));
   }
   if (entry->second) {
-    throw ConfigError(fmt::format("{}:{}: '{}' was already on line {}; remove one of them", source,
-                                  number, shown(entry->first), entry->second->line));
+    throw ConfigError("{}:{}: '{}' was already on line {}; remove one of them", source, number,
+                      shown(entry->first), entry->second->line);
   }
   entry->second = Entry{*time, number};
 }
@@ -90,15 +87,15 @@ std::vector<Duration> parse_frame_times(std::string_view text, const std::string
   for (const std::string& file : files) {
     const auto& entry = entries.at(file);
     if (!entry) {
-      throw ConfigError(fmt::format("{}: has no time for {}; add a line {},t_ns", source,
-                                    shown(file), shown(file)));
+      throw ConfigError("{}: has no time for {}; add a line {},t_ns", source, shown(file),
+                        shown(file));
     }
     const Duration time(entry->t_ns);
     if (!times.empty() && time <= times.back()) {
       throw ConfigError(
-          fmt::format("{}:{}: t_ns {} of {} is not after {}, that of the picture "
-                      "before it; times must increase in the order of the names",
-                      source, entry->line, entry->t_ns, shown(file), times.back().count()));
+          "{}:{}: t_ns {} of {} is not after {}, that of the picture before it; times must "
+          "increase in the order of the names",
+          source, entry->line, entry->t_ns, shown(file), times.back().count());
     }
     times.push_back(time);
   }
@@ -123,24 +120,17 @@ bool is_picture(const fs::path& path) {
 
 std::vector<std::string> picture_names(const std::string& dir) {
   std::error_code error;
-  if (!fs::is_directory(dir, error)) {
-    throw ConfigError(
-        fmt::format("images:{}: no such folder; give one that holds PNG, PGM or JPEG files", dir));
-  }
+  if (!fs::is_directory(dir, error))
+    throw ConfigError("images:{}: no such folder; give one that holds PNG, PGM or JPEG files", dir);
   std::vector<std::string> names;
   fs::directory_iterator it(dir, error);
-  for (; !error && it != fs::directory_iterator(); it.increment(error)) {
+  for (; !error && it != fs::directory_iterator(); it.increment(error))
     if (is_picture(it->path()) && it->is_regular_file(error))
       names.push_back(it->path().filename().string());
-  }
-  if (error) {
-    throw ConfigError(
-        fmt::format("images:{}: cannot be read: {}; check its permissions", dir, error.message()));
-  }
-  if (names.empty()) {
-    throw ConfigError(
-        fmt::format("images:{}: holds no PNG, PGM or JPEG file; give another folder", dir));
-  }
+  if (error)
+    throw ConfigError("images:{}: cannot be read: {}; check its permissions", dir, error.message());
+  if (names.empty())
+    throw ConfigError("images:{}: holds no PNG, PGM or JPEG file; give another folder", dir);
   std::sort(names.begin(), names.end());
   return names;
 }
@@ -152,8 +142,8 @@ ImageSize size_of(const std::string& path, std::vector<char>& scratch) {
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(scratch.data());
   const auto size = image_size({bytes, static_cast<std::size_t>(file.gcount())});
   if (!size) {
-    throw ConfigError(fmt::format(
-        "{}: is not a readable PNG, PGM or JPEG file; remove it or record it again", path));
+    throw ConfigError("{}: is not a readable PNG, PGM or JPEG file; remove it or record it again",
+                      path);
   }
   return *size;
 }
@@ -164,9 +154,9 @@ ImageSize common_size(const std::vector<std::string>& paths) {
   for (const std::string& path : paths) {
     const ImageSize size = size_of(path, scratch);
     if (size == first) continue;
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: is {}x{}, but {} is {}x{}; a folder must hold pictures of one camera and size", path,
-        size.width, size.height, paths.front(), first.width, first.height));
+        size.width, size.height, paths.front(), first.width, first.height);
   }
   return first;
 }
@@ -177,9 +167,7 @@ std::vector<Duration> frame_times(const std::string& dir, const std::vector<std:
   if (fs::exists(path, error)) {
     std::ifstream file(path, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (!file) {
-      throw ConfigError(fmt::format("{}: cannot be read; check its permissions", path.string()));
-    }
+    if (!file) throw ConfigError("{}: cannot be read; check its permissions", path.string());
     return parse_frame_times(text, path.string(), names);
   }
   std::vector<Duration> times(names.size());
@@ -205,9 +193,7 @@ ImagesSource::ImagesSource(const std::string& dir, bool fast) {
       1e9 / static_cast<double>(format_.period.count()), fast ? ", as fast as they can go" : "");
   if (fast) return;
   timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
-  if (!timer_) {
-    throw ConfigError(fmt::format("images:{}: no more file descriptors; raise ulimit -n", dir));
-  }
+  if (!timer_) throw ConfigError("images:{}: no more file descriptors; raise ulimit -n", dir);
   arm();
 }
 

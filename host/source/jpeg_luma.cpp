@@ -80,9 +80,8 @@ bool luminance_is_finest(const jpeg_decompress_struct& jpeg) {
   for (int i = 0; i < needed; ++i) {
     const jpeg_component_info& component = jpeg.comp_info[i];
     if (component.h_samp_factor != jpeg.max_h_samp_factor ||
-        component.v_samp_factor != jpeg.max_v_samp_factor) {
+        component.v_samp_factor != jpeg.max_v_samp_factor)
       return false;
-    }
   }
   return true;
 }
@@ -136,9 +135,8 @@ int JpegLuma::State::pass_rows_above(int y) {
   caller.markers_passed = 0;
   const bool interleaved = jpeg.num_components > 1;
   if (jpeg.restart_interval == 0 || jpeg.progressive_mode || jpeg.arith_code ||
-      jpeg.comps_in_scan != jpeg.num_components || (!interleaved && jpeg.max_v_samp_factor > 1)) {
+      jpeg.comps_in_scan != jpeg.num_components || (!interleaved && jpeg.max_v_samp_factor > 1))
     return 0;
-  }
   // A minimum coded unit; of a single component it is one block (T.81, A.2).
   const std::int64_t unit_width = DCTSIZE * (interleaved ? jpeg.max_h_samp_factor : 1);
   const std::int64_t unit_height = DCTSIZE * jpeg.max_v_samp_factor;
@@ -163,9 +161,8 @@ bool JpegLuma::State::read(std::span<const std::uint8_t> bytes, int width, int h
   jpeg_mem_src(&jpeg, bytes.data(), static_cast<unsigned long>(bytes.size()));
   jpeg_read_header(&jpeg, TRUE);
   if (static_cast<int>(jpeg.image_width) != width ||
-      static_cast<int>(jpeg.image_height) != height || !luminance_is_finest(jpeg)) {
+      static_cast<int>(jpeg.image_height) != height || !luminance_is_finest(jpeg))
     return false;
-  }
   // Grey output makes libjpeg skip the chroma transforms. Huffman tables that a webcam leaves out
   // are the standard ones, which libjpeg-turbo supplies by itself.
   jpeg.out_color_space = JCS_GRAYSCALE;

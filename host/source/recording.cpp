@@ -20,14 +20,13 @@ RecordingSource::RecordingSource(std::unique_ptr<record::RecordingReader> record
   const record::Head& head = recording_->head();
   const std::string file = recording_->path().string();
   if (head.keep == Keep::none) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "recording:{0}: was made with --keep none and has no pictures to replay; `tagwrench export "
         "{0} --csv FILE` gives its samples",
-        file));
+        file);
   }
-  if (recording_->frame_times().empty()) {
-    throw ConfigError(fmt::format("recording:{}: holds no frames; give another one", file));
-  }
+  if (recording_->frame_times().empty())
+    throw ConfigError("recording:{}: holds no frames; give another one", file);
   format_.width = head.width;
   format_.height = head.height;
   format_.period = head.period;
@@ -43,9 +42,7 @@ RecordingSource::RecordingSource(std::unique_ptr<record::RecordingReader> record
   picture_.resize(static_cast<std::size_t>(head.width) * static_cast<std::size_t>(head.height));
   if (fast) return;
   timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
-  if (!timer_) {
-    throw ConfigError(fmt::format("recording:{}: no more file descriptors; raise ulimit -n", file));
-  }
+  if (!timer_) throw ConfigError("recording:{}: no more file descriptors; raise ulimit -n", file);
   arm();
 }
 

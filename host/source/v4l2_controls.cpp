@@ -61,9 +61,8 @@ std::int32_t within(const ControlRange& range, std::int64_t value) {
 std::optional<ControlRange> V4l2ControlPort::range(std::uint32_t id) {
   v4l2_queryctrl query{};
   query.id = id;
-  if (!control_ioctl(fd_, VIDIOC_QUERYCTRL, &query) || (query.flags & V4L2_CTRL_FLAG_DISABLED)) {
+  if (!control_ioctl(fd_, VIDIOC_QUERYCTRL, &query) || (query.flags & V4L2_CTRL_FLAG_DISABLED))
     return std::nullopt;
-  }
   return ControlRange{query.minimum, query.maximum, query.step,
                       (query.flags & V4L2_CTRL_FLAG_READ_ONLY) == 0};
 }
@@ -105,14 +104,11 @@ void ControlLock::lock(ControlPort& port, int exposure_us) {
     if (control.kind == Kind::automatism) wanted.push_back({setting.index, control.off});
     if (control.kind != Kind::value) continue;
     std::int32_t value = port.get(control.id).value_or(setting.value);
-    if (control.id == V4L2_CID_EXPOSURE_ABSOLUTE && exposure_us > 0) {
+    if (control.id == V4L2_CID_EXPOSURE_ABSOLUTE && exposure_us > 0)
       value = static_cast<std::int32_t>(exposure_us / kExposureUnit_us);
-    }
     // With exposure held, the camera's own search for the mains frequency can only disturb.
-    if (control.id == V4L2_CID_POWER_LINE_FREQUENCY &&
-        value == V4L2_CID_POWER_LINE_FREQUENCY_AUTO) {
+    if (control.id == V4L2_CID_POWER_LINE_FREQUENCY && value == V4L2_CID_POWER_LINE_FREQUENCY_AUTO)
       value = V4L2_CID_POWER_LINE_FREQUENCY_DISABLED;
-    }
     wanted.push_back({setting.index, value});
   }
   for (const Setting& setting : wanted) apply(port, setting.index, setting.value);
@@ -129,11 +125,10 @@ void ControlLock::apply(ControlPort& port, std::size_t index, std::int32_t value
     final_value = V4L2_EXPOSURE_SHUTTER_PRIORITY;
     done = port.set(control.id, final_value);
   }
-  if (done) {
+  if (done)
     locked_.push_back({index, final_value});
-  } else {
+  else
     refused_.push_back(index);
-  }
 }
 
 bool ControlLock::change(ControlPort& port, std::uint32_t id, std::int64_t value) {
@@ -150,9 +145,8 @@ bool ControlLock::change(ControlPort& port, std::uint32_t id, std::int64_t value
 }
 
 std::optional<std::int32_t> ControlLock::locked(std::uint32_t id) const noexcept {
-  for (const Setting& setting : locked_) {
+  for (const Setting& setting : locked_)
     if (kControls[setting.index].id == id) return setting.value;
-  }
   return std::nullopt;
 }
 
@@ -192,15 +186,13 @@ std::string ControlLock::description() const {
   if (original_.empty()) return "it has no controls to lock";
   std::vector<std::size_t>
       missing;  // an automatism goes without saying where its value is not there either
-  for (const std::size_t index : absent_) {
+  for (const std::size_t index : absent_)
     if (kControls[index].kind != Kind::automatism) missing.push_back(index);
-  }
   const auto itself = [](std::size_t index) { return index; };
   std::string text = list("locked", locked_, [](const Setting& s) { return s.index; });
   for (const std::string& part :
-       {list("refused", refused_, itself), list("without", missing, itself)}) {
+       {list("refused", refused_, itself), list("without", missing, itself)})
     if (!part.empty()) text += (text.empty() ? "" : "; ") + part;
-  }
   return text;
 }
 

@@ -113,9 +113,8 @@ CameraNode inspect(const std::string& path) {
 std::vector<std::string> node_paths() {
   std::vector<int> numbers;
   for_each_entry("/dev", [&](const fs::path& path) {
-    if (const auto number = number_after(path.filename().string(), "video")) {
+    if (const auto number = number_after(path.filename().string(), "video"))
       numbers.push_back(*number);
-    }
   });
   std::sort(numbers.begin(), numbers.end());
   std::vector<std::string> paths;
@@ -133,14 +132,13 @@ int query_capability(const std::string& path, V4l2Capability& capability) {
 
 V4l2Device::V4l2Device(const std::string& path) : path_(path) {
   if (const int error = open_node(path, fd_)) fail("open it", error);
-  if (ask_capability(fd_.get(), capability_) != 0) {
-    throw ConfigError(fmt::format("{}: is not a video device; {}", path, capture_nodes_text()));
-  }
+  if (ask_capability(fd_.get(), capability_) != 0)
+    throw ConfigError("{}: is not a video device; {}", path, capture_nodes_text());
   if (!capability_.captures) {
     throw ConfigError(
-        fmt::format("{}: {} ({}) cannot capture (a metadata or output node, or a loopback that "
-                    "nobody feeds); {}",
-                    path, capability_.card, capability_.driver, capture_nodes_text()));
+        "{}: {} ({}) cannot capture (a metadata or output node, or a loopback that nobody feeds); "
+        "{}",
+        path, capability_.card, capability_.driver, capture_nodes_text());
   }
 }
 
@@ -164,23 +162,22 @@ void V4l2Device::fail(const char* doing, int error) const {
     case ENOENT:
     case ENODEV:
     case ENXIO:
-    case ENOTDIR:
-      throw ConfigError(fmt::format("{}: no such camera; {}", path_, capture_nodes_text()));
+    case ENOTDIR: throw ConfigError("{}: no such camera; {}", path_, capture_nodes_text());
     case EACCES:
     case EPERM:
       throw ConfigError(
-          fmt::format("{}: no permission; join the group video: sudo usermod -aG video $USER, then "
-                      "log in again",
-                      path_));
+          "{}: no permission; join the group video: sudo usermod -aG video $USER, then log in "
+          "again",
+          path_);
     case EBUSY: {
       const std::string holders = holders_text(path_);
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "{}: the camera is busy, {}; close it there, or choose another", path_,
-          holders.empty() ? "held by a process that is not visible" : "held by " + holders));
+          holders.empty() ? "held by a process that is not visible" : "held by " + holders);
     }
     default:
-      throw ConfigError(fmt::format("{}: cannot {}: {}; try another mode, or plug it in again",
-                                    path_, doing, std::strerror(error)));
+      throw ConfigError("{}: cannot {}: {}; try another mode, or plug it in again", path_, doing,
+                        std::strerror(error));
   }
 }
 
@@ -219,9 +216,8 @@ void V4l2Device::add_sizes(V4l2Mode mode, int wanted_width, int wanted_height,
       v4l2_format format{};
       format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
       if (device_ioctl(fd_.get(), VIDIOC_G_FMT, &format) == 0 &&
-          format.fmt.pix.pixelformat == mode.fourcc) {
+          format.fmt.pix.pixelformat == mode.fourcc)
         add(format.fmt.pix.width, format.fmt.pix.height);
-      }
       return;
     }
     if (size.type == V4L2_FRMSIZE_TYPE_DISCRETE) {
@@ -234,9 +230,8 @@ void V4l2Device::add_sizes(V4l2Mode mode, int wanted_width, int wanted_height,
       return value > 0 && v >= low && v <= high && (v - low) % std::max(1U, step) == 0;
     };
     if (fits(wanted_width, range.min_width, range.max_width, range.step_width) &&
-        fits(wanted_height, range.min_height, range.max_height, range.step_height)) {
+        fits(wanted_height, range.min_height, range.max_height, range.step_height))
       add(static_cast<unsigned>(wanted_width), static_cast<unsigned>(wanted_height));
-    }
     add(range.min_width, range.min_height);
     add(range.max_width, range.max_height);
     return;
@@ -274,16 +269,13 @@ V4l2Stream V4l2Device::set_mode(const V4l2Choice& choice) {
   format.fmt.pix.height = static_cast<unsigned>(mode.height);
   format.fmt.pix.pixelformat = mode.fourcc;
   format.fmt.pix.field = V4L2_FIELD_NONE;
-  if (const int error = device_ioctl(fd_.get(), VIDIOC_S_FMT, &format)) {
+  if (const int error = device_ioctl(fd_.get(), VIDIOC_S_FMT, &format))
     fail(("set " + describe(mode)).c_str(), error);
-  }
   const v4l2_pix_format& got = format.fmt.pix;
   if (got.width != static_cast<unsigned>(mode.width) ||
       got.height != static_cast<unsigned>(mode.height) || got.pixelformat != mode.fourcc) {
-    throw ConfigError(
-        fmt::format("{}: the driver does not give {} although it lists it; choose "
-                    "another mode",
-                    path_, describe(mode)));
+    throw ConfigError("{}: the driver does not give {} although it lists it; choose another mode",
+                      path_, describe(mode));
   }
   V4l2Stream stream;
   stream.pixels = mode.pixels;
@@ -318,15 +310,13 @@ void V4l2Device::start() {
   request.count = kBuffers;
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = V4L2_MEMORY_MMAP;
-  if (const int error = device_ioctl(fd_.get(), VIDIOC_REQBUFS, &request)) {
+  if (const int error = device_ioctl(fd_.get(), VIDIOC_REQBUFS, &request))
     fail("get buffers", error);
-  }
   if (request.count < kMinBuffers) fail("get buffers", ENOMEM);
   for (unsigned i = 0; i < std::min(request.count, 2 * kBuffers); ++i) {
     v4l2_buffer buffer = mapped_buffer(i);
-    if (const int error = device_ioctl(fd_.get(), VIDIOC_QUERYBUF, &buffer)) {
+    if (const int error = device_ioctl(fd_.get(), VIDIOC_QUERYBUF, &buffer))
       fail("get buffers", error);
-    }
     // Read-only would do, but some drivers map writable or not at all.
     void* memory = ::mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, fd_.get(),
                           buffer.m.offset);
@@ -408,9 +398,8 @@ std::string stable_path(const std::string& path) {
   std::error_code error;
   const fs::path node = fs::canonical(path, error);
   if (error) return path;
-  for (const char* folder : {"/dev/v4l/by-id", "/dev/v4l/by-path"}) {
+  for (const char* folder : {"/dev/v4l/by-id", "/dev/v4l/by-path"})
     if (path.starts_with(folder)) return path;
-  }
   for (const char* folder : {"/dev/v4l/by-id", "/dev/v4l/by-path"}) {
     std::string found;
     for_each_entry(folder, [&](const fs::path& link) {

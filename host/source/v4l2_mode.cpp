@@ -18,8 +18,8 @@ constexpr double kMaxFps = 10000;
 constexpr double kRateTolerance = 0.01;  ///< 29.97 and 30 are the same rate
 
 [[noreturn]] void bad_spec(std::string_view spec, std::string_view part, std::string_view why) {
-  throw ConfigError(fmt::format(
-      "v4l2:{}: '{}' {}; write v4l2:/dev/videoN[,WIDTHxHEIGHT[@FPS][,FOURCC]]", spec, part, why));
+  throw ConfigError("v4l2:{}: '{}' {}; write v4l2:/dev/videoN[,WIDTHxHEIGHT[@FPS][,FOURCC]]", spec,
+                    part, why);
 }
 
 std::vector<std::string_view> split(std::string_view text, char separator) {
@@ -35,9 +35,8 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
 std::optional<int> side(std::string_view text) {
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || value < 1 || value > kMaxSide) {
+  if (error != std::errc{} || end != text.data() + text.size() || value < 1 || value > kMaxSide)
     return std::nullopt;
-  }
   return value;
 }
 
@@ -45,9 +44,8 @@ std::optional<double> rate(std::string_view text) {
   double value = 0;
   const auto [end, error] =
       std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
-  if (error != std::errc{} || end != text.data() + text.size() || !(value > 0) || value > kMaxFps) {
+  if (error != std::errc{} || end != text.data() + text.size() || !(value > 0) || value > kMaxFps)
     return std::nullopt;
-  }
   return value;
 }
 
@@ -87,9 +85,8 @@ V4l2Options parse_v4l2_spec(std::string_view spec) {
   const auto parts = split(spec, ',');
   V4l2Options options;
   options.path = parts[0];
-  if (options.path.empty() || options.path.front() != '/') {
+  if (options.path.empty() || options.path.front() != '/')
     bad_spec(spec, parts[0], "is not a path to a device");
-  }
   if (parts.size() > 3) bad_spec(spec, parts[3], "is one part too many");
   if (parts.size() > 1) {
     const auto at = parts[1].find('@');
@@ -117,9 +114,8 @@ V4l2Options parse_v4l2_spec(std::string_view spec) {
 std::optional<V4l2Choice> choose_mode(std::span<const V4l2Mode> modes, const V4l2Options& options) {
   std::optional<V4l2Choice> best;
   for (const V4l2Mode& mode : modes) {
-    if (options.width > 0 && (mode.width != options.width || mode.height != options.height)) {
+    if (options.width > 0 && (mode.width != options.width || mode.height != options.height))
       continue;
-    }
     if (options.pixels && mode.pixels != *options.pixels) continue;
     const auto fps = offered_rate(mode, options);
     if (!fps) continue;
@@ -143,20 +139,18 @@ std::string describe(std::span<const V4l2Mode> modes, std::size_t limit) {
       return other.width == mode.width && other.height == mode.height &&
              other.pixels == mode.pixels;
     });
-    if (same == best.end()) {
+    if (same == best.end())
       best.push_back(mode);
-    } else if (mode.fps_max > same->fps_max) {
+    else if (mode.fps_max > same->fps_max)
       *same = mode;
-    }
   }
   const V4l2Options defaults;
   std::stable_sort(best.begin(), best.end(), [&](const V4l2Mode& a, const V4l2Mode& b) {
     return better({a, a.fps_max}, {b, b.fps_max}, defaults);
   });
   std::string text;
-  for (std::size_t i = 0; i < std::min(limit, best.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(limit, best.size()); ++i)
     text += (i ? ", " : "") + describe(best[i]);
-  }
   if (best.size() > limit) text += fmt::format(" and {} more", best.size() - limit);
   return text.empty() ? "none that is understood" : text;
 }

@@ -46,16 +46,16 @@ V4l2Choice choose(const V4l2Device& device, const V4l2Options& options) {
   const auto choice = choose_mode(modes, options);
   if (choice) return *choice;
   if (modes.empty()) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: {} offers no pixel format of GREY, YUYV, UYVY, NV12, MJPG; choose another camera, or "
         "start what feeds it first",
-        options.path, device.capability().card));
+        options.path, device.capability().card);
   }
   std::string request = asked ? fmt::format("{}x{}", options.width, options.height) : "such a mode";
   if (options.fps > 0) request += fmt::format("@{:.4g}", options.fps);
   if (options.pixels) request += fmt::format(" {}", name(*options.pixels));
-  throw ConfigError(fmt::format("{}: the camera does not have {}; it has {}", options.path, request,
-                                describe(modes, 8)));
+  throw ConfigError("{}: the camera does not have {}; it has {}", options.path, request,
+                    describe(modes, 8));
 }
 
 using namespace std::chrono_literals;
@@ -72,9 +72,7 @@ V4l2Source::V4l2Source(const V4l2Options& options)
   choice_ = choose(*device_, options);
   epoll_.reset(::epoll_create1(EPOLL_CLOEXEC));
   timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
-  if (!epoll_ || !timer_) {
-    throw ConfigError(fmt::format("{}: no more file descriptors; raise ulimit -n", path_));
-  }
+  if (!epoll_ || !timer_) throw ConfigError("{}: no more file descriptors; raise ulimit -n", path_);
   watch(timer_.get());
   const V4l2Stream stream = device_->set_mode(choice_);
   format_ = {stream.width, stream.height, stream.period, {}};
@@ -169,8 +167,8 @@ void V4l2Source::watch(int fd) const {
   event.events = EPOLLIN;
   event.data.fd = fd;
   if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0) {
-    throw ConfigError(fmt::format("{}: cannot be waited for: {}; choose a capture device", path_,
-                                  std::strerror(errno)));
+    throw ConfigError("{}: cannot be waited for: {}; choose a capture device", path_,
+                      std::strerror(errno));
   }
 }
 
@@ -279,11 +277,10 @@ ReadStatus V4l2Source::drain(unsigned queued, Frame& frame) noexcept {
   const Duration patience = state_ == State::streaming ? stall_after() : kReopenAfter;
   const Duration silent = Clock::now() - last_buffer_;
   if (silent >= patience) return lose("no frame comes");
-  if (state_ == State::streaming) {
+  if (state_ == State::streaming)
     arm(patience - silent, Duration{});
-  } else {
+  else
     arm(kRetryEvery, kRetryEvery);
-  }
   return ReadStatus::nothing;
 }
 

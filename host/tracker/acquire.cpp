@@ -139,9 +139,8 @@ void Acquirer::add_sharpened(const ImageView& image, SquareList& list) {
     return std::find(list.ids.begin(), list.ids.end(), id) != list.ids.end();
   };
   if (std::all_of(target_.tags.begin(), target_.tags.end(),
-                  [&](const Tag& tag) { return listed(tag.id); })) {
+                  [&](const Tag& tag) { return listed(tag.id); }))
     return;
-  }
   const std::optional<SquareList> more = finder_.find(image, true);
   if (!more) return;
   const std::vector<int> first = list.ids;

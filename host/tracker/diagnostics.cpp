@@ -185,10 +185,9 @@ Diagnostic judge_missing(const CameraModel& camera, const TargetDescription& tar
   if (!finding.other_ids.empty()) return Diagnostic::wrong_ids;
   if (finding.tags.empty() && !others.empty()) {
     details.family = name(others.front().family);
-    for (const ReadSquare& tag : others) {
+    for (const ReadSquare& tag : others)
       if (tag.family == others.front().family && !holds(details.seen, tag.id))
         details.seen.add(tag.id);
-    }
     return Diagnostic::wrong_family;
   }
   const PictureQuality quality = picture_quality(image);
@@ -442,8 +441,8 @@ std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& d) {
     case Diagnostic::other_scale:
       return fmt::format(
           "{} are {:.0f} % {} than target.tag_size_mm in sensor.yaml for the distance between "
-          "them; "
-          "measure the print (100 %?), or place the tags anew with `tagwrench calibrate target`",
+          "them; measure the print (100 %?), or place the tags anew with `tagwrench calibrate "
+          "target`",
           tags(d.concerned), 100 * std::abs(d.amount - 1), d.amount > 1 ? "larger" : "smaller");
     case Diagnostic::other_places:
       return fmt::format(
@@ -455,8 +454,7 @@ std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& d) {
           "{} {} seen, but the target is {} {}, farther than its springs let it go; {}",
           tags(d.seen), is(d.seen), from_rest(d),
           d.rest_given ? "rest as sensor.yaml has it" : "where it was at rest",
-          d.rest_given ? "run `tagwrench calibrate target`, or put camera and platform "
-                         "back"
+          d.rest_given ? "run `tagwrench calibrate target`, or put camera and platform back"
                        : "put camera and platform back, or start again");
   }
   return {};

@@ -82,9 +82,8 @@ void add_points(const Walk& walk, std::vector<EdgePoint>& points) {
 
 double median_of_valid(std::span<const EdgeMeasurement> measured, double EdgeMeasurement::*member) {
   std::vector<double> values;
-  for (const EdgeMeasurement& m : measured) {
+  for (const EdgeMeasurement& m : measured)
     if (m.valid) values.push_back(m.*member);
-  }
   return median(std::move(values));
 }
 

@@ -143,10 +143,9 @@ void PhotometricAligner::view_patches(const Eigen::Isometry3d& pose, const RowMo
 /// RMS of whitened residuals in a patch that is as it should be; 0 when none is in view.
 double PhotometricAligner::typical_residual() noexcept {
   std::size_t count = 0;
-  for (std::size_t n = 0; n < sums_.size(); ++n) {
+  for (std::size_t n = 0; n < sums_.size(); ++n)
     if (sums_[n].inside >= kMinInside * static_cast<float>(template_.patches[n].pixels))
       scratch_[count++] = sums_[n].squares / std::max(1.0F, sums_[n].weights);
-  }
   if (count == 0) return 0;
   const auto at =
       scratch_.begin() + static_cast<std::ptrdiff_t>(kTypicalRank * static_cast<double>(count - 1));

@@ -183,11 +183,10 @@ class TagFit {
         const Eigen::Vector2d at = (to_cells * Eigen::Vector3d(column, row, 1)).hnormalized();
         if (at.minCoeff() < -margin || at.maxCoeff() > n + margin) continue;
         const int level = image_.pixels[static_cast<std::ptrdiff_t>(row) * image_.stride + column];
-        if (level >= kWhite) {
+        if (level >= kWhite)
           ++white_;
-        } else {
+        else
           pixels_.emplace_back(column, row, level);
-        }
       }
     }
   }

@@ -166,9 +166,8 @@ class Builder {
     tags_.push_back({platform_T_tag, plane, box,
                      SplineImage(cut_out(mean_, box), box.left, box.top, std::max(1, box.width()),
                                  std::max(1, box.height()))});
-    for (int y = box.top + 2; y < box.bottom - 2; ++y) {
+    for (int y = box.top + 2; y < box.bottom - 2; ++y)
       for (int x = box.left + 2; x < box.right - 2; ++x) consider(tags_.size() - 1, x, y);
-    }
   }
 
   PixelTemplate finish() {
@@ -207,9 +206,8 @@ class Builder {
     const auto place = on_tag(tag, x, y);
     if (!place || place->cwiseAbs().maxCoeff() > half) return;
     for (int j = -2; j <= 2; ++j) {
-      for (int i = -2; i <= 2; ++i) {
+      for (int i = -2; i <= 2; ++i)
         if (at(x + i, y + j) > kSaturated) return;
-      }
     }
     const double gx = 0.5 * (at(x + 1, y) - at(x - 1, y));
     const double gy = 0.5 * (at(x, y + 1) - at(x, y - 1));
@@ -318,10 +316,9 @@ class Builder {
   double bilaplacian(int x, int y) const {
     const auto smooth = [&](int cx, int cy) {
       double sum = 0;
-      for (int j = -1; j <= 1; ++j) {
+      for (int j = -1; j <= 1; ++j)
         for (int i = -1; i <= 1; ++i)
           sum += (2 - std::abs(i)) * (2 - std::abs(j)) * at_clamped(cx + i, cy + j);
-      }
       return sum / 16;
     };
     const auto laplacian = [&](int cx, int cy) {
@@ -390,9 +387,8 @@ double SplineImage::level(double x, double y) const {
 PixelPolynomial SplineImage::polynomial(int x, int y) const {
   static const Fit fit = make_fit();
   Eigen::Matrix<double, kGrid * kGrid, 1> levels;
-  for (int j = 0; j < kGrid; ++j) {
+  for (int j = 0; j < kGrid; ++j)
     for (int i = 0; i < kGrid; ++i) levels[j * kGrid + i] = level(x + offset(i), y + offset(j));
-  }
   PixelPolynomial out;
   Eigen::Map<Eigen::Matrix<double, 10, 1>>(out.data()) = fit * levels;
   return out;

@@ -50,9 +50,8 @@ Measurements measure_all(const EdgeMeter& meter, const PixelView<float>& image,
 double robust_cut(const Measurements& all) {
   std::vector<double> offsets;
   for (const auto& tag : all) {
-    for (const EdgeMeasurement& m : tag) {
+    for (const EdgeMeasurement& m : tag)
       if (m.valid) offsets.push_back(std::abs(m.offset_px));
-    }
   }
   return kTukey95 * std::max(kMinScale_px, kMadToSigma * median(std::move(offsets)));
 }
@@ -117,10 +116,9 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
     const double few = clusters > parameters ? clusters / (clusters - parameters) : 10.0;
     covariance = few * (units.asDiagonal() * (inverse * meat * inverse) * units.asDiagonal())
                            .topLeftCorner<6, 6>();
-    for (Eigen::Index t = 0; t < tags; ++t) {
+    for (Eigen::Index t = 0; t < tags; ++t)
       for (EdgePoint& point : target.tags[static_cast<std::size_t>(t)].points)
         point = shifted(point, step[6 + t]);
-    }
   }
   renormalise(camera_T_platform);
   return camera_T_platform.matrix().allFinite() && camera_T_platform.translation().z() > 0;
@@ -432,18 +430,16 @@ bool ReferenceEstimator::finish() {
     // Given tags make one rigid body: they and the reference pose are fitted together, and the open
     // ones placed by it.
     EdgeTarget given;
-    for (std::size_t t = 0; t < patterns_.size(); ++t) {
+    for (std::size_t t = 0; t < patterns_.size(); ++t)
       if (description_.tags[t].platform_T_tag) given.tags.push_back(learned_.target.tags[t]);
-    }
     fitted = last_pose_;
     Matrix6 covariance;
     if (!fit_pose_and_spread(meter_, mean, given, fitted, covariance)) return false;
     learned_.pose_covariance = covariance + distance_covariance(fitted);
     if (!options_.camera_T_platform) learned_.camera_T_platform = fitted;
-    for (std::size_t t = 0; t < patterns_.size(); ++t) {
+    for (std::size_t t = 0; t < patterns_.size(); ++t)
       if (!description_.tags[t].platform_T_tag)
         learned_.target.tags[t].platform_T_tag = fitted.inverse() * camera_T_tag[t];
-    }
   }
   if (!learn_appearance(meter_, mean, learned_.target, fitted)) return false;
   learned_.tag_covariance = std::move(tag_covariance);

@@ -107,9 +107,8 @@ Refiner::Step Refiner::iterate(const ImageView& image, bool coarse, Refinement& 
 /// wrong.
 double Refiner::robust_scale_px() noexcept {
   std::size_t count = 0;
-  for (const EdgeMeasurement& m : measurements_) {
+  for (const EdgeMeasurement& m : measurements_)
     if (m.valid) scratch_[count++] = static_cast<float>(std::abs(m.offset_px));
-  }
   if (count == 0) return 0;
   const auto middle = scratch_.begin() + static_cast<std::ptrdiff_t>(count / 2);
   std::nth_element(scratch_.begin(), middle, scratch_.begin() + static_cast<std::ptrdiff_t>(count));

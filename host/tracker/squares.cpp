@@ -173,9 +173,8 @@ TagFamily smallest(TagFamily family, int id) {
   if (last - kSmaller < static_cast<int>(TagFamily::aruco_4x4_50) ||
       family > TagFamily::aruco_7x7_1000)
     return family;
-  for (int f = last - kSmaller; f < last; ++f) {
+  for (int f = last - kSmaller; f < last; ++f)
     if (id < id_count(static_cast<TagFamily>(f))) return static_cast<TagFamily>(f);
-  }
   return family;
 }
 
@@ -289,9 +288,8 @@ std::vector<ReadSquare> read_squares(const ImageView& image, const std::vector<S
       [](const Square& a, const Square& b) { return shortest_side(a) > shortest_side(b); });
   largest.resize(most);
   std::vector<ReadSquare> tags;
-  for (const Square& square : largest) {
+  for (const Square& square : largest)
     if (const auto tag = read_square(image, square, expected, missing)) tags.push_back(*tag);
-  }
   return tags;
 }
 

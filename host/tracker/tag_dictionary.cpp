@@ -22,11 +22,9 @@ cv::Ptr<cv::aruco::Dictionary> grid_dictionary() {
   cv::Mat bytes;
   for (int id = 0; id < kGridIds; ++id) {
     cv::Mat bits(kGridCells, kGridCells, CV_8UC1);
-    for (int row = 0; row < kGridCells; ++row) {
-      for (int column = 0; column < kGridCells; ++column) {
+    for (int row = 0; row < kGridCells; ++row)
+      for (int column = 0; column < kGridCells; ++column)
         bits.at<std::uint8_t>(row, column) = grid_is_white(id, row, column) ? 1 : 0;
-      }
-    }
     bytes.push_back(cv::aruco::Dictionary::getByteListFromBits(bits));
   }
   return cv::makePtr<cv::aruco::Dictionary>(bytes, kGridCells, (kGridDistance - 1) / 2);

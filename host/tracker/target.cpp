@@ -35,9 +35,8 @@ const FamilyRow& row(TagFamily family) { return kFamilies[static_cast<std::size_
 std::string_view name(TagFamily family) { return row(family).name; }
 
 std::optional<TagFamily> family_from_name(std::string_view text) {
-  for (std::size_t i = 0; i < kFamilies.size(); ++i) {
+  for (std::size_t i = 0; i < kFamilies.size(); ++i)
     if (kFamilies[i].name == text) return static_cast<TagFamily>(i);
-  }
   return std::nullopt;
 }
 

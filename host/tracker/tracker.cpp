@@ -263,11 +263,10 @@ void Tracker::Impl::conclude(const Estimate& found, FrameFacts& facts, Track& tr
   const TimePoint time = facts.frame.capture_time;
   const PhotometricFit& fit = found.fit;
   const Eigen::Isometry3d& pose = found.pose();
-  if (!found.anew && is_held(state)) {
+  if (!found.anew && is_held(state))
     predictor.add(time, pose);
-  } else {
+  else
     predictor.start(time, pose);
-  }
   enter_held();
   facts.accepted = is_accepted(fit);
   facts.pose = pose;

@@ -36,10 +36,9 @@ struct AxisKnowledge {
 Matrix6 answer_variance(const Problem& problem, const Eigen::MatrixXd& covariance) {
   Matrix6 A = Matrix6::Zero();
   for (int k = 0; k < 6; ++k) {
-    for (int l = 0; l < 6; ++l) {
+    for (int l = 0; l < 6; ++l)
       for (int i = 0; i < 6; ++i)
         A(k, l) += covariance(6 * k + i, 6 * l + i) / (problem.scale[i] * problem.scale[i]);
-    }
   }
   return A;
 }
@@ -66,10 +65,9 @@ std::array<AxisKnowledge, 6> axis_knowledge(const Problem& problem, const Matrix
     const double error = std::sqrt(missed + after);
     const double ratio = before > 0 ? std::min(1.0, std::sqrt(after / before)) : 1;
     double own = 0;
-    for (int k = 0; k < 6; ++k) {
+    for (int k = 0; k < 6; ++k)
       for (int l = 0; l < 6; ++l)
         own += motion[k] * motion[l] * covariance(6 * k + axis, 6 * l + axis);
-    }
     out[static_cast<std::size_t>(axis)] = {
         .reached = error <= kReachedError && (ratio <= kReachedRatio || !problem.has_prior),
         .coverage = missed > kReachedError ? 0 : 1 - ratio,
@@ -89,19 +87,17 @@ std::vector<Vector6> missing_loads(const Problem& problem, const std::vector<dou
   }
   const Eigen::JacobiSVD<Matrix6> svd(moment, Eigen::ComputeFullV);
   std::vector<Vector6> out;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (svd.singularValues()[i] < kMissing * kMissing * svd.singularValues()[0])
       out.push_back(svd.matrixV().col(i));
-  }
   return out;
 }
 
 /// "Fx and My": the axes that take part in a combination.
 std::string axes_of(const Vector6& combination) {
   std::vector<std::string> names;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (std::abs(combination[i]) > kTakesFraction) names.emplace_back(wrench_axis(i));
-  }
   return fmt::format("{}", fmt::join(names, " and "));
 }
 
@@ -248,10 +244,10 @@ int zero_in_use(const Problem& problem, std::span<const Observation> observation
   const int zero = options.zero_in_use.value_or(observations.front().zero);
   const auto found = std::find(problem.zeros.begin(), problem.zeros.end(), zero);
   if (found == problem.zeros.end()) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "calibration: no step was taken in mounting {}, in which the sensor is to be used; take "
         "one at rest there",
-        zero + 1));
+        zero + 1);
   }
   return static_cast<int>(found - problem.zeros.begin());
 }
@@ -372,10 +368,9 @@ void set_axes(const Problem& problem, const Judged& judged, WrenchFit& out) {
   for (std::size_t i = 0; i < 6; ++i) {
     AxisFit& axis = out.axis[i];
     const auto row = static_cast<int>(i);
-    for (const Row& r : problem.rows) {
+    for (const Row& r : problem.rows)
       if (judged.weighting.block[static_cast<std::size_t>(r.block)] > 0)
         axis.largest = std::max(axis.largest, std::abs(r.wrench[row]));
-    }
     axis.coverage = known[i].coverage;
     axis.gain_sigma = known[i].gain_sigma;
     axis.error_constant = judged.weighting.error.constant[row];
@@ -418,19 +413,18 @@ void set_common(const Problem& problem, const Judged& judged, WrenchFit& out) {
 /// calibrated, they say why themselves.
 void refuse_gross_errors(const Problem& problem, const WrenchFit& fitted) {
   if (std::none_of(fitted.axis.begin(), fitted.axis.end(),
-                   [](const AxisFit& axis) { return axis.state == AxisState::calibrated; })) {
+                   [](const AxisFit& axis) { return axis.state == AxisState::calibrated; }))
     return;
-  }
   for (std::size_t i = 0; i < 6; ++i) {
     const AxisFit& axis = fitted.axis[i];
     const double off = std::hypot(axis.error_constant, axis.error_proportional) /
                        problem.scale[static_cast<int>(i)];
     if (axis.largest == 0 || off < kGrossError) continue;
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "calibration: the steps contradict each other by {:.0f} % of full load in {}, whichever "
         "few are left out; check masses, points and directions of the plan, then take the steps "
         "again",
-        100 * off, kWrenchAxes[i]));
+        100 * off, kWrenchAxes[i]);
   }
 }
 
@@ -442,9 +436,8 @@ void require_all(const WrenchFit& fitted) {
           fmt::format("{} is not calibrated ({})", kWrenchAxes[i], fitted.axis[i].reason));
   }
   if (lacking.empty()) return;
-  throw ConfigError(
-      fmt::format("calibration: {}; add steps that load it, or let the spring model complete it",
-                  fmt::join(lacking, ", ")));
+  throw ConfigError("calibration: {}; add steps that load it, or let the spring model complete it",
+                    fmt::join(lacking, ", "));
 }
 
 }  // namespace
@@ -483,9 +476,8 @@ WrenchFit fit_wrench(std::span<const Observation> observations, std::span<const 
 Vector6 coverage(std::span<const Observation> observations, const Matrix6& stiffness,
                  double prior_width) {
   if (std::none_of(observations.begin(), observations.end(),
-                   [](const Observation& o) { return o.wrench.squaredNorm() > 0; })) {
+                   [](const Observation& o) { return o.wrench.squaredNorm() > 0; }))
     return Vector6::Zero();
-  }
   const Problem problem = make_problem(observations, {}, {}, stiffness, prior_width);
   constexpr double kModelError = 0.005;  // of the load: no answer is better than a small one
   const Weighting weighting =

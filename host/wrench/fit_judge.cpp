@@ -385,12 +385,12 @@ Judged judge_explained(Problem& problem, const Explanation& explanation,
       fmt::format("{} and {}", wrench_axis(asymmetry.one), wrench_axis(asymmetry.other));
   const std::string suspects = left_out_steps(problem, explanation.left_out);
   if (!explanation.found || !suspects.empty() || asymmetry.relative > kGrossAsymmetry) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "calibration: the steps contradict each other: K would not be symmetric by {:.0f} % ({}), "
         "as springs' is; check masses, points and directions of the plan{}, and that nothing rubs, "
         "then take the steps again",
         100 * asymmetry.relative, pair,
-        suspects.empty() ? "" : fmt::format(" (suspect: {})", suspects)));
+        suspects.empty() ? "" : fmt::format(" (suspect: {})", suspects));
   }
   warnings.push_back(fmt::format(
       "K is not symmetric by {:.0f} standard deviations ({}), as springs' is; fitted without that "

@@ -40,22 +40,19 @@ bool is_covariance(const Matrix6& c) {
 
 void check(const Observation& o, std::size_t index) {
   const auto refuse = [&](const char* what) {
-    throw ConfigError(
-        fmt::format("calibration: observation {} (step {}, {:.3f} s) has {}; redo that step",
-                    index + 1, o.step + 1, o.time, what));
+    throw ConfigError("calibration: observation {} (step {}, {:.3f} s) has {}; redo that step",
+                      index + 1, o.step + 1, o.time, what);
   };
   if (!std::isfinite(o.time) || !o.displacement.allFinite() || !o.wrench.allFinite())
     refuse("a number that is not finite");
   if (!is_covariance(o.displacement_covariance))
     refuse("a displacement_covariance that is no covariance");
   if (!is_covariance(o.wrench_covariance)) refuse("a wrench_covariance that is no covariance");
-  for (const CorrelatedError& error : o.common) {
+  for (const CorrelatedError& error : o.common)
     if (!error.effect.allFinite()) refuse("a common error that is not finite");
-  }
-  for (const CorrelatedProduct& product : o.products) {
+  for (const CorrelatedProduct& product : o.products)
     if (!product.effect.allFinite() || std::max(product.first, product.second) >= o.common.size())
       refuse("a product of common errors that is none");
-  }
 }
 
 /// Observations of a step in order of time, long ones cut into parts.
@@ -236,9 +233,8 @@ void add_row(const Problem& problem, const Row& row, const FeatureVector& phi, c
     to.right[c] -= effect.dot(Wy);
     for (int k = 0; k <= columns; ++k)
       to.information.block<1, 6>(c, at(k)) -= value(k) * We.transpose();
-    for (const auto& [other, its_effect] : row.common) {
+    for (const auto& [other, its_effect] : row.common)
       if (other <= index) to.information(c, problem.common_at(other)) += We.dot(its_effect);
-    }
   }
 }
 
@@ -323,19 +319,18 @@ Problem make_problem(std::span<const Observation> observations, std::span<const 
           {row.common[product.first].first, row.common[product.second].first, product.effect});
     }
   }
-  for (std::size_t b = 0; b < problem.blocks.size(); ++b) {
+  for (std::size_t b = 0; b < problem.blocks.size(); ++b)
     for (const std::size_t i : problem.blocks[b].members)
       problem.rows[i].block = static_cast<int>(b);
-  }
   set_scales(problem);
   set_features(problem, observations, path);
   set_prior(problem, prior, prior_width);
   const std::size_t unknowns = 6 + problem.zeros.size();  // for each of the six axes
   if (!prior && observations.size() < unknowns) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "calibration: {} observations for {} unknowns an axis; take more steps, or give springs in "
         "sensor.yaml to complete it",
-        observations.size(), unknowns));
+        observations.size(), unknowns);
   }
   return problem;
 }

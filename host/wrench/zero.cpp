@@ -15,9 +15,8 @@ constexpr double kMaxScatter = 3e-3;
 bool known(double range) { return range > 0 && range < kUnknownRange; }
 
 Vector6 known_fraction(Vector6 range) {
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (!known(range[i])) range[i] = 0;
-  }
   return range;
 }
 
@@ -25,9 +24,8 @@ StationarityDetector::Options scatter(const Vector6& range) {
   StationarityDetector::Options options;
   options.least = range * kMinScatter;
   options.most = range * kMaxScatter;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (range[i] == 0) options.least[i] = options.most[i] = 1e150;  // not looked at
-  }
   return options;
 }
 
@@ -63,9 +61,8 @@ ZeroTracking::ZeroTracking(const ZeroOptions& options)
       meter_(scatter(range_)) {}
 
 bool ZeroTracking::within(const Vector6& wrench, double part) const noexcept {
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (range_[i] > 0 && !(std::abs(wrench[i]) <= part * range_[i])) return false;
-  }
   return true;
 }
 

@@ -75,14 +75,13 @@ bool BoardLoop::connect() {
   bool said = false;
   while (session().state() != link::BoardState::ready) {
     if (!turn(begin + kBoardPatience)) return false;
-    if (session().state() == link::BoardState::other_version) {
-      throw ConfigError(fmt::format("{}: a board of another version cannot be used", link_.port()));
-    }
+    if (session().state() == link::BoardState::other_version)
+      throw ConfigError("{}: a board of another version cannot be used", link_.port());
     const Duration waited = clock_now() - begin;
     if (waited >= kBoardPatience) throw ConfigError(link_.why_no_board());
     if (!said && waited > kBoardPatience / 2) {
       said = true;
-      log_info(fmt::format("{}: waiting for the board's answer", link_.port()));
+      log_info("{}: waiting for the board's answer", link_.port());
     }
   }
   return true;
@@ -92,9 +91,8 @@ bool BoardLoop::settle() {
   if (!connect()) return false;
   const TimePoint end = clock_now() + kSettling;
   while (clock_now() < end && !(session().clock().report().converged && session().has_status() &&
-                                session().has_capabilities())) {
+                                session().has_capabilities()))
     if (!turn(end)) return false;
-  }
   return true;
 }
 
@@ -107,7 +105,7 @@ std::string cells_path(const BoardSetup& options, const link::BoardSession& sess
 void check_cells_file(const BoardSetup& options) {
   std::error_code error;
   if (!options.cells_file.empty() && !std::filesystem::exists(options.cells_file, error))
-    throw ConfigError(fmt::format("--cells {}: there is no such file", options.cells_file));
+    throw ConfigError("--cells {}: there is no such file", options.cells_file);
 }
 
 link::CellCalibrations load_cells(const BoardSetup& options, const link::BoardSession& session) {

@@ -201,13 +201,13 @@ void BoardOutput::compare(const Row& row) noexcept {
   if (fault == ReferenceFault::none) return;
   found_ = fault == ReferenceFault::scale
                ? fmt::format(
-                     "against load cell {} the sensor measures {:.3f} +/- {:.3f} of the "
-                     "force: look at the cell's line of action (wrench.reference), then "
-                     "`tagwrench check` and `tagwrench calibrate wrench`",
+                     "against load cell {} the sensor measures {:.3f} +/- {:.3f} of the force: "
+                     "look at the cell's line of action (wrench.reference), then `tagwrench check` "
+                     "and `tagwrench calibrate wrench`",
                      line.channel, monitor_.scale(), monitor_.scale_sigma())
                : fmt::format(
-                     "against load cell {} the zero is off by {:.4f} +/- {:.4f} N along "
-                     "its line: hands off, `tagwrench board tare` and `tagwrench zero`",
+                     "against load cell {} the zero is off by {:.4f} +/- {:.4f} N along its line: "
+                     "hands off, `tagwrench board tare` and `tagwrench zero`",
                      line.channel, monitor_.zero(), monitor_.zero_sigma());
 }
 
@@ -296,8 +296,8 @@ bool RunBoard::settle_light(Input& input, const UniqueFd& stop) {
   if (input.kind != SourceKind::camera) {
     lamp.set_level(kUnseenLevel_permille);
     settled_permille_ = led_permille_ = kUnseenLevel_permille;
-    log_info(fmt::format("the board's LED is on at {:.0f} %, but does not light this source",
-                         kUnseenLevel_permille / 10));
+    log_info("the board's LED is on at {:.0f} %, but does not light this source",
+             kUnseenLevel_permille / 10);
     return true;
   }
   Acquirer finder(input.sensor.camera, input.sensor.target);
@@ -327,25 +327,24 @@ std::unique_ptr<Output> RunBoard::output(const SensorConfig& sensor, const std::
 void RunBoard::compare(BoardOutput& output, const SensorConfig& sensor) const {
   const ReferenceLine& line = *sensor.reference;
   if (!cells_[static_cast<std::size_t>(line.channel)].calibrated) {
-    log_info(fmt::format(
+    log_info(
         "wrench.reference: load cell {} is not calibrated, so nothing is compared with it; run "
         "`tagwrench board calibrate-cell`",
-        line.channel));
+        line.channel);
     return;
   }
   const WrenchEstimator wrench(sensor.wrench);
   output.compare({line, wrench.tool(), range_through(wrench.tool(), sensor.wrench.range)});
-  log_info(fmt::format("every sample is compared with load cell {}", line.channel));
+  log_info("every sample is compared with load cell {}", line.channel);
 }
 
 BoardReading RunBoard::reading() const noexcept {
   BoardReading reading;
   reading.led = led_permille_ / 1000;
   reading.exposure_us = exposure_us_;
-  for (std::size_t i = 0; output_ != nullptr && i < reading.cells.size(); ++i) {
+  for (std::size_t i = 0; output_ != nullptr && i < reading.cells.size(); ++i)
     if (const std::optional<link::Newtons> felt = output_->felt(i))
       reading.cells[i] = {true, felt->value, felt->sigma};
-  }
   return reading;
 }
 

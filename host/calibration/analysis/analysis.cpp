@@ -34,15 +34,13 @@ const std::string& called(const Trial& trial) {
 void check_apart(const Trial& a, const Trial& b) {
   const bool same_shape =
       a.time.size() == b.time.size() && a.reference.size() == b.reference.size();
-  if (same_shape && a.time == b.time && a.features == b.features && a.reference == b.reference) {
-    throw ConfigError(
-        fmt::format("{} and {}: are the same data twice; name each once", called(a), called(b)));
-  }
+  if (same_shape && a.time == b.time && a.features == b.features && a.reference == b.reference)
+    throw ConfigError("{} and {}: are the same data twice; name each once", called(a), called(b));
   if (!a.sensor.empty() && !b.sensor.empty() && a.sensor != b.sensor) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{} and {}: are of different sensors, or of one whose camera or target was calibrated "
         "between them; analyze them one by one",
-        called(a), called(b)));
+        called(a), called(b));
   }
 }
 
@@ -50,15 +48,13 @@ void check_together(const std::vector<Trial>& trials) {
   if (trials.empty()) throw ConfigError("nothing to analyze: name a file");
   for (const Trial& trial : trials) {
     if (trial.feature_names != trials[0].feature_names) {
-      throw ConfigError(
-          fmt::format("{} and {}: their features differ ({} and {}); analyze them one by one",
-                      called(trials[0]), called(trial), fmt::join(trials[0].feature_names, " "),
-                      fmt::join(trial.feature_names, " ")));
+      throw ConfigError("{} and {}: their features differ ({} and {}); analyze them one by one",
+                        called(trials[0]), called(trial), fmt::join(trials[0].feature_names, " "),
+                        fmt::join(trial.feature_names, " "));
     }
   }
-  for (std::size_t b = 1; b < trials.size(); ++b) {
+  for (std::size_t b = 1; b < trials.size(); ++b)
     for (std::size_t a = 0; a < b; ++a) check_apart(trials[a], trials[b]);
-  }
 }
 
 bool usable(const CleanTrial& trial, Eigen::Index i) {
@@ -79,11 +75,10 @@ std::vector<Range> usable_ranges(const std::vector<CleanTrial>& trials) {
     const double longest = kGapsOfMedian * median_interval(trial.time);
     for (Eigen::Index i = 0; i < trial.time.size(); ++i) {
       if (!usable(trial, i)) continue;
-      if (i > 0 && continues(trial, i, longest)) {
+      if (i > 0 && continues(trial, i, longest))
         ++ranges.back().count;
-      } else {
+      else
         ranges.push_back({t, i, 1});
-      }
     }
   }
   return ranges;
@@ -205,9 +200,8 @@ void add_held_out(const Rows& rows, Analysis& analysis) {
 
 void add_brought_predictions(const Rows& rows, Analysis& analysis) {
   std::vector<Eigen::Index> there;
-  for (Eigen::Index i = 0; i < rows.time.size(); ++i) {
+  for (Eigen::Index i = 0; i < rows.time.size(); ++i)
     if (rows.predicted.row(i).allFinite() && rows.sigma.row(i).allFinite()) there.push_back(i);
-  }
   add_held_out(only(rows, there), analysis);
 }
 
@@ -222,10 +216,10 @@ void cross_validate(const std::vector<CleanTrial>& trials, const std::vector<Fol
                                   [&](const Range& r) { return !trials[r.trial].held; });
     const Rows learned = rows_of(trials, plan.learned, fold.lag.value, options.smooth);
     if (learned.time.size() <= learned.features.cols() + 1) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "fold {} of {}: {} readings are left to learn {} numbers per axis from; record more, or "
           "use fewer folds",
-          f + 1, folds.size(), learned.time.size(), learned.features.cols() + 1));
+          f + 1, folds.size(), learned.time.size(), learned.features.cols() + 1);
     }
     const LinearModel model = fit_linear(learned.features, learned.felt, options.ridge);
     Rows rows = rows_of(trials, plan.held_out, fold.lag.value, options.smooth, /*in_context=*/true);
@@ -299,9 +293,8 @@ Rows rows_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& ra
       rows.predicted.middleRows(at, count) = trial.predicted.middleRows(first, count);
       rows.sigma.middleRows(at, count) = trial.predicted_sigma.middleRows(first, count);
     }
-    for (const Eigen::Index end = at + count; at < end; ++at) {
+    for (const Eigen::Index end = at + count; at < end; ++at)
       if (rows.felt.row(at).allFinite()) felt.push_back(at);
-    }
   }
   return only(rows, felt);
 }
@@ -324,11 +317,10 @@ Lag lag_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& rang
     if (to < end) ++to;
     segment.reference_time = trial.reference_time.segment(from - begin, to - from);
     const auto reference = trial.reference.middleRows(from - begin, to - from);
-    if (axis < 0) {
+    if (axis < 0)
       segment.reference = reference;
-    } else {
+    else
       segment.reference = reference.col(axis);
-    }
   }
   Lag lag;
   lag.known = true;
@@ -350,10 +342,10 @@ Analysis analyze(const std::vector<Trial>& trials, const AnalysisOptions& option
   Rows rows = rows_of(clean, all, analysis.lag.value, options.smooth);
   analysis.readings = rows.time.size();
   if (rows.time.size() <= rows.features.cols() + 1) {
-    throw ConfigError(fmt::format(
-        "{}: {} readings with a reference for {} unknown numbers per axis; record more, or "
-        "check the units of time",
-        trials[0].name, rows.time.size(), rows.features.cols() + 1));
+    throw ConfigError(
+        "{}: {} readings with a reference for {} unknown numbers per axis; record more, or check "
+        "the units of time",
+        trials[0].name, rows.time.size(), rows.features.cols() + 1);
   }
   Eigen::VectorXd noise = clean[0].noise;
   for (const CleanTrial& trial : clean) noise = noise.cwiseMax(trial.noise);
@@ -373,7 +365,7 @@ Analysis analyze(const std::vector<Trial>& trials, const AnalysisOptions& option
     cross_validate(clean, plans.folds, options, analysis);
   }
   if (analysis.time.size() == 0)
-    throw ConfigError(fmt::format("{}: nothing could be held out; record more", trials[0].name));
+    throw ConfigError("{}: nothing could be held out; record more", trials[0].name);
   measure_held_out(analysis);
   rows.predicted = model.predict(rows.features);
   const Eigen::VectorXd in_sample = r_squared(rows.predicted, rows.felt);

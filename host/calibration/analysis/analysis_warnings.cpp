@@ -28,28 +28,23 @@ void warn(Warnings& warnings, fmt::format_string<Args...> text, Args&&... args) 
 void check_shapes(const Trial& trial) {
   const Eigen::Index n = trial.time.size();
   const Eigen::Index m = trial.reference_time.size();
-  if (!shapes_fit(trial) || trial.features.cols() == 0) {
-    throw ConfigError(
-        fmt::format("{}: columns of different lengths, or none; write it anew", trial.name));
-  }
+  if (!shapes_fit(trial) || trial.features.cols() == 0)
+    throw ConfigError("{}: columns of different lengths, or none; write it anew", trial.name);
   if (n < 2 || m < 2) {
-    throw ConfigError(
-        fmt::format("{}: {} readings and {} of the reference; at least two of each "
-                    "are needed",
-                    trial.name, n, m));
+    throw ConfigError("{}: {} readings and {} of the reference; at least two of each are needed",
+                      trial.name, n, m);
   }
   if (!trial.features.allFinite() || !trial.reference.allFinite())
-    throw ConfigError(
-        fmt::format("{}: numbers that are not finite; leave those rows out", trial.name));
+    throw ConfigError("{}: numbers that are not finite; leave those rows out", trial.name);
 }
 
 void check_times(const Eigen::VectorXd& time, const std::string& name, const char* what) {
   for (Eigen::Index i = 0; i < time.size(); ++i) {
     if (!std::isfinite(time[i]))
-      throw ConfigError(fmt::format("{}: {} {}: its time is no finite number", name, what, i + 1));
+      throw ConfigError("{}: {} {}: its time is no finite number", name, what, i + 1);
     if (i > 0 && time[i] <= time[i - 1]) {
-      throw ConfigError(fmt::format("{}: {} {}: time {} s after {} s; times must grow", name, what,
-                                    i + 1, time[i], time[i - 1]));
+      throw ConfigError("{}: {} {}: time {} s after {} s; times must grow", name, what, i + 1,
+                        time[i], time[i - 1]);
     }
   }
 }
@@ -182,10 +177,10 @@ void check_overlap(const CleanTrial& clean, const AnalysisOptions& options) {
   const bool overlaps = clean.time[clean.time.size() - 1] - options.lag_from >= first &&
                         clean.time[0] - options.lag_to <= last;
   if (!overlaps) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: readings from {:.3f} to {:.3f} s, the reference from {:.3f} to {:.3f} s: no overlap; "
         "both need one clock, check the units of time",
-        clean.name, clean.time[0], clean.time[clean.time.size() - 1], first, last));
+        clean.name, clean.time[0], clean.time[clean.time.size() - 1], first, last);
   }
 }
 
@@ -347,8 +342,8 @@ CleanTrial check_trial(const Trial& trial, const AnalysisOptions& options, Warni
   const double start = trial.time[first] + options.drop_start;
   while (first < trial.time.size() && trial.time[first] < start) ++first;
   if (first + 2 > trial.time.size())
-    throw ConfigError(fmt::format("{}: dropping {} s leaves no readings; drop less", trial.name,
-                                  options.drop_start));
+    throw ConfigError("{}: dropping {} s leaves no readings; drop less", trial.name,
+                      options.drop_start);
 
   CleanTrial clean{trial, Eigen::VectorXd::Zero(6), Eigen::VectorXd::Zero(6),
                    std::numeric_limits<double>::infinity()};
@@ -381,11 +376,10 @@ Warnings excitation_warnings(const Analysis& analysis) {
     if (axis.calibrated) continue;
     const auto known = std::find_if(axes_of_reasons.begin(), axes_of_reasons.end(),
                                     [&](const auto& entry) { return entry.first == axis.reason; });
-    if (known == axes_of_reasons.end()) {
+    if (known == axes_of_reasons.end())
       axes_of_reasons.emplace_back(axis.reason, kWrenchAxes[k]);
-    } else {
+    else
       known->second += fmt::format(" {}", kWrenchAxes[k]);
-    }
   }
   Warnings lines;
   for (const auto& [reason, axes] : axes_of_reasons)

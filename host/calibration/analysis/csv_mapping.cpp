@@ -56,7 +56,7 @@ UsedRows rows_in_order(const DelimitedText& text, const std::string& column, dou
                        std::size_t skip, std::vector<std::string>& notes) {
   const std::vector<std::size_t> found = text.find(column);
   if (found.size() != 1)
-    throw ConfigError(fmt::format("{}: name one column of times, not '{}'", text.name(), column));
+    throw ConfigError("{}: name one column of times, not '{}'", text.name(), column);
   UsedRows rows;
   std::vector<double> times;
   std::size_t repeated = 0;
@@ -65,9 +65,9 @@ UsedRows rows_in_order(const DelimitedText& text, const std::string& column, dou
     const double time = text.number(row, found[0], DelimitedText::kMax / unit) * unit;
     if (row > 0 && time < before) {
       throw ConfigError(
-          fmt::format("{}: time runs backwards, {} s after {} s; put the rows in "
-                      "order, or name the right column of times",
-                      text.place(row), time, before));
+          "{}: time runs backwards, {} s after {} s; put the rows in order, or name the right "
+          "column of times",
+          text.place(row), time, before);
     }
     const bool repeats = row > 0 && time == before;
     before = time;
@@ -83,10 +83,8 @@ UsedRows rows_in_order(const DelimitedText& text, const std::string& column, dou
     notes.push_back(fmt::format("{}: {} with the time of the row before left out", text.name(),
                                 repeated == 1 ? "1 row" : fmt::format("{} rows", repeated)));
   }
-  if (times.size() < 2) {
-    throw ConfigError(
-        fmt::format("{}: fewer than two rows of different times are left", text.name()));
-  }
+  if (times.size() < 2)
+    throw ConfigError("{}: fewer than two rows of different times are left", text.name());
   rows.time = Eigen::Map<const Eigen::VectorXd>(times.data(), times.size());
   return rows;
 }
@@ -100,9 +98,8 @@ Eigen::MatrixXd all_numbers(const DelimitedText& text, const std::vector<std::si
 
 Eigen::Matrix3d rotation(const std::string& order, const Eigen::Vector3d& angles) {
   Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i)
     r = r * Eigen::AngleAxisd(angles[i], Eigen::Vector3d::Unit(order[i] - 'x')).toRotationMatrix();
-  }
   return r;
 }
 
@@ -142,8 +139,8 @@ void add_features(const CsvMapping& mapping, const FeatureColumns& group, const 
   values = (group.unit * values(rows.row, Eigen::all)).eval();
   if (!group.euler.empty()) {
     if (columns.size() != 3) {
-      throw ConfigError(fmt::format("{}: Euler angles are three columns, not {} ('{}')",
-                                    text.name(), columns.size(), group.columns));
+      throw ConfigError("{}: Euler angles are three columns, not {} ('{}')", text.name(),
+                        columns.size(), group.columns);
     }
     values = rotation_vectors(group.euler, values, mapping.rest_readings);
   }
@@ -159,11 +156,11 @@ void add_features(const CsvMapping& mapping, const FeatureColumns& group, const 
     const double way = column.maxCoeff() - column.minCoeff();
     const bool turns = group.quantity == 'r';
     if (group.quantity == 0 || way <= (turns ? kMaxTurn : kMaxWay)) continue;
-    mapped.notes.push_back(fmt::format(
-        "{}: column {} ({}) goes over {:.3g} {}, further than a platform on springs: give its unit "
-        "({}), or leave out the row that is wrong",
-        text.name(), columns[i] + 1, trial.feature_names.back(), way, turns ? "rad" : "m",
-        turns ? "deg or mrad" : "mm or um"));
+    mapped.notes.push_back(
+        fmt::format("{}: column {} ({}) goes over {:.3g} {}, further than a platform on springs: "
+                    "give its unit ({}), or leave out the row that is wrong",
+                    text.name(), columns[i] + 1, trial.feature_names.back(), way,
+                    turns ? "rad" : "m", turns ? "deg or mrad" : "mm or um"));
   }
 }
 
@@ -175,8 +172,8 @@ void add_loads(const CsvMapping& mapping, const DelimitedText& text, const UsedR
   for (const LoadColumns& group : mapping.loads) {
     const std::vector<std::size_t> columns = text.find(group.columns);
     const auto wrong = [&](std::size_t count, const char* what) {
-      return ConfigError(fmt::format("{}: {} columns '{}', but {} {}", text.name(), columns.size(),
-                                     group.columns, count, what));
+      return ConfigError("{}: {} columns '{}', but {} {}", text.name(), columns.size(),
+                         group.columns, count, what);
     };
     if (!group.counts_per_unit.empty() && group.counts_per_unit.size() != columns.size())
       throw wrong(group.counts_per_unit.size(), "counts");
@@ -190,9 +187,9 @@ void add_loads(const CsvMapping& mapping, const DelimitedText& text, const UsedR
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const std::size_t axis = group.axes.empty() ? next : group.axes[i];
       if (axis >= kWrenchAxes.size() || given[axis]) {
-        throw ConfigError(fmt::format(
-            "{}: '{}' gives {}; name each axis once with axes=Fx,...", text.name(), group.columns,
-            axis < kWrenchAxes.size() ? "an axis twice" : "more than six axes"));
+        throw ConfigError("{}: '{}' gives {}; name each axis once with axes=Fx,...", text.name(),
+                          group.columns,
+                          axis < kWrenchAxes.size() ? "an axis twice" : "more than six axes");
       }
       given[axis] = true;
       next = axis + 1;
@@ -204,7 +201,7 @@ void add_loads(const CsvMapping& mapping, const DelimitedText& text, const UsedR
 
 ConfigError unknown(const std::string& option, const std::string& text, std::string_view part,
                     const std::string& known) {
-  return ConfigError(fmt::format("{} {}: what is '{}'? Known: {}", option, text, part, known));
+  return ConfigError("{} {}: what is '{}'? Known: {}", option, text, part, known);
 }
 
 /// Of "KEY=VALUE" the value.
@@ -239,8 +236,8 @@ FeatureColumns parse_feature_columns(const std::string& text, const std::string&
     } else if (const auto weight = value_of("unsmooth=", part)) {
       columns.unsmooth = parse_number(*weight).value_or(0);
       if (columns.unsmooth < kMinWeight || columns.unsmooth > 1)
-        throw ConfigError(fmt::format("{} {}: the weight of a smoothing is from {:g} to 1", option,
-                                      text, kMinWeight));
+        throw ConfigError("{} {}: the weight of a smoothing is from {:g} to 1", option, text,
+                          kMinWeight);
     } else {
       throw unknown(option, text, part,
                     names(kFeatureUnits) + " euler euler=ORDER unsmooth=WEIGHT");
@@ -257,11 +254,9 @@ LoadColumns parse_load_columns(const std::string& text, const std::string& optio
     } else if (const auto counts = value_of("counts=", part)) {
       for (const std::string_view one : split(*counts, ',')) {
         const double value = parse_number(one).value_or(0);
-        if (std::abs(value) < 1 / DelimitedText::kMax || std::abs(value) > DelimitedText::kMax) {
-          throw ConfigError(fmt::format("{} {}: counts per unit are numbers from {:g} to {:g}",
-                                        option, text, 1 / DelimitedText::kMax,
-                                        DelimitedText::kMax));
-        }
+        if (std::abs(value) < 1 / DelimitedText::kMax || std::abs(value) > DelimitedText::kMax)
+          throw ConfigError("{} {}: counts per unit are numbers from {:g} to {:g}", option, text,
+                            1 / DelimitedText::kMax, DelimitedText::kMax);
         columns.counts_per_unit.push_back(value);
       }
     } else if (const auto axes = value_of("axes=", part)) {
@@ -280,7 +275,7 @@ LoadColumns parse_load_columns(const std::string& text, const std::string& optio
 double parse_time_unit(const std::string& text, const std::string& option) {
   const Unit* unit = find_unit(kTimeUnits, text);
   if (unit == nullptr)
-    throw ConfigError(fmt::format("{}: no unit '{}'; use {}", option, text, names(kTimeUnits)));
+    throw ConfigError("{}: no unit '{}'; use {}", option, text, names(kTimeUnits));
   return unit->si;
 }
 

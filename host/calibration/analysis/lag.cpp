@@ -41,11 +41,10 @@ Prepared prepare(const Segment& segment, double from, double to, Eigen::Index ev
   prepared.longest_gap = kMaxGap * median_interval(segment.reference_time);
   std::vector<Eigen::Index> kept;
   const Eigen::Index last = segment.reference_time.size() - 1;
-  for (Eigen::Index i = 0; i < segment.time.size() && last > 0; i += every) {
+  for (Eigen::Index i = 0; i < segment.time.size() && last > 0; i += every)
     if (segment.time[i] - to >= segment.reference_time[0] &&
         segment.time[i] - from <= segment.reference_time[last])
       kept.push_back(i);
-  }
   prepared.time = segment.time(kept);
   prepared.features = segment.features(kept, Eigen::all);
   if (!kept.empty()) {
@@ -244,9 +243,8 @@ Lag estimate_lag(std::span<const Segment> given, const LagSearch& search) {
   Lag lag;
   if (given.empty()) return lag;
   std::vector<Segment> smoothed;
-  if (search.smooth) {
+  if (search.smooth)
     for (const Segment& segment : given) smoothed.push_back(smooth_alike(segment));
-  }
   const std::span<const Segment> segments = search.smooth ? smoothed : given;
   const LagScan coarse(segments, search, search.from, search.to);
   if (coarse.rows() < 3 * segments.front().features.cols()) return lag;
@@ -301,19 +299,18 @@ std::string lag_text(const Lag& lag) {
 }
 
 std::string lag_warning(const Lag& lag, double from, double to) {
-  if (!lag.known) {
+  if (!lag.known)
     return "the lag between readings and reference cannot be told: they do not move together";
-  }
   if (lag.at_limit) {
     return lag_text(lag) +
            ": the end of what was searched, so the true lag may lie beyond; are both on one clock?";
   }
   const bool early = lag.value + 2 * lag.sigma < from;
   if (!early && lag.value - 2 * lag.sigma <= to) return {};
-  return lag_text(lag) + fmt::format(
-                             ", more than {:.0f} ms; are both on one clock, and stamped when they "
-                             "were taken?",
-                             1e3 * std::abs(early ? from : to));
+  return lag_text(lag) +
+         fmt::format(
+             ", more than {:.0f} ms; are both on one clock, and stamped when they were taken?",
+             1e3 * std::abs(early ? from : to));
 }
 
 Eigen::MatrixXd smooth_rows(const Eigen::MatrixXd& rows) {

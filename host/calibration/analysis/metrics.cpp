@@ -55,9 +55,8 @@ struct Series {
 /// The largest magnitude of those that are known; NaN if none is.
 double largest(const Eigen::VectorXd& values) {
   double most = kNaN;
-  for (const double value : values) {
+  for (const double value : values)
     if (std::isfinite(value) && !(std::abs(value) <= most)) most = std::abs(value);
-  }
   return most;
 }
 

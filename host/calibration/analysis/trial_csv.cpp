@@ -23,12 +23,12 @@ constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
 std::string load(const std::filesystem::path& file) {
   std::error_code error;
   if (std::filesystem::is_directory(file, error))
-    throw ConfigError(fmt::format("{}: a folder; name a CSV file", file.string()));
+    throw ConfigError("{}: a folder; name a CSV file", file.string());
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw ConfigError(fmt::format("{}: cannot be read; check the name", file.string()));
+  if (!in) throw ConfigError("{}: cannot be read; check the name", file.string());
   const auto size = std::filesystem::file_size(file, error);
   if (!error && size > kMaxBytes)
-    throw ConfigError(fmt::format("{}: larger than 1 GB; cut it into pieces", file.string()));
+    throw ConfigError("{}: larger than 1 GB; cut it into pieces", file.string());
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
@@ -59,9 +59,8 @@ char separator_of(const std::vector<Line>& lines) {
 std::string shown(std::string_view field) {
   constexpr std::size_t kMax = 40;
   std::string text(field.substr(0, kMax));
-  for (char& c : text) {
+  for (char& c : text)
     if (static_cast<unsigned char>(c) < ' ') c = '?';
-  }
   return field.size() > kMax ? text + "..." : text;
 }
 
@@ -71,9 +70,8 @@ constexpr std::string_view kSigma = "sigma_";
 constexpr std::string_view kPredicted = "predicted_";
 
 std::string one_line(std::string text) {
-  for (char& c : text) {
+  for (char& c : text)
     if (static_cast<unsigned char>(c) < ' ') c = ' ';
-  }
   return text;
 }
 
@@ -111,10 +109,8 @@ class TrialReader {
     std::vector<std::size_t> references;
     for (std::size_t row = 0; row < text_.rows(); ++row) {
       const std::string_view kind = text_.field(row, 0);
-      if (kind != "reading" && kind != "reference") {
-        throw ConfigError(
-            fmt::format("{}: the first column must be reading or reference", text_.place(row)));
-      }
+      if (kind != "reading" && kind != "reference")
+        throw ConfigError("{}: the first column must be reading or reference", text_.place(row));
       (kind == "reading" ? readings : references).push_back(row);
     }
     trial_.time = times(readings);
@@ -138,19 +134,18 @@ class TrialReader {
   static const std::filesystem::path& ours(const std::filesystem::path& file) {
     std::error_code error;
     if (std::filesystem::is_regular_file(file, error) && !is_trial_file(file)) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "{}: does not begin with '# {}'; for files of others name their columns, see `tagwrench "
           "analyze --help`",
-          file.string(), kFormat));
+          file.string(), kFormat);
     }
     return file;
   }
 
   void find_columns() {
     const std::vector<std::string>& header = text_.header();
-    if (header.size() < 2 || header[0] != "kind" || header[1] != "t_s") {
-      throw ConfigError(fmt::format("{}: the header must begin with kind,t_s", text_.name()));
-    }
+    if (header.size() < 2 || header[0] != "kind" || header[1] != "t_s")
+      throw ConfigError("{}: the header must begin with kind,t_s", text_.name());
     for (std::size_t i = 2; i < header.size(); ++i) {
       std::string name = header[i];
       const bool predicted = name.starts_with(kPredicted);
@@ -177,13 +172,12 @@ class TrialReader {
         loads_.values.size() != kLoads.size() || features_.values.empty() || !whole(loads_) ||
         !whole(features_)) {
       throw ConfigError(
-          fmt::format("{}: the header must name features, the six of {}, and all of "
-                      "their sigmas or none",
-                      text_.name(), fmt::join(kLoads, ",")));
+          "{}: the header must name features, the six of {}, and all of their sigmas or none",
+          text_.name(), fmt::join(kLoads, ","));
     }
     if (!std::ranges::equal(loads_.values, kLoads, {}, [&](std::size_t i) { return header[i]; })) {
-      throw ConfigError(fmt::format("{}: the loads must be in the order {}", text_.name(),
-                                    fmt::join(kLoads, ",")));
+      throw ConfigError("{}: the loads must be in the order {}", text_.name(),
+                        fmt::join(kLoads, ","));
     }
   }
 
@@ -192,9 +186,8 @@ class TrialReader {
     for (std::size_t i = 1; i < rows.size(); ++i) {
       if (time[i] <= time[i - 1]) {
         throw ConfigError(
-            fmt::format("{}: time {} s after {} s in the row of the same kind before; "
-                        "times must grow",
-                        text_.place(rows[i]), time[i], time[i - 1]));
+            "{}: time {} s after {} s in the row of the same kind before; times must grow",
+            text_.place(rows[i]), time[i], time[i - 1]);
       }
     }
     return time;
@@ -204,10 +197,9 @@ class TrialReader {
                          const std::vector<std::size_t>& columns) const {
     if (columns.empty()) return {};
     Eigen::MatrixXd matrix = text_.numbers(rows, columns);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t i = 0; i < rows.size(); ++i)
       if (matrix.row(i).minCoeff() < 0)
-        throw ConfigError(fmt::format("{}: a sigma that is negative", text_.place(rows[i])));
-    }
+        throw ConfigError("{}: a sigma that is negative", text_.place(rows[i]));
     return matrix;
   }
 
@@ -215,8 +207,7 @@ class TrialReader {
     const std::string_view field = text_.field(row, step_);
     const int value = field.empty() ? -1 : parse_whole<int>(field).value_or(-2);
     if (value >= -1) return value;
-    throw ConfigError(
-        fmt::format("{}: step must be a number from 0, or -1 between steps", text_.place(row)));
+    throw ConfigError("{}: step must be a number from 0, or -1 between steps", text_.place(row));
   }
 
   DelimitedText text_;
@@ -247,29 +238,28 @@ DelimitedText::DelimitedText(const std::filesystem::path& file, char separator, 
     const std::string_view line = rest.substr(0, end);
     rest.remove_prefix(std::min(end + 1, rest.size()));
     if (number <= skip || trimmed(line).empty()) continue;
-    if (line[0] == '#') {
+    if (line[0] == '#')
       comments_.emplace_back(trimmed(line.substr(1)));
-    } else {
+    else
       lines.push_back({line, number});
-    }
   }
-  if (lines.empty()) throw ConfigError(fmt::format("{}: no rows in it", name_));
+  if (lines.empty()) throw ConfigError("{}: no rows in it", name_);
   if (separator == 0) separator = separator_of(lines);
 
   columns_ = fields_of(lines[0].text, separator);
   if (columns_ < 2) {
-    throw ConfigError(fmt::format(
-        "{}:{}: only one column when split at '{}'; give the right --separator", name_,
-        lines[0].number, separator == '\t' ? std::string("tab") : std::string(1, separator)));
+    throw ConfigError("{}:{}: only one column when split at '{}'; give the right --separator",
+                      name_, lines[0].number,
+                      separator == '\t' ? std::string("tab") : std::string(1, separator));
   }
   fields_.reserve(lines.size() * columns_);
   for (const Line& line : lines) {
     const std::size_t count = fields_of(line.text, separator);
     if (count != columns_) {
       throw ConfigError(
-          fmt::format("{}:{}: {} fields where the first row has {}; mend the row, or "
-                      "give the right --separator",
-                      name_, line.number, count, columns_));
+          "{}:{}: {} fields where the first row has {}; mend the row, or give the right "
+          "--separator",
+          name_, line.number, count, columns_);
     }
     for (const std::string_view field : split(line.text, separator))
       fields_.push_back(trimmed(field));
@@ -282,7 +272,7 @@ DelimitedText::DelimitedText(const std::filesystem::path& file, char separator, 
     fields_.erase(fields_.begin(), first_end);
     lines_.erase(lines_.begin());
   }
-  if (lines_.empty()) throw ConfigError(fmt::format("{}: a header, but no rows in it", name_));
+  if (lines_.empty()) throw ConfigError("{}: a header, but no rows in it", name_);
 }
 
 std::string DelimitedText::place(std::size_t row) const {
@@ -296,19 +286,17 @@ double DelimitedText::number(std::size_t row, std::size_t column, double largest
   const std::string which = header_.empty()
                                 ? fmt::format("column {}", column + 1)
                                 : fmt::format("column {} ({})", column + 1, shown(header_[column]));
-  if (text.empty()) {
-    throw ConfigError(
-        fmt::format("{}: {} is empty; leave the row out or fill it in", place(row), which));
-  }
+  if (text.empty())
+    throw ConfigError("{}: {} is empty; leave the row out or fill it in", place(row), which);
   if (value) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: {} is '{}', which no instrument reads (at most {:g}); mend it or leave the row out",
-        place(row), which, shown(text), largest));
+        place(row), which, shown(text), largest);
   }
   const bool comma = text.find(',') != std::string_view::npos;
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "{}: {} is '{}', which is no finite number; {}", place(row), which, shown(text),
-      comma ? "write decimal points, not commas" : "leave the row out, or name other columns"));
+      comma ? "write decimal points, not commas" : "leave the row out, or name other columns");
 }
 
 Eigen::MatrixXd DelimitedText::numbers(const std::vector<std::size_t>& rows,
@@ -328,10 +316,8 @@ std::vector<std::size_t> DelimitedText::find(std::string_view columns) const {
   std::vector<std::size_t> found;
   const auto numbered = [&](std::string_view text) -> std::size_t {
     const auto number = parse_whole<std::size_t>(text);
-    if (number && (*number < 1 || *number > columns_)) {
-      throw ConfigError(
-          fmt::format("{}: no column {}; it has 1 to {}", name_, shown(text), columns_));
-    }
+    if (number && (*number < 1 || *number > columns_))
+      throw ConfigError("{}: no column {}; it has 1 to {}", name_, shown(text), columns_);
     return number.value_or(0);
   };
   for (const std::string_view part : split(columns, ',')) {
@@ -347,13 +333,12 @@ std::vector<std::size_t> DelimitedText::find(std::string_view columns) const {
     const std::size_t last =
         dash == std::string_view::npos ? first : numbered(one.substr(dash + 1));
     if (first == 0 || last < first) {
-      throw ConfigError(fmt::format("{}: no column '{}'; name columns by number from 1 ('3-8'){}",
-                                    name_, shown(one),
-                                    header_.empty() ? "" : " or as its header does"));
+      throw ConfigError("{}: no column '{}'; name columns by number from 1 ('3-8'){}", name_,
+                        shown(one), header_.empty() ? "" : " or as its header does");
     }
     for (std::size_t i = first; i <= last; ++i) found.push_back(i - 1);
   }
-  if (found.empty()) throw ConfigError(fmt::format("{}: no columns named", name_));
+  if (found.empty()) throw ConfigError("{}: no columns named", name_);
   return found;
 }
 
@@ -381,10 +366,9 @@ bool shapes_fit(const Trial& trial) {
 std::string trial_to_csv(const Trial& trial) {
   if (!shapes_fit(trial))
     throw std::invalid_argument("a trial whose columns are not of one length");
-  for (const std::string& name : trial.feature_names) {
+  for (const std::string& name : trial.feature_names)
     if (name.empty() || name.find_first_of(",;\t\r\n#") != std::string::npos)
       throw std::invalid_argument("a feature's name that cannot be a CSV column: " + name);
-  }
   std::string text = fmt::format("# {}\n# name: {}\n", kFormat, one_line(trial.name));
   if (!trial.sensor.empty()) text += fmt::format("# sensor: {}\n", one_line(trial.sensor));
   if (trial.held) text += "# held: true\n";

@@ -97,22 +97,19 @@ void ViewCollector::thin_out(int most) {
     for (std::size_t i = 0; i < views_.size(); ++i)
       to_chosen[i] = std::min(to_chosen[i], difference_px(views_[i].corners, views_[next].corners));
     next = 0;
-    for (std::size_t i = 0; i < views_.size(); ++i) {
+    for (std::size_t i = 0; i < views_.size(); ++i)
       if (!chosen[i] && (chosen[next] || to_chosen[i] > to_chosen[next])) next = i;
-    }
   }
   std::vector<CameraView> left;
-  for (std::size_t i = 0; i < views_.size(); ++i) {
+  for (std::size_t i = 0; i < views_.size(); ++i)
     if (chosen[i]) left.push_back(std::move(views_[i]));
-  }
   views_ = std::move(left);
 }
 
 std::string ViewCollector::what_was_seen() const {
   std::vector<std::string> parts;
-  for (const auto& [look, count] : looks_) {
+  for (const auto& [look, count] : looks_)
     if (look != BoardView::board) parts.push_back(fmt::format("{} {}", count, words(look)));
-  }
   return listed(parts);
 }
 
@@ -130,23 +127,23 @@ void ViewCollector::check() const {
   // Part of a checkerboard may pass for a smaller one here and there.
   if (static_cast<int>(views_.size()) < kMinCameraViews) {
     if (const std::string guess = other_board(); !guess.empty()) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "--board {}: found in {} of {} images; the board in the others looks like {}: correct "
           "--board, or show all of it",
-          asked, count, looked_, guess));
+          asked, count, looked_, guess);
     }
   }
   if (count == 0) {
     throw ConfigError(
-        fmt::format("--board {}: no usable view of it ({}); light it evenly, hold it sharp and "
-                    "whole in view, and check --board",
-                    asked, looked_ == 0 ? "no image" : "images: " + what_was_seen()));
+        "--board {}: no usable view of it ({}); light it evenly, hold it sharp and whole in view, "
+        "and check --board",
+        asked, looked_ == 0 ? "no image" : "images: " + what_was_seen());
   }
   if (views_.size() < 3 && alike_ > 0) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "all {} images with the board show it in the same pose: move it about and tilt it between "
         "views",
-        count));
+        count);
   }
 }
 

@@ -43,10 +43,9 @@ struct LocalGrid {
 /// order where there are enough of them, since perspective and the lens bend the grid.
 std::optional<LocalGrid> local_grid(const std::vector<BoardCorner>& corners, std::size_t at) {
   std::vector<const BoardCorner*> neighbours;
-  for (std::size_t i = 0; i < corners.size(); ++i) {
+  for (std::size_t i = 0; i < corners.size(); ++i)
     if (i != at && (corners[i].board - corners[at].board).norm() <= kNeighbourhood)
       neighbours.push_back(&corners[i]);
-  }
   const auto count = static_cast<Eigen::Index>(neighbours.size());
   for (const Eigen::Index terms : {6, 3}) {
     if (count < terms + (terms == 3 ? 0 : kSpare)) continue;

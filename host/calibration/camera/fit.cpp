@@ -182,10 +182,10 @@ Solution solve_robustly(std::vector<Points>& all, std::vector<std::size_t>& whic
     if (worst == errors.size()) return solution;
     which.erase(which.begin() + static_cast<std::ptrdiff_t>(worst));
     if (static_cast<double>(which.size()) < fewest) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "more than a third of the {} views contradict the others (reprojection error {:.2f} px): "
           "check that --board describes the board and that it is flat and stiff, and hold it still",
-          all.size(), solution.rms_px));
+          all.size(), solution.rms_px);
     }
   }
 }
@@ -225,9 +225,9 @@ CameraFit fit_camera(const std::vector<CameraView>& views, int width_px, int hei
     return result(solution, all, used, size);
   } catch (const cv::Exception& e) {
     throw ConfigError(
-        fmt::format("no camera fits the views ({}): show the board tilted, and at "
-                    "different places and distances",
-                    e.err));
+        "no camera fits the views ({}): show the board tilted, and at different places and "
+        "distances",
+        e.err);
   }
 }
 

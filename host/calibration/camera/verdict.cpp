@@ -77,9 +77,8 @@ int Coverage::regions() const {
 
 std::vector<std::string> Coverage::missing_regions() const {
   std::vector<std::string> out;
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
+  for (std::size_t i = 0; i < corners_.size(); ++i)
     if (corners_[i] < kMinCorners) out.emplace_back(kRegions[i]);
-  }
   return out;
 }
 
@@ -88,9 +87,8 @@ std::vector<std::string> Coverage::missing() const {
   if (const std::vector<std::string> regions = missing_regions(); !regions.empty())
     out.push_back("the board at the " + listed(regions) + " of the picture");
   std::vector<std::string> edges;
-  for (std::size_t i = 0; i < tilted_.size(); ++i) {
+  for (std::size_t i = 0; i < tilted_.size(); ++i)
     if (!tilted_[i]) edges.emplace_back(kEdges[i]);
-  }
   if (!edges.empty())
     out.push_back("its " + listed(edges) + " edge tilted 20 degrees or more toward the lens");
   if (farthest_ < kDistanceRatio * nearest_)
@@ -106,15 +104,15 @@ double Coverage::span() const {
 void check_views(const std::vector<CameraView>& views, const Coverage& coverage) {
   if (static_cast<int>(views.size()) < kMinCameraViews) {
     throw ConfigError(
-        fmt::format("only {} different usable views, {} are needed and 20 are good: show the board "
-                    "at more places, distances and tilts",
-                    views.size(), kMinCameraViews));
+        "only {} different usable views, {} are needed and 20 are good: show the board at more "
+        "places, distances and tilts",
+        views.size(), kMinCameraViews);
   }
   if (coverage.regions() < kMinRegions || coverage.span() < kMinSpan) {
     throw ConfigError(
-        fmt::format("the views leave too much of the image empty (corners span {:.0f} % of it, and "
-                    "miss {}): show the board there too",
-                    100 * coverage.span(), listed(coverage.missing_regions())));
+        "the views leave too much of the image empty (corners span {:.0f} % of it, and miss {}): "
+        "show the board there too",
+        100 * coverage.span(), listed(coverage.missing_regions()));
   }
 }
 
@@ -122,40 +120,37 @@ void check_fit(const CameraFit& fit, const Coverage& coverage) {
   const CameraModel& camera = fit.camera;
   const double tilt = coverage.largest_tilt() * kDegrees;
   if (tilt < kMinTilt) {
-    throw ConfigError(fmt::format(
-        "the board is nearly frontal in every view (at most {:.0f} degrees), so the focal "
-        "length cannot be told from the distance: tilt it by 20 degrees and more, each way",
-        tilt));
+    throw ConfigError(
+        "the board is nearly frontal in every view (at most {:.0f} degrees), so the focal length "
+        "cannot be told from the distance: tilt it by 20 degrees and more, each way",
+        tilt);
   }
   if (fit.rms_px > kMaxRms_px) {
     throw ConfigError(
-        fmt::format("no camera explains the views better than {:.2f} px: check that --board "
-                    "describes the board "
-                    "and that it is flat, and hold it still",
-                    fit.rms_px));
+        "no camera explains the views better than {:.2f} px: check that --board describes the "
+        "board and that it is flat, and hold it still",
+        fit.rms_px);
   }
   const double focal = std::max(fit.sigma[0] / camera.fx_px, fit.sigma[1] / camera.fy_px);
   if (!(focal < kFocalSigma) || !(std::max(fit.sigma[2], fit.sigma[3]) < kCentreSigma_px)) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "the views do not determine the camera: fx {:.1f} +- {:.1f} px, centre +- {:.1f} px "
-        "(largest "
-        "tilt {:.0f} degrees): show the board larger, sharper and tilted more, each way",
-        camera.fx_px, fit.sigma[0], std::max(fit.sigma[2], fit.sigma[3]), tilt));
+        "(largest tilt {:.0f} degrees): show the board larger, sharper and tilted more, each way",
+        camera.fx_px, fit.sigma[0], std::max(fit.sigma[2], fit.sigma[3]), tilt);
   }
   if (std::abs(camera.fx_px / camera.fy_px - 1) > kAspect) {
     throw ConfigError(
-        fmt::format("fx {:.1f} and fy {:.1f} px differ as no camera's do: check --board, and that "
-                    "its print was not "
-                    "stretched",
-                    camera.fx_px, camera.fy_px));
+        "fx {:.1f} and fy {:.1f} px differ as no camera's do: check --board, and that its print "
+        "was not stretched",
+        camera.fx_px, camera.fy_px);
   }
   const double off_x = std::abs(camera.cx_px / (camera.width_px - 1) - 0.5);
   const double off_y = std::abs(camera.cy_px / (camera.height_px - 1) - 0.5);
   if (std::max(off_x, off_y) > kCentreOff) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "the optical axis would meet the image at ({:.0f}, {:.0f}) px, far from its middle: is the "
         "image cropped? Otherwise tilt the board more, each way",
-        camera.cx_px, camera.cy_px));
+        camera.cx_px, camera.cy_px);
   }
   if (!monotonic(camera)) {
     throw ConfigError(

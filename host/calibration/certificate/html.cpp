@@ -136,9 +136,8 @@ std::string cell(const std::string& text, const char* attributes = "") {
 
 std::string header(const Certificate& c) {
   return fmt::format(
-      "<header><div><h1>Calibration certificate</h1>"
-      "<p>Six-axis force–torque sensor, tracked optically</p></div>"
-      "<div class=\"id\"><b>No. {}</b><br>issued {}<br>{}</div></header>\n",
+      "<header><div><h1>Calibration certificate</h1><p>Six-axis force–torque sensor, tracked "
+      "optically</p></div><div class=\"id\"><b>No. {}</b><br>issued {}<br>{}</div></header>\n",
       escaped(c.number), escaped(c.issued), escaped(c.software));
 }
 
@@ -186,33 +185,31 @@ nlohmann::ordered_json facts_json(const std::vector<Fact>& facts) {
 /// Widths in percent.
 std::string columns() {
   std::string text = "<colgroup>";
-  for (const double width :
-       {3.2, 15.0, 6.4, 8.4, 5.8, 5.6, 6.0, 6.0, 5.8, 8.2, 8.4, 8.2, 8.6, 4.4}) {
+  for (const double width : {3.2, 15.0, 6.4, 8.4, 5.8, 5.6, 6.0, 6.0, 5.8, 8.2, 8.4, 8.2, 8.6, 4.4})
     text += fmt::format("<col style=\"width:{}%\">", width);
-  }
   return text + "</colgroup>";
 }
 
 std::string axes_note(const Analysis& a) {
   return fmt::format(
-      "<p class=\"note\">R² and RMSE are of single readings{}, their own noise and that "
-      "of "
-      "the reference included. Percentages are of the full scale loaded: the larger end of the "
-      "range. – not told by these data.</p>\n",
+      "<p class=\"note\">R² and RMSE are of single readings{}, their own noise and that of the "
+      "reference included. Percentages are of the full scale loaded: the larger end of the range. "
+      "– not told by these data.</p>\n",
       a.own_predictions ? ", predicted by the calibration's own fit without their step" : "");
 }
 
 std::string axes(const Analysis& a, const PageRoom& room) {
   std::string text =
       "<table class=\"axes\">" + columns() +
-      "<thead><tr><th></th><th></th>"
-      "<th colspan=\"4\" class=\"first\">held out</th><th colspan=\"3\" class=\"first\">shape, of "
-      "full scale</th><th colspan=\"4\" class=\"first\">at rest</th><th class=\"first\"></th></tr>"
-      "<tr><th></th><th>range</th><th class=\"first\">R²</th><th>RMSE</th><th>of full<br>scale</th>"
-      "<th>in 95 %<br>interval</th><th class=\"first\">non-<br>linearity</th><th>hyster-<br>esis"
-      "</th><th>creep</th><th class=\"first\">noise</th><th>density<br>per "
-      "√Hz</th><th>resolu-<br>tion</th>"
-      "<th>drift/h</th><th class=\"first\">excita-<br>tion</th></tr></thead><tbody>\n";
+      "<thead><tr><th></th><th></th><th colspan=\"4\" class=\"first\">held out</th><th "
+      "colspan=\"3\" class=\"first\">shape, of full scale</th><th colspan=\"4\" class=\"first\">at "
+      "rest</th><th class=\"first\"></th></tr><tr><th></th><th>range</th><th "
+      "class=\"first\">R²</th><th>RMSE</th><th>of full<br>scale</th><th>in 95 "
+      "%<br>interval</th><th "
+      "class=\"first\">non-<br>linearity</th><th>hyster-<br>esis</th><th>creep</th><th "
+      "class=\"first\">noise</th><th>density<br>per "
+      "√Hz</th><th>resolu-<br>tion</th><th>drift/h</th><th "
+      "class=\"first\">excita-<br>tion</th></tr></thead><tbody>\n";
   for (int axis = 0; axis < 6; ++axis) text += axis_row(a.axis[axis], axis, room);
   return text + "</tbody></table>\n" + axes_note(a);
 }
@@ -334,23 +331,22 @@ std::string escaped(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const std::size_t length = utf8_length(text.substr(i));
     const char c = text[i];
-    if (length == 0) {
+    if (length == 0)
       out += "\uFFFD";
-    } else if (length > 1) {
+    else if (length > 1)
       out += text.substr(i, length);
-    } else if (c == '&') {
+    else if (c == '&')
       out += "&amp;";
-    } else if (c == '<') {
+    else if (c == '<')
       out += "&lt;";
-    } else if (c == '>') {
+    else if (c == '>')
       out += "&gt;";
-    } else if (c == '"') {
+    else if (c == '"')
       out += "&quot;";
-    } else if (c == '\'') {
+    else if (c == '\'')
       out += "&#39;";
-    } else {
+    else
       out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
-    }
     i += std::max<std::size_t>(1, length);
   }
   return out;
@@ -359,9 +355,9 @@ std::string escaped(std::string_view text) {
 std::string certificate_html(const Certificate& c, const std::string& scatter,
                              const std::string& traces, const PageRoom& room) {
   std::string page = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-      "<title>Calibration certificate {}</title><style>{}"
-      ".scatter svg{{height:{:.1f}mm}} .traces svg{{height:{:.1f}mm}}</style></head><body>\n",
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Calibration "
+      "certificate {}</title><style>{}.scatter svg{{height:{:.1f}mm}} .traces "
+      "svg{{height:{:.1f}mm}}</style></head><body>\n",
       escaped(c.number), kCertificateStyle, room.scatter_mm, room.traces_mm);
   page += header(c);
   page += "<div class=\"columns\">" + fact_list("Sensor", c.sensor, room) +
@@ -369,14 +365,12 @@ std::string certificate_html(const Certificate& c, const std::string& scatter,
   page += axes(c.analysis, room);
   page +=
       "<div class=\"columns wide-left\"><section class=\"scatter\"><h2>This sensor, held out, "
-      "against the "
-      "reference</h2>" +
+      "against the reference</h2>" +
       scatter + "</section><section>" + cross_talk(c.analysis) +
       fact_list("Conditions", conditions(c.analysis), room) + "</section></div>\n";
   page +=
       "<section class=\"traces\"><h2>Over time, s, without pauses: <span "
-      "class=\"black\">reference</span> and "
-      "<span class=\"red\">this sensor, held out</span></h2>" +
+      "class=\"black\">reference</span> and <span class=\"red\">this sensor, held out</span></h2>" +
       traces + "</section>\n";
   page += "<div class=\"columns\">" + data(c) + remarks(c.analysis, room) + "</div>\n";
   page += fmt::format(

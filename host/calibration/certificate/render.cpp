@@ -64,9 +64,8 @@ pid_t start(const Program& program, const std::vector<std::string>& arguments, i
       ::posix_spawnp(&pid, program.name.c_str(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   if (error == 0) return pid;
-  throw ConfigError(fmt::format("{}: {}; install it (Debian: apt install {})", program.name,
-                                error == ENOENT ? "is not installed" : std::strerror(error),
-                                program.package));
+  throw ConfigError("{}: {}; install it (Debian: apt install {})", program.name,
+                    error == ENOENT ? "is not installed" : std::strerror(error), program.package);
 }
 
 /// Its wait status; if it takes longer than that, it is ended.
@@ -124,9 +123,8 @@ Span span(const Analysis& a, int axis) {
 double tick(const Span& s, int count) {
   const double wanted = (s.high - s.low) / count;
   const double decade = std::pow(10, std::floor(std::log10(wanted)));
-  for (const double step : {1.0, 2.0, 5.0}) {
+  for (const double step : {1.0, 2.0, 5.0})
     if (step * decade >= wanted) return step * decade;
-  }
   return 10 * decade;
 }
 
@@ -134,8 +132,8 @@ std::string terminal(PlotSize size) {
   // The font is the page's: the SVG stands in it. Dots are the round ends of lines.
   return fmt::format(
       "set encoding utf8\n"
-      "set terminal svg size {},{} dynamic font 'sans-serif,7.5' linewidth 0.6 rounded "
-      "background '#ffffff'\n"
+      "set terminal svg size {},{} dynamic font 'sans-serif,7.5' linewidth 0.6 rounded background "
+      "'#ffffff'\n"
       "set key off\n"
       "set tics scale 0.4 nomirror textcolor '#333333'\n"
       "set border 3 linecolor '#777777' linewidth 0.7\n",
@@ -176,8 +174,8 @@ std::string scatter_panel(const Analysis& a, int axis) {
       "set xrange [{0:.6g}:{1:.6g}]\nset yrange [{0:.6g}:{1:.6g}]\n"
       "set xtics nomirror scale 0.4 {2:.6g} offset 0,0.5\n"
       "set ytics nomirror scale 0.4 {2:.6g} offset 0.7,0\n"
-      "plot x with lines linecolor '#000000' linewidth 0.8, "
-      "$dots using 1:2 with lines linecolor '#d62728' linewidth {3}\n",
+      "plot x with lines linecolor '#000000' linewidth 0.8, $dots using 1:2 with lines linecolor "
+      "'#d62728' linewidth {3}\n",
       s.low, s.high, tick(s, 6), a.reference_rate > 0 ? 3 : 6);
   return script;
 }
@@ -191,9 +189,8 @@ bool goes_on(const Analysis& a, Eigen::Index i) {
 /// earlier than the one before has ended, and loads hang for seconds, minutes apart.
 Eigen::VectorXd running_time(const Analysis& a) {
   Eigen::VectorXd passed = Eigen::VectorXd::Zero(a.time.size());  // 0: a pause
-  for (Eigen::Index i = 1; i < a.time.size(); ++i) {
+  for (Eigen::Index i = 1; i < a.time.size(); ++i)
     if (goes_on(a, i)) passed[i] = std::max(0.0, a.time[i] - a.time[i - 1]);
-  }
   const auto pauses = static_cast<double>(std::max<Eigen::Index>(1, (passed.array() == 0).count()));
   const double most = kMaxPauses * passed.sum() / pauses;
   const double step = kPause * std::max(study::median_interval(a.time), 1e-9);
@@ -235,8 +232,8 @@ std::string trace_panel(const Analysis& a, const Eigen::VectorXd& time, int axis
   return fmt::format(
       "$felt << END\n{}END\n$ours << END\n{}END\n"
       "set yrange [{:.6g}:{:.6g}]\nset ytics nomirror scale 0.4 {:.6g} offset 0.7,0\n"
-      "plot $felt using 1:2 with lines linecolor '#000000' linewidth {}, "
-      "$ours using 1:2 with lines linecolor '#d62728' linewidth {}\n",
+      "plot $felt using 1:2 with lines linecolor '#000000' linewidth {}, $ours using 1:2 with "
+      "lines linecolor '#d62728' linewidth {}\n",
       trace_data(a, time, a.felt, axis), trace_data(a, time, a.predicted, axis), s.low, s.high,
       tick(s, 5), moving ? 2.0 : 5.0, moving ? 0.9 : 1.6);
 }
@@ -282,9 +279,8 @@ PlotSize plot_size(double width_mm, double height_mm) {
 int pages_of(const std::string& pdf) {
   constexpr std::string_view kPage = "/Type /Page";
   int count = 0;
-  for (std::size_t at = pdf.find(kPage); at != std::string::npos; at = pdf.find(kPage, at + 1)) {
+  for (std::size_t at = pdf.find(kPage); at != std::string::npos; at = pdf.find(kPage, at + 1))
     if (at + kPage.size() < pdf.size() && pdf[at + kPage.size()] != 's') ++count;
-  }
   if (count == 0) throw std::runtime_error("weasyprint failed: its PDF has no page");
   return count;
 }
@@ -423,17 +419,15 @@ void write_together(const std::vector<NamedText>& files, bool replace) {
     // As if nothing had been.
     for (const Arrival& arrival : arrivals) {
       if (!arrival.temporary.empty()) ::unlink(arrival.temporary.c_str());
-      if (!arrival.old.empty()) {
+      if (!arrival.old.empty())
         ::rename(arrival.old.c_str(), arrival.path.c_str());
-      } else if (arrival.named) {
+      else if (arrival.named)
         ::unlink(arrival.path.c_str());
-      }
     }
     throw;
   }
-  for (const Arrival& arrival : arrivals) {
+  for (const Arrival& arrival : arrivals)
     if (!arrival.old.empty()) ::unlink(arrival.old.c_str());
-  }
 }
 
 }  // namespace tagwrench

@@ -176,13 +176,12 @@ InSituFinding judge_zero(const AtRest& rest) {
     finding.amount = share;
     finding.axis = i;
   }
-  if (!rest.held || !known) {
+  if (!rest.held || !known)
     finding.fault = Fault::not_known;
-  } else if (std::abs(finding.amount) > kRestElsewhere) {
+  else if (std::abs(finding.amount) > kRestElsewhere)
     finding.fault = Fault::rest_elsewhere;
-  } else if (std::abs(finding.amount) > kZeroOff) {
+  else if (std::abs(finding.amount) > kZeroOff)
     finding.fault = Fault::zero_drifted;
-  }
   return finding;
 }
 
@@ -249,11 +248,10 @@ InSituFinding judge(const ProofLoad& load) {
 InSituFinding judge(const ReferenceMonitor& monitor) {
   InSituFinding finding{
       .subject = Subject::scale, .amount = monitor.scale(), .sigma = monitor.scale_sigma()};
-  if (!(finding.sigma < kScaleOff / kSigmas)) {
+  if (!(finding.sigma < kScaleOff / kSigmas))
     finding.fault = Fault::not_known;
-  } else if (scale_is_off(finding.amount, finding.sigma)) {
+  else if (scale_is_off(finding.amount, finding.sigma))
     finding.fault = Fault::scale_wrong;
-  }
   return finding;
 }
 

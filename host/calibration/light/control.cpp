@@ -79,9 +79,8 @@ Histogram tag_histogram(const ImageView& image, bool mirrored, const FoundTag& t
   if (x1 < x0 || y1 < y0) return histogram;
   for (int y = clamped(y0, image.height); y <= clamped(y1, image.height); ++y) {
     const std::uint8_t* row = image.pixels + static_cast<std::ptrdiff_t>(y) * image.stride;
-    for (int x = clamped(x0, image.width); x <= clamped(x1, image.width); ++x) {
+    for (int x = clamped(x0, image.width); x <= clamped(x1, image.width); ++x)
       if (within(tag.corners_px, x, y)) histogram.add(row[mirrored ? image.width - 1 - x : x]);
-    }
   }
   return histogram;
 }

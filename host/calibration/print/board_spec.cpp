@@ -20,7 +20,7 @@ constexpr const char* kForm =
     "charuco:9x6:1.2mm:0.9mm:aruco_4x4_50, or checkerboard:COLUMNSxROWS:SQUAREmm";
 
 [[noreturn]] void refuse(std::string_view text, const std::string& why) {
-  throw ConfigError(fmt::format("board '{}': {}", text, why));
+  throw ConfigError("board '{}': {}", text, why);
 }
 
 /// "1.2mm" in metres.
@@ -65,13 +65,12 @@ void check(const BoardSpec& board) {
 BoardSpec parse_board(std::string_view text) {
   const std::vector<std::string_view> parts = split(text, ':');
   BoardSpec board;
-  if (parts[0] == "charuco" && parts.size() == 5) {
+  if (parts[0] == "charuco" && parts.size() == 5)
     board.kind = BoardKind::charuco;
-  } else if (parts[0] == "checkerboard" && parts.size() == 3) {
+  else if (parts[0] == "checkerboard" && parts.size() == 3)
     board.kind = BoardKind::checkerboard;
-  } else {
+  else
     refuse(text, kForm);
-  }
   const std::vector<std::string_view> squares = split(parts[1], 'x');
   const std::optional<int> columns = parse_whole<int>(squares[0]);
   const std::optional<int> rows = squares.size() == 2 ? parse_whole<int>(squares[1]) : std::nullopt;

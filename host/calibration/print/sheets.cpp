@@ -193,27 +193,25 @@ void fill(const Paper& paper, PagePoint room, int count,
           const std::function<void(int, PagePoint)>& place) {
   const Rectangle free = content(paper);
   const int columns = capacity(paper, room)[0];
-  for (int i = 0; i < count; ++i) {
+  for (int i = 0; i < count; ++i)
     place(i, {free.left_mm + (i % columns) * room.x_mm, free.top_mm + (i / columns) * room.y_mm});
-  }
 }
 
 void check_copies(int copies) {
-  if (copies < 1) throw ConfigError(fmt::format("--copies: {} is too few; use 1 or more", copies));
+  if (copies < 1) throw ConfigError("--copies: {} is too few; use 1 or more", copies);
 }
 
 // Throws unless `count` items of this room fit.
 void check_fit(const Paper& paper, PagePoint room, long count, const std::string& what) {
   const auto [columns, rows] = capacity(paper, room);
   if (columns < 1 || rows < 1) {
-    throw ConfigError(
-        fmt::format("{} does not fit on {}: {:.1f} x {:.1f} mm with its marks; make it smaller",
-                    what, paper.name, room.x_mm, room.y_mm));
+    throw ConfigError("{} does not fit on {}: {:.1f} x {:.1f} mm with its marks; make it smaller",
+                      what, paper.name, room.x_mm, room.y_mm);
   }
   const long places = static_cast<long>(columns) * rows;
   if (count > places) {
-    throw ConfigError(fmt::format("--copies: {} times {} do not fit on {}, {} do; print fewer",
-                                  count, what, paper.name, places));
+    throw ConfigError("--copies: {} times {} do not fit on {}, {} do; print fewer", count, what,
+                      paper.name, places);
   }
 }
 
@@ -372,21 +370,15 @@ double cell_mm(const BoardSpec& board) {
 Drawing tag_sheet(const Paper& paper, const TagSheet& sheet) {
   const int ids = id_count(sheet.family);
   if (sheet.ids.empty()) throw ConfigError("--ids: is empty; list at least one tag id");
-  for (const int id : sheet.ids) {
-    if (id < 0 || id >= ids) {
-      throw ConfigError(
-          fmt::format("--ids: id {} is not in {}; use 0 to {}", id, name(sheet.family), ids - 1));
-    }
-  }
+  for (const int id : sheet.ids)
+    if (id < 0 || id >= ids)
+      throw ConfigError("--ids: id {} is not in {}; use 0 to {}", id, name(sheet.family), ids - 1);
   if (!(sheet.size_mm >= kMin_mm && sheet.size_mm <= kMax_mm)) {
-    throw ConfigError(
-        fmt::format("--size-mm: {} is no size; use the edge of the black square in mm, {} to {}",
-                    sheet.size_mm, kMin_mm, kMax_mm));
+    throw ConfigError("--size-mm: {} is no size; use the edge of the black square in mm, {} to {}",
+                      sheet.size_mm, kMin_mm, kMax_mm);
   }
-  if (!(sheet.border_mm >= 0 && sheet.border_mm <= kMax_mm)) {
-    throw ConfigError(
-        fmt::format("--border-mm: {} is no border; use 0 mm or more", sheet.border_mm));
-  }
+  if (!(sheet.border_mm >= 0 && sheet.border_mm <= kMax_mm))
+    throw ConfigError("--border-mm: {} is no border; use 0 mm or more", sheet.border_mm);
   check_copies(sheet.copies);
   const auto item = [&sheet](int id) {
     return Item{sheet.size_mm,
@@ -476,10 +468,8 @@ Drawing published_sheet(const Paper& paper) {
 void write_vector_file(const Drawing& drawing, const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (ending != ".pdf" && ending != ".svg") {
-    throw ConfigError(
-        fmt::format("--out {}: is neither a .pdf nor an .svg; name it so", path.string()));
-  }
+  if (ending != ".pdf" && ending != ".svg")
+    throw ConfigError("--out {}: is neither a .pdf nor an .svg; name it so", path.string());
   check_replaceable(path);
   write_atomically(path, render(drawing, ending == ".pdf"));
 }

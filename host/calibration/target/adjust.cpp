@@ -87,10 +87,9 @@ PrintScatter print_scatter(const std::vector<EdgeTag>& printed,
     }
   }
   double alike = 1;
-  for (std::size_t lag = 1; lag <= kLags; ++lag) {
+  for (std::size_t lag = 1; lag <= kLags; ++lag)
     if (counts[lag] > 0)
       alike += 2 * std::max(0.0, sums[lag] / counts[lag]) / (sums[0] / counts[0]);
-  }
   out.effective = out.robust * std::sqrt(alike);
   return out;
 }
@@ -180,10 +179,9 @@ EdgeTag Problem::edges(const State& state, std::size_t tag) const {
 /// How far (m, along its normal) the rolling shutter shows each point off its place.
 Eigen::VectorXd Problem::lateness(const std::vector<Observation>& seen, double readout) const {
   Eigen::VectorXd late = Eigen::VectorXd::Zero(points);
-  for (std::size_t p = 0; p < seen.size(); ++p) {
+  for (std::size_t p = 0; p < seen.size(); ++p)
     if (seen[p].valid)
       late[static_cast<Eigen::Index>(p)] = seen[p].by.readout * readout / seen[p].by.normal;
-  }
   return late;
 }
 

@@ -146,11 +146,10 @@ Keyframe cropped(const ImageView& image, const CameraModel& camera,
   auto to = frame.pixels.begin();
   for (int row = y0; row < y0 + height; ++row) {
     const std::uint8_t* from = image.pixels + static_cast<std::ptrdiff_t>(row) * image.stride;
-    if (camera.mirrored) {
+    if (camera.mirrored)
       to = std::reverse_copy(from + image.width - x0 - width, from + image.width - x0, to);
-    } else {
+    else
       to = std::copy(from + x0, from + x0 + width, to);
-    }
   }
   return frame;
 }
@@ -167,9 +166,8 @@ void KeyframeSet::add(Keyframe frame) {
     spacing_ *= kSpacingGrowth;
     std::vector<Keyframe> all;
     all.swap(frames_);
-    for (Keyframe& kept : all) {
+    for (Keyframe& kept : all)
       if (wants(kept.displacement)) frames_.push_back(std::move(kept));
-    }
   }
 }
 

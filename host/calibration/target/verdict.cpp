@@ -190,11 +190,10 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
   const ViewSpan span =
       view_span(record.keyframes(), midpoint_frame(record.at_rest().camera_T_tag));
   std::vector<std::string> lines;
-  lines.push_back(
-      fmt::format("{} frames at rest; then {} of {} with all tags held; {} different pictures, {} "
-                  "edge points",
-                  record.at_rest().image.frames, counts.followed, counts.moving,
-                  record.keyframes().size(), estimate.points));
+  lines.push_back(fmt::format(
+      "{} frames at rest; then {} of {} with all tags held; {} different pictures, {} edge points",
+      record.at_rest().image.frames, counts.followed, counts.moving, record.keyframes().size(),
+      estimate.points));
   lines.push_back(fmt::format(
       "excited: x {:.2f}, y {:.2f}, z {:.2f} mm; about x {:.1f}, y {:.1f}, z {:.1f} degrees; the "
       "view turned by {:.1f} and {:.1f} degrees ({:.1f} needed both ways)",
@@ -210,19 +209,19 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
       return fmt::format("{:.{}f} {:.{}f} {:.{}f}", v[from] * scale, digits, v[from + 1] * scale,
                          digits, v[from + 2] * scale, digits);
     };
-    lines.push_back(fmt::format(
-        "tag {}: position {} mm +- {} um (from the rest alone +- {}); rotation {} rad +- {} mrad "
-        "(+- {})",
-        target.tags[t].id, three(pose, 0, 1e3, 4), three(after[t], 0, 1e6, 2),
-        three(before[t], 0, 1e6, 2), three(pose, 3, 1, 5), three(after[t], 3, 1e3, 2),
-        three(before[t], 3, 1e3, 2)));
+    lines.push_back(
+        fmt::format("tag {}: position {} mm +- {} um (from the rest alone +- {}); rotation {} rad "
+                    "+- {} mrad (+- {})",
+                    target.tags[t].id, three(pose, 0, 1e3, 4), three(after[t], 0, 1e6, 2),
+                    three(before[t], 0, 1e6, 2), three(pose, 3, 1, 5), three(after[t], 3, 1e3, 2),
+                    three(before[t], 3, 1e3, 2)));
   }
   const int all = static_cast<int>(estimate.covariance.rows());
   const int better = better_known(estimate, kBetterFraction);
-  lines.push_back(fmt::format(
-      "{} of {} combinations of these are known better than from the rest; the other {} "
-      "hang on the print, whose edges scatter by {:.1f} um",
-      better, all, all - better, estimate.print_scatter * 1e6));
+  lines.push_back(
+      fmt::format("{} of {} combinations of these are known better than from the rest; the other "
+                  "{} hang on the print, whose edges scatter by {:.1f} um",
+                  better, all, all - better, estimate.print_scatter * 1e6));
   lines.push_back(fmt::format(
       "focal length: {:.2f} +- {:.2f} px fits best, sensor.yaml says {:.2f}; residual {:.3f} px",
       camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px,

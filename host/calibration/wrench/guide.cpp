@@ -233,9 +233,8 @@ void WrenchGuide::begin_taking(double time) {
   phase_ = Phase::taking;
   begun_ = time;
   taking_ = {todo_.front(), 0, {}, {}};
-  for (const ReferenceSample& sample : readings_) {
+  for (const ReferenceSample& sample : readings_)
     if (sample.time > time - kReadingsBeforeTaking) taking_.readings.push_back(sample);
-  }
 }
 
 void WrenchGuide::finish_taking() {
@@ -499,11 +498,10 @@ void WrenchGuide::watch_mass(const Hold& hold) {
   const Likeness load = likeness(felt, expected);
   if (felt.norm() < 0.2 * expected.norm()) return;  // nothing hangs yet
   if (load.cosine < -0.5) {
-    complain(
-        fmt::format("it pulls the opposite way ({}): gravity or the point of the plan is other "
-                    "than how it hangs",
-                    axes_text(felt)),
-        true);
+    complain(fmt::format("it pulls the opposite way ({}): gravity or the point of the plan is "
+                         "other than how it hangs",
+                         axes_text(felt)),
+             true);
   } else if (load.cosine < 0.6) {
     complain(fmt::format("it pulls elsewhere ({}) than the plan says ({}): gravity or the point of "
                          "the plan is other than how it hangs",
@@ -520,10 +518,9 @@ void WrenchGuide::watch_mass(const Hold& hold) {
 
 void WrenchGuide::accept_hold() {
   StepRecord record{todo_.front(), 0, hold_.frames(), {}};
-  for (const ReferenceSample& sample : readings_) {
+  for (const ReferenceSample& sample : readings_)
     if (sample.time >= record.frames.front().time && sample.time <= record.frames.back().time)
       record.readings.push_back(sample);
-  }
   accept(std::move(record));
 }
 

@@ -420,10 +420,9 @@ void add_predictions(const WrenchPlan& plan, const WrenchFit& fit, WrenchData& d
     const bool push = kind == StepKind::push;
     const double reach = push ? kPushWindow : 0;
     std::vector<Eigen::Index> rows;
-    for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index i = 0; i < n; ++i)
       if (trial.step[i] == o.step && (hold || std::abs(trial.time[i] - o.time) <= reach))
         rows.push_back(i);
-    }
     if (rows.empty()) continue;
     if (push) {
       predict_push(fit.model.K, felt, o.time, rows, held, trial);

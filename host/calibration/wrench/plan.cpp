@@ -71,9 +71,8 @@ std::vector<PlanPoint> read_points(YamlReader& root) {
   for (YamlReader& node : root.children("points")) {
     PlanPoint point;
     point.name = node.text("name");
-    for (const PlanPoint& other : points) {
+    for (const PlanPoint& other : points)
       if (other.name == point.name) node.fail("name", "another point is called so already");
-    }
     point.position = vector3(node.numbers("position_mm", 3)) * kMilli;
     if (point.position.norm() > 1)
       node.fail("position_mm", "lies more than a metre away; it is in mm from the tags' midpoint");
@@ -201,9 +200,8 @@ std::string plan_text(const std::string& name_or_file) {
     file.open(name_or_file, std::ios::binary);
   std::ostringstream text;
   if (!file.is_open() || !(text << file.rdbuf())) {
-    throw ConfigError(
-        fmt::format("--plan {}: neither a ready-made plan ({}) nor a file that can be read",
-                    name_or_file, names));
+    throw ConfigError("--plan {}: neither a ready-made plan ({}) nor a file that can be read",
+                      name_or_file, names);
   }
   return text.str();
 }

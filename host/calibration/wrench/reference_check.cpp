@@ -37,9 +37,8 @@ double agreement(const Eigen::MatrixXd& said, const Eigen::MatrixXd& expected,
   int axes = 0;
   for (int axis = 0; axis < 6; ++axis) {
     std::vector<Eigen::Index> rows;
-    for (Eigen::Index i = 0; i < said.rows(); ++i) {
+    for (Eigen::Index i = 0; i < said.rows(); ++i)
       if (std::isfinite(said(i, axis))) rows.push_back(i);
-    }
     const Eigen::VectorXd a = said(rows, axis);
     const Eigen::VectorXd b = expected(rows, axis);
     if (rows.size() < 10 || deviation(a) < kStill * range[axis]) continue;
@@ -107,10 +106,9 @@ ReferenceFinding check_reference(const WrenchPlan& plan, const StepRecord& recor
   segment.reference = reference_wrenches(plan, record, rest);
   const study::Lag lag = study::estimate_lag({&segment, 1});
   if (!lag.known || lag.explained < kNoRelation)
-    return {
-        Verdict::again,
-        "what the reference says has nothing to do with how the platform moves, at no lag: is it "
-        "the instrument that this sensor is pushed with, and on this clock?"};
+    return {Verdict::again,
+            "what the reference says has nothing to do with how the platform moves, at no lag: is "
+            "it the instrument that this sensor is pushed with, and on this clock?"};
   const Eigen::MatrixXd said =
       study::reference_at(segment.time, lag.value, segment.reference_time, segment.reference, 0.1);
   if (agreement(said, segment.features, range) < kOpposite)

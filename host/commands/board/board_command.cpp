@@ -55,10 +55,9 @@ void board_command(command_line::Command program) {
   const auto add = [&](const char* name, const char* what, int (*run)(const BoardOptions&)) {
     auto verb = family.add_subcommand(name, what);
     if (run != board_optoforce)
-      verb.add_option(
-          "--port", o.port,
-          "path (best one of /dev/serial/by-id) or usb:VENDOR:PRODUCT[:SERIAL]; without "
-          "it the only USB serial port");
+      verb.add_option("--port", o.port,
+                      "path (best one of /dev/serial/by-id) or usb:VENDOR:PRODUCT[:SERIAL]; "
+                      "without it the only USB serial port");
     verb.runs([shared, run] { return run(*shared); });
     return verb;
   };
@@ -110,10 +109,9 @@ void board_command(command_line::Command program) {
 
   optoforce.add_option("--port", o.port, "its serial port").required();
   optoforce
-      .add_option(
-          "--counts-per-unit", o.counts_per_unit,
-          "from its data sheet: counts per N of Fx,Fy,Fz, then per N m of Tx,Ty,Tz where it "
-          "has them")
+      .add_option("--counts-per-unit", o.counts_per_unit,
+                  "from its data sheet: counts per N of Fx,Fy,Fz, then per N m of Tx,Ty,Tz where "
+                  "it has them")
       .required()
       .delimiter(',');
   optoforce.add_option("--rate", o.force_rate, "Hz: 1000, 333, 100, 30 or 10");

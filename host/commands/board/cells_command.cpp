@@ -172,19 +172,17 @@ int board_calibrate_cell(const BoardOptions& options) {
     const Key key = wait_for_key(loop);
     if (key == Key::stopped) return stopped_unchanged();
     if (key == Key::ended)
-      throw ConfigError(fmt::format(
-          "calibrate-cell: standard input ended before {:g} kg; one line per mass is needed",
-          mass));
+      throw ConfigError(
+          "calibrate-cell: standard input ended before {:g} kg; one line per mass is needed", mass);
     const auto mean = measure(loop, options);
     if (!mean) return stopped_unchanged();
     if (mean->saturated) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "calibrate-cell: load cell {} is at the end of its amplifier's range under {:g} kg; take "
           "a smaller mass, a smaller gain (--input a64), or check its wires",
-          options.channel, mass));
+          options.channel, mass);
     }
-    log_info(
-        fmt::format("{:g} kg: {:.1f} counts, each +- {:.1f}", mass, mean->mean, mean->deviation()));
+    log_info("{:g} kg: {:.1f} counts, each +- {:.1f}", mass, mean->mean, mean->deviation());
     points.push_back({mass, mean->mean, mean->deviation() / std::sqrt(mean->count)});
     variance += mean->deviation() * mean->deviation();
   }
@@ -212,12 +210,11 @@ int board_tare(const BoardOptions& options) {
   link::CellCalibrations cells = load_cells(options, loop.session());
   std::uint8_t mask = 0;
   std::string left_out;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
+  for (std::size_t i = 0; i < cells.size(); ++i)
     if (cells[i].calibrated)
       mask |= static_cast<std::uint8_t>(1u << i);
     else if (i < loop.session().capabilities().cells)
       left_out += fmt::format("{}{}", left_out.empty() ? "" : ", ", i);
-  }
   if (mask == 0) {
     throw ConfigError(
         "board tare: no load cell of this board is calibrated; run `tagwrench board "
@@ -232,9 +229,9 @@ int board_tare(const BoardOptions& options) {
     const double scale = std::abs(cell.newtons_per_count);
     if (result.spread_counts > kMaxSpread * std::max(cell.noise_counts, kMinNoise_counts)) {
       log_info(
-          fmt::format("load cell {} moved while it was tared ({:.2g} N from end to end); let it "
-                      "rest, then try again",
-                      result.channel, result.spread_counts * scale));
+          "load cell {} moved while it was tared ({:.2g} N from end to end); let it rest, then try "
+          "again",
+          result.channel, result.spread_counts * scale);
       return 1;
     }
     report += fmt::format("cell {}: zero moved by {:+.4f} N\n", result.channel,
@@ -245,7 +242,7 @@ int board_tare(const BoardOptions& options) {
     cell.zero_scale_covariance_n = 0;  // measured apart from the scale
   }
   link::save_cells(path, link::id_text(loop.session().hello().unique_id), cells);
-  if (!left_out.empty()) log_info(fmt::format("left out, not calibrated: load cell {}", left_out));
+  if (!left_out.empty()) log_info("left out, not calibrated: load cell {}", left_out);
   print_data(fmt::format("{}kept in {}\n", report, path));
   return 0;
 }

@@ -43,9 +43,9 @@ std::string find_image() {
     if (fs::exists(folder / kImageName, error)) return (folder / kImageName).string();
     looked += (looked.empty() ? "" : ", ") + folder.string();
   }
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "board flash: no {} in {}; run `./run firmware` in the clone, or give --image FILE",
-      kImageName, looked));
+      kImageName, looked);
 }
 
 enum class HexRecord : std::uint8_t { wrong, data, end };
@@ -73,7 +73,7 @@ HexRecord hex_record(std::string_view line) {
 void check_image(const std::string& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error))
-    throw ConfigError(fmt::format("{}: there is no such file; give --image FILE.hex", path));
+    throw ConfigError("{}: there is no such file; give --image FILE.hex", path);
   std::ifstream in(path);
   HexRecord last = HexRecord::wrong;
   if (fs::file_size(path, error) <= kMaxImageBytes) {
@@ -83,9 +83,9 @@ void check_image(const std::string& path) {
     }
   }
   if (last != HexRecord::end)
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: not an Intel HEX file of an ATmega328P, or not a whole one; give --image FILE.hex",
-        path));
+        path);
 }
 
 std::string flash_port(const BoardOptions& options) {
@@ -128,8 +128,8 @@ int run_program(std::vector<std::string> arguments) {
   if (failed == ENOENT)
     throw ConfigError("board flash: avrdude is not installed; `sudo apt install avrdude`");
   if (failed != 0)
-    throw ConfigError(fmt::format("board flash: avrdude cannot be started: {}; try again",
-                                  std::strerror(failed)));
+    throw ConfigError("board flash: avrdude cannot be started: {}; try again",
+                      std::strerror(failed));
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
@@ -148,26 +148,26 @@ int board_flash(const BoardOptions& options) {
     return 0;
   }
   { const link::SerialPort free(port, link::kBaud); }  // or it says what is the matter
-  log_info(fmt::format("running {}", fmt::join(arguments, " ")));
+  log_info("running {}", fmt::join(arguments, " "));
   if (const int status = run_program(arguments); status != 0) {
-    log_info(fmt::format(
+    log_info(
         "board flash: avrdude failed ({}); is it a {} with an ATmega328P? A Nano with the old boot "
         "loader is --board nano-old",
-        status, options.model));
+        status, options.model);
     return 1;
   }
   BoardLoop loop(port, session_options(options));
   if (!loop.connect()) return 0;
   const link::Hello& hello = loop.session().hello();
   if (options.image.empty() && std::string(hello.firmware) != TAGWRENCH_VERSION) {
-    log_info(fmt::format(
+    log_info(
         "board flash: the board says firmware {} after {} was written; check the image and try "
         "again",
-        hello.firmware, TAGWRENCH_VERSION));
+        hello.firmware, TAGWRENCH_VERSION);
     return 1;
   }
-  log_info(fmt::format("the board answers: {}, firmware {}, protocol {}.{}", hello.board,
-                       hello.firmware, hello.protocol_major, hello.protocol_minor));
+  log_info("the board answers: {}, firmware {}, protocol {}.{}", hello.board, hello.firmware,
+           hello.protocol_major, hello.protocol_minor);
   return 0;
 }
 

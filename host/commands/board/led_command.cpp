@@ -19,10 +19,10 @@ using std::chrono::milliseconds;
 [[noreturn]] void not_a_light(const BoardOptions& options) {
   std::string words;
   for (const std::string& word : options.light) words += (words.empty() ? "" : " ") + word;
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "board led '{}': not a light; use off, LEVEL% (0 to 100), strobe PERIOD_US WIDTH_US "
       "[PHASE_US] or pattern [BIT_US [SEED]]",
-      words));
+      words);
 }
 
 struct Light {
@@ -66,8 +66,8 @@ void check_limits(const link::Led& led, const link::Capabilities& can) {
   const auto check = [](const char* what, std::uint32_t value, std::uint32_t least,
                         std::uint32_t most, const std::string& condition = {}) {
     if (value < least || value > most)
-      throw ConfigError(fmt::format("{} {} us: this board does {} to {} us{}", what, value, least,
-                                    most, condition));
+      throw ConfigError("{} {} us: this board does {} to {} us{}", what, value, least, most,
+                        condition);
   };
   const bool strobe = led.mode == link::LedMode::strobe;
   check(strobe ? "period" : "bit", led.period_us, can.strobe_period_min_us,

@@ -73,8 +73,8 @@ class ForceWatch {
     if (nothing() && !stopped_) return say_nothing();
     const auto& counters = sensor_.counters();
     if (counters.lost_frames > 0 || counters.interruptions > 0)
-      log_info(fmt::format("{} samples were lost, {} times bytes came that belong to none",
-                           counters.lost_frames, counters.interruptions));
+      log_info("{} samples were lost, {} times bytes came that belong to none",
+               counters.lost_frames, counters.interruptions);
     if (!good) log_info(out_.failure());
     return good ? 0 : 1;
   }
@@ -101,20 +101,19 @@ class ForceWatch {
   void watch_port() {
     if (sensor_.plugged() != plugged_) {
       plugged_ = sensor_.plugged();
-      log_info(options_.port + (plugged_ ? ": the port is back"
-                                         : ": the port is gone; plug it in "
-                                           "again, this program waits"));
+      log_info(options_.port + (plugged_
+                                    ? ": the port is back"
+                                    : ": the port is gone; plug it in again, this program waits"));
     }
   }
 
   int say_nothing() const {
     const std::uint64_t bytes = sensor_.counters().skipped_bytes;
-    log_info(
-        bytes == 0
-            ? fmt::format("{}: nothing comes; is this the sensor's port?", options_.port)
-            : fmt::format("{}: {} bytes came, but no frame of an OptoForce sensor; is this its "
-                          "port?",
-                          options_.port, bytes));
+    log_info(bytes == 0
+                 ? fmt::format("{}: nothing comes; is this the sensor's port?", options_.port)
+                 : fmt::format(
+                       "{}: {} bytes came, but no frame of an OptoForce sensor; is this its port?",
+                       options_.port, bytes));
     return 1;
   }
 

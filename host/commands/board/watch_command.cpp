@@ -120,23 +120,20 @@ class BoardView {
       const Cell& cell = cells_[i];
       const link::FaultCode fault = loop.cell_fault(i);
       out += "  ";
-      if (fault == link::FaultCode::cell_stuck) {
+      if (fault == link::FaultCode::cell_stuck)
         out += fmt::format("cell {} is stuck", i);
-      } else if (!cell.seen || fault == link::FaultCode::cell_silent) {
+      else if (!cell.seen || fault == link::FaultCode::cell_silent)
         out += fmt::format("cell {} is not wired", i);
-      } else if (cell.reading.time.time < stale) {
+      else if (cell.reading.time.time < stale)
         out += fmt::format("cell {} is silent", i);
-      } else {
+      else
         out += cell_text(i, cell.reading, calibrations[i]);
-      }
       if (cell.lost > 0) out += fmt::format(" ({} lost)", cell.lost);
     }
-    for (std::size_t i = 0; i < adc_.size(); ++i) {
+    for (std::size_t i = 0; i < adc_.size(); ++i)
       if (adc_[i] >= 0) out += fmt::format("  adc {} {}", i, adc_[i]);
-    }
-    for (std::size_t i = 0; i < pressed_.size(); ++i) {
+    for (std::size_t i = 0; i < pressed_.size(); ++i)
       if (button_seen_[i]) out += fmt::format("  button {} {}", i, pressed_[i] ? "down" : "up");
-    }
     return out + "\n";
   }
 
@@ -170,7 +167,7 @@ class Watch {
     drop_samples();
     load_calibrations();
     if (style_ == Style::csv && !options_.seconds)
-      log_info(fmt::format("writing to {}; Ctrl-C ends it", place()));
+      log_info("writing to {}; Ctrl-C ends it", place());
     const TimePoint begin = clock_now();
     const TimePoint end =
         options_.seconds ? begin + in_seconds(*options_.seconds) : TimePoint::max();
@@ -182,7 +179,7 @@ class Watch {
       if (good && style_ == Style::people && clock_now() >= next_line_) good = write_view();
     }
     if (good && style_ == Style::csv)
-      log_info(fmt::format("{} samples and events written to {}", samples_, place()));
+      log_info("{} samples and events written to {}", samples_, place());
     say_losses();
     if (!good) log_info(out_.failure());
     return good ? 0 : 1;
@@ -222,9 +219,8 @@ class Watch {
     }
     for (link::AdcReading r; good && session.next(r);) good = take(r);
     for (link::ButtonReading r; good && session.next(r);) good = take(r);
-    for (link::FaultReading r; good && session.next(r);) {
+    for (link::FaultReading r; good && session.next(r);)
       good = write_sample([&] { return json_line(r); }, [&] { return csv_line(r); });
-    }
     return good && flush();
   }
 
@@ -265,8 +261,7 @@ class Watch {
     const std::uint64_t lost =
         counters.lost_conversions + loop_.session().overwritten() - overwritten_before_;
     if (lost > 0 || counters.damaged_frames > 0)
-      log_info(fmt::format("{} samples were lost, {} frames came damaged", lost,
-                           counters.damaged_frames));
+      log_info("{} samples were lost, {} frames came damaged", lost, counters.damaged_frames);
   }
 
   const BoardOptions& options_;

@@ -37,8 +37,7 @@ double seconds(TimePoint time) {
 }
 
 [[noreturn]] void damaged(const record::RecordingReader& recording, const std::string& what) {
-  throw ConfigError(
-      fmt::format("recording:{}: {}; calibrate anew", recording.path().string(), what));
+  throw ConfigError("recording:{}: {}; calibrate anew", recording.path().string(), what);
 }
 
 /// A reading with the number that orders it among the marks.
@@ -95,10 +94,9 @@ void track_frames(Input& input, const std::vector<AcceptedStep>& steps,
     source.want(track.wanted);
     if (track.status != Status::ok) continue;
     const TimePoint time = frame.capture_time;
-    for (std::size_t i = 0; i < steps.size(); ++i) {
+    for (std::size_t i = 0; i < steps.size(); ++i)
       if (time >= steps[i].from - kRounding && time <= steps[i].to + kRounding)
         records[i].frames.push_back({seconds(time), track.displacement, track.covariance});
-    }
   }
   if (const std::string bad = source.unusable(); !bad.empty()) log_info(bad);
 }
@@ -185,10 +183,10 @@ std::vector<AcceptedStep> accepted_steps(record::RecordingReader& recording,
   }
   if (!steps.empty() && steps.back().id == 0) steps.pop_back();  // cut off there
   if (steps.empty()) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "recording:{}: holds no step of a calibration; record one with `tagwrench calibrate wrench "
         "--record FILE`",
-        recording.path().string()));
+        recording.path().string());
   }
   if (!zeros_fit(steps, plan)) damaged(recording, "its loads have no rest to count from");
   return steps;

@@ -38,9 +38,9 @@ class BoardCell final : public Reference {
       throw ConfigError("stopped while waiting for the board; start again when it is plugged");
     cell_ = load_cells(options_, loop_.session())[channel_];
     if (!cell_.calibrated) {
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "{}: cell {} is not calibrated; run `tagwrench board calibrate-cell --channel {}`",
-          loop_.link().port(), channel, channel));
+          loop_.link().port(), channel, channel);
     }
     if (bench != nullptr) hand_.emplace(options.emulated_cell, channel, *bench, start);
   }
@@ -194,10 +194,10 @@ EmulatedCell::EmulatedCell(const std::string& orders, int channel, const sim::Be
       start_(simulation_start),
       told_to_(bench.newest()) {
   if (orders_) return;
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "--emulated-cell {}: {}; give the pipe (mkfifo) that the emulated board has as its standard "
       "input",
-      orders, errno == ENXIO ? "nobody reads it" : std::strerror(errno)));
+      orders, errno == ENXIO ? "nobody reads it" : std::strerror(errno));
 }
 
 void EmulatedCell::follow() noexcept {
@@ -221,14 +221,14 @@ std::unique_ptr<Reference> open_reference(const WrenchPlan& plan,
   if (bench != nullptr) return simulated(plan, options, *bench, simulation_start);
   if (plan.reference == ReferenceKind::load_cell) {
     if (options.board.empty()) {
-      throw ConfigError(
-          fmt::format("--plan {}: needs a load cell; give its board with --board PORT", plan.name));
+      throw ConfigError("--plan {}: needs a load cell; give its board with --board PORT",
+                        plan.name);
     }
     return std::make_unique<BoardCell>(options, plan.cell_channel);
   }
   if (options.optoforce.empty()) {
-    throw ConfigError(fmt::format(
-        "--plan {}: needs a six-axis reference; give its port with --optoforce PORT", plan.name));
+    throw ConfigError("--plan {}: needs a six-axis reference; give its port with --optoforce PORT",
+                      plan.name);
   }
   if (options.counts_per_unit.size() != 6) {
     throw ConfigError(

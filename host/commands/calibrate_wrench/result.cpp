@@ -30,9 +30,8 @@ constexpr double kMax = 1e12;
 json frame_json(const TrackedFrame& frame) {
   json row = {frame.time};
   for (const double v : frame.displacement) row.push_back(v);
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     for (int j = 0; j <= i; ++j) row.push_back(frame.covariance(i, j));
-  }
   return row;
 }
 
@@ -80,7 +79,7 @@ class ProgressReader {
 
  private:
   [[noreturn]] void fail(const std::string& message) const {
-    throw ConfigError(fmt::format("{}: {}", path_.string(), message));
+    throw ConfigError("{}: {}", path_.string(), message);
   }
   [[noreturn]] void damaged() const {
     fail("is damaged; remove it and start anew without --resume");
@@ -110,9 +109,8 @@ class ProgressReader {
     std::size_t at = 0;
     out.time = v[at++];
     for (int i = 0; i < 6; ++i) out.displacement[i] = v[at++];
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < 6; ++i)
       for (int j = 0; j <= i; ++j) out.covariance(i, j) = out.covariance(j, i) = v[at++];
-    }
     return out;
   }
   ReferenceSample reading(const json& row) const {
@@ -150,9 +148,8 @@ std::string axis_line(int i, const AxisFit& axis, double range, double reference
   const double milli = 1e3;
   const char* name_of_axis = kWrenchAxes[static_cast<std::size_t>(i)];
   const char* unit = i < 3 ? "mN" : "mN m";
-  if (axis.state != AxisState::calibrated) {
+  if (axis.state != AxisState::calibrated)
     return fmt::format("{}    NOT calibrated, {}: {}", name_of_axis, name(axis.state), axis.reason);
-  }
   return fmt::format("{} {:9.1f} {:4} {:9.2f} {:4} {:6.2f} % {:9.2f} {:4} {:8.0f} %", name_of_axis,
                      milli * axis.largest, unit, milli * axis.held_out_rmse, unit,
                      100 * axis.held_out_rmse / range, milli * reference, unit, 100 * inside);
@@ -237,10 +234,10 @@ void check_some_axis(const WrenchFit& fit) {
     if (fit.axis[i].state == AxisState::calibrated) return;
     reasons += fmt::format("{}{} ({})", i == 0 ? "" : ", ", kWrenchAxes[i], fit.axis[i].reason);
   }
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "calibration: no axis is known from these steps: {}; the calibration in force stays; take "
       "the steps again, with --force",
-      reasons));
+      reasons);
 }
 
 std::string what_is_lost(const CalibrationFiles& files, const WrenchFit& fit) {
@@ -275,10 +272,10 @@ void write_calibration(const CalibrationFiles& files, const WrenchData& data,
     read_calibration(fresh);
   } catch (const ConfigError& unusable) {
     fs::remove(fresh, none);
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "calibration: what came of these steps cannot be used ({}); the calibration in force "
         "stays; take the steps again, with --force",
-        unusable.what()));
+        unusable.what());
   }
   if (fs::exists(files.calibration, none))
     write_atomically(files.before, read_text(files.calibration));

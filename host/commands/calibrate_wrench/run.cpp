@@ -57,9 +57,8 @@ class Telling {
   }
   void wipe() {
     constexpr std::string_view kWipe = "\r\x1b[K";
-    if (open_) {
-      [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kWipe.data(), kWipe.size());
-    }
+    if (open_) [[maybe_unused]]
+      const ssize_t written = ::write(STDERR_FILENO, kWipe.data(), kWipe.size());
     open_ = false;
   }
 
@@ -225,11 +224,10 @@ class Runner {
   void speak() {
     for (GuideLine line; guide_.next(line);) {
       const bool warning = line.kind == GuideLine::Kind::warning;
-      if (warning && run_.events->on()) {
+      if (warning && run_.events->on())
         run_.events->line("warning", line.text);
-      } else {
+      else
         say((line.kind == GuideLine::Kind::task ? "> " : "") + line.text);
-      }
     }
   }
 

@@ -28,10 +28,10 @@ fs::path resolved(const fs::path& path) {
 
 template <class Error>
 [[noreturn]] void cannot_write(const fs::path& path) {
-  throw Error(fmt::format(
-      "{}: cannot be written ({}); the old file is as it was: free some space, mend the "
-      "permissions, or name another file with --out",
-      path.string(), std::strerror(errno)));
+  throw Error(
+      fmt::format("{}: cannot be written ({}); the old file is as it was: free some space, mend "
+                  "the permissions, or name another file with --out",
+                  path.string(), std::strerror(errno)));
 }
 
 /// A temporary file that goes away unless it has been renamed.
@@ -89,21 +89,16 @@ void check_replaceable(const fs::path& path) {
   const fs::path real = resolved(path);
   std::error_code error;
   const fs::file_status status = fs::status(real, error);
-  if (fs::exists(status) && !fs::is_regular_file(status)) {
-    throw ConfigError(
-        fmt::format("{}: is not a regular file; name another file with --out", path.string()));
-  }
+  if (fs::exists(status) && !fs::is_regular_file(status))
+    throw ConfigError("{}: is not a regular file; name another file with --out", path.string());
   if (fs::exists(status) && ::access(real.c_str(), W_OK) != 0) {
-    throw ConfigError(
-        fmt::format("{}: is write-protected ({}); chmod u+w it, or name another "
-                    "file with --out",
-                    path.string(), std::strerror(errno)));
+    throw ConfigError("{}: is write-protected ({}); chmod u+w it, or name another file with --out",
+                      path.string(), std::strerror(errno));
   }
   const fs::path folder = real.has_parent_path() ? real.parent_path() : fs::path(".");
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    throw ConfigError(
-        fmt::format("{}: its folder cannot be written ({}); name another file with --out",
-                    path.string(), std::strerror(errno)));
+    throw ConfigError("{}: its folder cannot be written ({}); name another file with --out",
+                      path.string(), std::strerror(errno));
   }
 }
 
@@ -121,8 +116,8 @@ std::string read_text(const fs::path& path) {
   std::ostringstream text;
   if (!file.is_open() || !(text << file.rdbuf())) {
     throw ConfigError(
-        fmt::format("{}: cannot be read; check the path and that it is a readable, non-empty file",
-                    path.string()));
+        "{}: cannot be read; check the path and that it is a readable, non-empty file",
+        path.string());
   }
   return text.str();
 }

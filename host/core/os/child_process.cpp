@@ -58,9 +58,7 @@ void close_gap(unsigned first, unsigned last) noexcept {
   rlimit files{};  // kernels before 5.9
   getrlimit(RLIMIT_NOFILE, &files);
   const rlim_t limit = std::min<rlim_t>(files.rlim_cur, 65536);
-  for (unsigned fd = first; fd <= last && fd < limit; ++fd) {
-    ::close(static_cast<int>(fd));
-  }
+  for (unsigned fd = first; fd <= last && fd < limit; ++fd) ::close(static_cast<int>(fd));
 }
 
 }  // namespace

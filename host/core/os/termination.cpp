@@ -75,9 +75,8 @@ int borrowed_termination_fd() noexcept { return event_fd.load(); }
 bool termination_requested() noexcept { return requested.load(); }
 
 void forget_termination() noexcept {
-  for (const int signal : kSignals) {
+  for (const int signal : kSignals)
     if (!is_ignored(signal)) ::signal(signal, SIG_DFL);
-  }
 }
 
 void ignore_signals() noexcept {

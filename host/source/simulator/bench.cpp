@@ -280,9 +280,8 @@ Vector6 Bench::wrench_of(const Action& action, double time,
 
 Vector6 Bench::wrench(double time, const Vector6& displacement) noexcept {
   Vector6 sum = Vector6::Zero();
-  for (const Action& action : actions_) {
+  for (const Action& action : actions_)
     if (action.what != What::nothing) sum += wrench_of(action, time, displacement);
-  }
   remember(time, sum);
   pass(time);
   return sum;
@@ -307,9 +306,8 @@ Eigen::Vector3d Bench::slip(int tag, double time) noexcept {
 
 double Bench::cell_force(double time) const noexcept {
   double sum = 0;
-  for (const Action& action : actions_) {
+  for (const Action& action : actions_)
     if (action.what == What::push) sum += push_force(action, time);
-  }
   return sum;
 }
 

@@ -42,9 +42,8 @@ template <typename T>
 void add_all(const std::vector<T>& list, double from, double to, StaticVector<Going<T>>& into,
              Happening& h) noexcept {
   double begin = 0;
-  for (const T& what : list) {
+  for (const T& what : list)
     if (turn_at(what.when, from, to, begin)) add_going(what, begin, into, h);
-  }
 }
 
 // 0 outside of the time of a disturbance, 1 inside, smooth in between.
@@ -248,9 +247,8 @@ Spot spot(const Going<Glare>& glare, double time) noexcept {
 
 double light_factor(const Happening& happening, double time, double exposure) noexcept {
   double factor = 1;
-  for (const auto& change : happening.light) {
+  for (const auto& change : happening.light)
     factor *= 1 + (change.what.factor - 1) * strength(change, time);
-  }
   for (const auto& lamp : happening.flicker) {
     if (time < lamp.begin || time >= lamp.end()) continue;
     // The mean of a sine over a window T is the sine times sin(pi f T) / (pi f T).

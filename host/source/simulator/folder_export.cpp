@@ -106,8 +106,8 @@ std::vector<fs::path> earlier_export(const fs::path& dir) {
   std::error_code error;
   fs::create_directories(dir, error);
   if (error) {
-    throw ConfigError(fmt::format("{}: cannot be made a folder ({}): choose another --out",
-                                  dir.string(), error.message()));
+    throw ConfigError("{}: cannot be made a folder ({}): choose another --out", dir.string(),
+                      error.message());
   }
   std::vector<fs::path> found;
   bool marked = false;
@@ -116,22 +116,21 @@ std::vector<fs::path> earlier_export(const fs::path& dir) {
     const fs::path name = entry->path().filename();
     marked = marked || name == "truth.csv" || name == kPartial;
     if (!is_ours(name)) {
-      throw ConfigError(
-          fmt::format("{}: the folder already holds {}: give --out an empty or a new folder",
-                      dir.string(), name.string()));
+      throw ConfigError("{}: the folder already holds {}: give --out an empty or a new folder",
+                        dir.string(), name.string());
     }
     found.push_back(entry->path());
   }
   if (error) {
-    throw ConfigError(fmt::format("{}: cannot be read ({}): choose another --out", dir.string(),
-                                  error.message()));
+    throw ConfigError("{}: cannot be read ({}): choose another --out", dir.string(),
+                      error.message());
   }
   // Numbered pictures alone may be anybody's.
   if (!found.empty() && !marked) {
-    throw ConfigError(fmt::format(
-        "{}: the folder holds pictures that are not an earlier export: give --out an empty or "
-        "a new folder",
-        dir.string()));
+    throw ConfigError(
+        "{}: the folder holds pictures that are not an earlier export: give --out an empty or a "
+        "new folder",
+        dir.string());
   }
   return found;
 }
@@ -167,9 +166,8 @@ void write_all(const Scenario& scenario, const fs::path& partial, int frames) {
 void move_into_place(const fs::path& partial, const fs::path& dir) {
   // truth.csv first: it marks the folder as ours should the rest fail.
   fs::rename(partial / "truth.csv", dir / "truth.csv");
-  for (const auto& entry : fs::directory_iterator(partial)) {
+  for (const auto& entry : fs::directory_iterator(partial))
     fs::rename(entry.path(), dir / entry.path().filename());
-  }
   fs::remove(partial);
 }
 
@@ -215,8 +213,8 @@ std::string sensor_yaml(const Scenario& s) {
       "# The simulated sensor as its owner knows it.\n"
       "camera:\n  width: {}\n  height: {}\n  fx: {:.10g}\n  fy: {:.10g}\n  cx: {:.10g}\n"
       "  cy: {:.10g}\n  distortion: {}\n  mirrored: {}\n"
-      "target:\n  family: {}\n  tag_size_mm: {:.10g}\n  border_mm: {:.10g}\n  tags:\n{}"
-      "rest:\n  frames: {}\n"
+      "target:\n  family: {}\n  tag_size_mm: {:.10g}\n  border_mm: {:.10g}\n  tags:\n{}rest:\n  "
+      "frames: {}\n"
       "wrench:\n  springs:\n    centres_mm:\n{}    axial_n_per_mm: {:.10g}\n"
       "    lateral_n_per_mm: {:.10g}\n    bending_nm_per_rad: {:.10g}\n"
       "    torsion_nm_per_rad: {:.10g}\n  range_n: {}\n  range_nm: {}\n",
@@ -228,9 +226,8 @@ std::string sensor_yaml(const Scenario& s) {
 }
 
 void export_folder(const Scenario& scenario, const fs::path& dir, int frames) {
-  if (frames < 1 || frames > kMaxFrames) {
-    throw ConfigError(fmt::format("--frames: must lie between 1 and {}", kMaxFrames));
-  }
+  if (frames < 1 || frames > kMaxFrames)
+    throw ConfigError("--frames: must lie between 1 and {}", kMaxFrames);
   const std::string wrong = problem(scenario);
   if (!wrong.empty()) throw ConfigError("scenario: " + wrong);
   const std::vector<fs::path> earlier = earlier_export(dir);

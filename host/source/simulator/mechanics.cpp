@@ -118,12 +118,10 @@ Vector6 PlatformMotion::acceleration(const State& state, const Vector6& load) co
 /// Creep goes on and sliders are dragged along, by one step.
 void PlatformMotion::relax() noexcept {
   const Vector6& now = ring_[static_cast<std::size_t>(newest_) % ring_.size()].displacement;
-  if (mechanics_.creep_share > 0) {
+  if (mechanics_.creep_share > 0)
     crept_ += kStep / mechanics_.creep_time * (mechanics_.creep_share * (now - crept_) - crept_);
-  }
-  if (mechanics_.friction > 0) {
+  if (mechanics_.friction > 0)
     slider_ = slider_.cwiseMax(now - friction_reach_).cwiseMin(now + friction_reach_);
-  }
 }
 
 void PlatformMotion::step() noexcept {

@@ -87,9 +87,8 @@ class InkCoverage {
     for (int row = rows.first; row <= rows.last; ++row) {
       const double height = strip_overlap(row, y0, y1);
       if (height <= 0) continue;
-      for (int column = columns.first; column <= columns.last; ++column) {
+      for (int column = columns.first; column <= columns.last; ++column)
         if (black(column, row)) area += height * strip_overlap(column, x0, x1);
-      }
     }
     return area / ((x1 - x0) * (y1 - y0));
   }
@@ -119,10 +118,8 @@ class InkCoverage {
     const Range columns = cells(column_strip);
     const Range rows = cells(row_strip);
     for (int row = std::max(rows.first, 0); row <= std::min(rows.last, cells_.across - 1); ++row) {
-      for (int c = std::max(columns.first, 0); c <= std::min(columns.last, cells_.across - 1);
-           ++c) {
+      for (int c = std::max(columns.first, 0); c <= std::min(columns.last, cells_.across - 1); ++c)
         if (cells_.is_black(c, row)) return true;
-      }
     }
     return false;
   }
@@ -173,9 +170,8 @@ int family_size(const std::string& family) {
 }
 
 TagCells tag_cells(const std::string& family, int id) {
-  if (family == kGrid) {
+  if (family == kGrid)
     return framed(kGridCells, [id](int row, int column) { return grid_is_white(id, row, column); });
-  }
   const auto dictionary = cv::aruco::getPredefinedDictionary(find_family(family)->second);
   const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
       dictionary->bytesList.rowRange(id, id + 1), dictionary->markerSize);
@@ -338,9 +334,8 @@ Texture print_plate(const Mechanics& mechanics, double half_x, double half_y, do
       double shade = kPlateReflectance + lines + gouge + 0.025 * stains(y, x) + 0.012 * grain(x, y);
       shade = draw_screw(shade, x, y, -kScrewX);
       shade = draw_screw(shade, x, y, kScrewX);
-      for (const double side_x : {-sx, sx}) {
+      for (const double side_x : {-sx, sx})
         for (const double side_y : {-sy, sy}) shade = draw_spring(shade, x, y, side_x, side_y);
-      }
       t.texels[t.index(u, v)] = {.reflectance = static_cast<float>(std::clamp(shade, 0.02, 1.0)),
                                  .coverage = 1};
     }
@@ -392,10 +387,9 @@ Texture softened(const Texture& t, double sigma_texels) {
   out.texels.assign(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height), {});
   for (float Texel::*part : {&Texel::reflectance, &Texel::coverage}) {
     std::vector<float> wide(out.texels.size());
-    for (int v = 0; v < t.height; ++v) {
+    for (int v = 0; v < t.height; ++v)
       for (int u = 0; u < t.width; ++u)
         wide[out.index(u + more, v + more)] = t.texels[t.index(u, v)].*part;
-    }
     const std::vector<float> soft =
         blurred_columns(blurred_columns(wide, out.width, weights), out.height, weights);
     for (std::size_t i = 0; i < soft.size(); ++i) out.texels[i].*part = soft[i];

@@ -178,9 +178,8 @@ void Renderer::draw_even(const View& view, int row) noexcept {
       scratch_.x[to] = x[i] + dx * (x[i + 1] - x[i - 1]) + dy * (x[i + row_step] - x[i - row_step]);
       scratch_.y[to] = y[i] + dx * (y[i + 1] - y[i - 1]) + dy * (y[i + row_step] - y[i - row_step]);
     }
-    for (int i = 0; i < view.instant_count; ++i) {
+    for (int i = 0; i < view.instant_count; ++i)
       add_samples(*view.texture, view.instants[static_cast<std::size_t>(i)], count, 0, 1);
-    }
   }
   composite(view, row, 1.0F / static_cast<float>(kEvenSamples * kEvenSamples * view.instant_count));
 }
@@ -191,9 +190,8 @@ void Renderer::composite(const View& view, int row, float weight) noexcept {
                view.left;
   const Texel* sum = scratch_.sum.data();
   const float lit = weight * view.shade;
-  for (int i = 0; i < view.right - view.left; ++i) {
+  for (int i = 0; i < view.right - view.left; ++i)
     out[i] = out[i] * (1.0F - weight * sum[i].coverage) + lit * sum[i].reflectance;
-  }
 }
 
 void Renderer::blur_rows() noexcept {
@@ -246,12 +244,11 @@ void Renderer::expose_row(int row, double time, Random& random, std::uint8_t* pi
     light[i] = std::min(std::max(noisy + 0.5F, 0.0F), 255.0F);
   }
   std::uint8_t* out = pixels + index * width;
-  if (camera_.mirrored) {
+  if (camera_.mirrored)
     for (std::size_t i = 0; i < width; ++i)
       out[width - 1 - i] = static_cast<std::uint8_t>(light[i]);
-  } else {
+  else
     for (std::size_t i = 0; i < width; ++i) out[i] = static_cast<std::uint8_t>(light[i]);
-  }
 }
 
 // px from the image centre.
@@ -260,11 +257,9 @@ Eigen::Vector2d Renderer::from_centre(double column, double row) const noexcept 
 }
 
 void Renderer::draw_occluders(double middle_time) noexcept {
-  for (const Going<Occluder>& occluder : happening_.occluders) {
-    for (int row = 0; row < camera_.height_px; ++row) {
+  for (const Going<Occluder>& occluder : happening_.occluders)
+    for (int row = 0; row < camera_.height_px; ++row)
       draw_occluder_row(occluder, row, row_time(row, middle_time));
-    }
-  }
 }
 
 // The same shape as covered().
@@ -356,9 +351,8 @@ double Renderer::contrast_at(const Eigen::Vector2d& pixel, double middle_time) c
   const double time = row_time(row, middle_time);
   const Eigen::Vector2d off = from_centre(pixel.x(), pixel.y());
   double seen = 1;
-  for (const auto& occluder : happening_.occluders) {
+  for (const auto& occluder : happening_.occluders)
     seen *= 1 - covered(occluder, off, time, exposure_.time);
-  }
   double spots = 0;
   for (const auto& going : happening_.glare) {
     const Spot s = spot(going, time);

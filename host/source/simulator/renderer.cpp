@@ -59,9 +59,8 @@ Renderer::Renderer(const Scenario& scenario)
   padded_.resize(columns + 2 * kMaxRadius);
   row_.resize(columns);
   for (auto* line : {&scratch_.x, &scratch_.y, &scratch_.u, &scratch_.v, &scratch_.reflectance,
-                     &scratch_.coverage}) {
+                     &scratch_.coverage})
     line->resize(columns + 2);
-  }
   scratch_.sum.resize(columns + 2);
   Random random(seed_, kNoiseTable);
   normals_.resize(kNormals + columns);
@@ -115,9 +114,8 @@ void Renderer::build_layers(const Scenario& scenario) {
 void Renderer::slip_tag(std::size_t tag, const Eigen::Vector3d& slip) noexcept {
   const RigidPose moved{rotation_matrix({0, 0, slip.z()}), {slip.x(), slip.y(), 0}};
   tags_[tag].platform_T_tag = glued_[tag].platform_T_tag * moved;
-  for (Layer& layer : layers_) {
+  for (Layer& layer : layers_)
     if (layer.fine && layer.tag == tag) layer.platform_T_plane = tags_[tag].platform_T_tag;
-  }
 }
 
 void Renderer::build_light() {
@@ -158,13 +156,12 @@ void Renderer::render(const PlatformMotion& motion, double middle_time, std::uin
       draw_opaque(views_.front(), row);
       for (std::size_t i = 1; i < layers_.size(); ++i) {
         if (row < views_[i].top || row >= views_[i].bottom) continue;
-        if (!layers_[i].fine) {
+        if (!layers_[i].fine)
           draw_coarse(views_[i], row);
-        } else if (exposure_.even) {
+        else if (exposure_.even)
           draw_even(views_[i], row);
-        } else {
+        else
           draw_fine(views_[i], row);
-        }
       }
     }
   }
@@ -177,9 +174,8 @@ void Renderer::render(const PlatformMotion& motion, double middle_time, std::uin
   blur_rows();
   expose_rows(middle_time);
   Random random = Random::numbered(seed_, kNoiseOffsets, sequence);
-  for (int row = 0; row < camera_.height_px; ++row) {
+  for (int row = 0; row < camera_.height_px; ++row)
     expose_row(row, row_time(row, middle_time), random, pixels);
-  }
   judge_visibility(middle_time);
 }
 
@@ -215,9 +211,8 @@ void Renderer::expose_rows(double middle_time) noexcept {
 
 const Texture& Renderer::seen(const Layer& layer) const noexcept {
   if (!layer.fine) return layer.texture;
-  for (const DirtShown& shown : happening_.dirt) {
+  for (const DirtShown& shown : happening_.dirt)
     if (shown.tag == layer.tag) return dirty_[shown.dirt];
-  }
   return layer.texture;
 }
 
@@ -228,9 +223,8 @@ void Renderer::view_band(const PlatformMotion& motion, double middle_time, int f
     return platform_pose(target_, motion.seen(time + share * exposure_.time));
   };
   instant_count_ = instants_for(pose_at(-0.5), pose_at(0), pose_at(0.5));
-  for (int i = 0; i < instant_count_; ++i) {
+  for (int i = 0; i < instant_count_; ++i)
     poses_[static_cast<std::size_t>(i)] = pose_at((i + 0.5) / instant_count_ - 0.5);
-  }
   middle_pose_ = pose_at(0);
   for (std::size_t i = 0; i < layers_.size(); ++i) view_layer(layers_[i], views_[i]);
 }
@@ -319,9 +313,8 @@ Renderer::TexelFromRay Renderer::texel_from_ray(const Layer& layer,
   const Eigen::Matrix3d h = texel_from_plane * ray_from_plane.inverse();
   const double scale = 1.0 / h.cwiseAbs().maxCoeff();
   TexelFromRay result;
-  for (int i = 0; i < 9; ++i) {
+  for (int i = 0; i < 9; ++i)
     result[static_cast<std::size_t>(i)] = static_cast<float>(scale * h(i / 3, i % 3));
-  }
   return result;
 }
 

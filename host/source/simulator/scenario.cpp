@@ -91,15 +91,14 @@ std::string outside(const std::string& prefix, const Fields& fields) {
   for (const Field& field : fields) {
     double one = 0;
     std::span<const double> values(&one, 1);
-    if (auto* number = std::get_if<double*>(&field.setting)) {
+    if (auto* number = std::get_if<double*>(&field.setting))
       one = **number;
-    } else if (auto* whole = std::get_if<int*>(&field.setting)) {
+    else if (auto* whole = std::get_if<int*>(&field.setting))
       one = **whole;
-    } else if (auto* list = std::get_if<std::span<double>>(&field.setting)) {
+    else if (auto* list = std::get_if<std::span<double>>(&field.setting))
       values = *list;
-    } else {
+    else
       continue;
-    }
     for (const double value : values) {
       const double shown = value / field.unit;
       if (shown >= field.low && shown <= field.high) continue;
@@ -436,22 +435,17 @@ std::string target_problem(const Target& t) {
       return "target.tags: id " + std::to_string(tag.id) + " does not exist in " + t.family +
              ", which has ids 0 to " + std::to_string(family_size(t.family) - 1);
     }
-    if (!ids.insert(tag.id).second) {
+    if (!ids.insert(tag.id).second)
       return "target.tags: id " + std::to_string(tag.id) + " is there twice";
-    }
-    if (!tag.position.allFinite() || !tag.rotation.allFinite()) {
+    if (!tag.position.allFinite() || !tag.rotation.allFinite())
       return "target.tags: position and rotation must be finite numbers";
-    }
   }
-  if (!t.rest_position.allFinite() || t.rest_position.z() < 2 * t.tag_size) {
+  if (!t.rest_position.allFinite() || t.rest_position.z() < 2 * t.tag_size)
     return "target.rest_position: must be in front of the lens, by two tag sizes or more";
-  }
-  if (t.border < 0 || t.border > t.tag_size) {
+  if (t.border < 0 || t.border > t.tag_size)
     return "target.border_mm must lie between 0 and the tag size";
-  }
-  if (!(t.ink_spread >= 0 && t.ink_spread < 0.02 * t.tag_size)) {
+  if (!(t.ink_spread >= 0 && t.ink_spread < 0.02 * t.tag_size))
     return "target.ink_spread_um must lie between 0 and 2 % of the tag size";
-  }
   return {};
 }
 
@@ -500,10 +494,9 @@ std::string bench_problem(BenchSettings& b, int tags) {
   if (found.empty())
     found = outside("bench.faults: ", {{"slip_tag", b.faults.slip_tag, 0, tags - 1}});
   for (const auto& [key, faults] :
-       {std::pair{"load_cell", &b.load_cell.faults}, std::pair{"six_axis", &b.six_axis.faults}}) {
+       {std::pair{"load_cell", &b.load_cell.faults}, std::pair{"six_axis", &b.six_axis.faults}})
     if (found.empty() && !(faults->silent_from <= faults->silent_to))
       found = fmt::format("bench.{}: silent_to_s must not come before silent_from_s", key);
-  }
   return found;
 }
 
@@ -544,10 +537,9 @@ std::string problem(const Scenario& scenario) {
   const int tags = static_cast<int>(s.target.tags.size());
   if (s.trajectory.axis < 0 || s.trajectory.axis > 5)
     return "trajectory.axis: must be one of the six axes";
-  for (std::size_t i = 0; i < 6; ++i) {
+  for (std::size_t i = 0; i < 6; ++i)
     if (!(std::abs(s.trajectory.amplitude[i]) <= (i < 3 ? 1e3 : 1e2)))
       return "trajectory.amplitude must lie within 1000 N and 100 N m";
-  }
   std::string found;
   for (const auto& [key, fields] : sections(s))
     if (found.empty()) found = outside(fmt::format("{}.", key), fields);

@@ -46,9 +46,9 @@ timespec to_timespec(Duration since_boot) {
 UniqueFd make_timer() {
   UniqueFd timer(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
   if (!timer) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "simulated sensor: no timer from the kernel ({}): close other programs and try again",
-        std::strerror(errno)));
+        std::strerror(errno));
   }
   return timer;
 }

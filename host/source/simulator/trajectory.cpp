@@ -134,9 +134,8 @@ Vector6 TrajectoryPlayer::steps(double time) const noexcept {
   const double phase = std::fmod(time, 12 * kEach);
   const int which = static_cast<int>(phase / kEach);
   Vector6 wrench = Vector6::Zero();
-  if (phase - which * kEach < kStepOn) {
+  if (phase - which * kEach < kStepOn)
     wrench[which / 2] = (which % 2 == 0 ? 1 : -1) * trajectory_.amplitude[which / 2];
-  }
   return wrench;
 }
 
@@ -161,9 +160,8 @@ Vector6 TrajectoryPlayer::compound(double time) const noexcept {
   Vector6 wrench;
   for (int axis = 0; axis < 6; ++axis) {
     double sum = 0;
-    for (const Tone& tone : tones_[axis]) {
+    for (const Tone& tone : tones_[axis])
       sum += tone.weight * std::sin(2 * pi * tone.frequency * time + tone.phase);
-    }
     // The tones rarely agree; without the gain the hand would seldom reach half of the amplitude.
     wrench[axis] = fade * trajectory_.amplitude[axis] * std::tanh(1.5 * sum) / std::tanh(1.5);
   }
@@ -208,9 +206,8 @@ TrajectoryPlayer::HardEvent TrajectoryPlayer::hard_event(double time) const noex
       Random::shuffled(seed_, kHardMotionOrder, number, kHardEvents.size()))];
   event.begin = period * (static_cast<double>(number) + random.uniform(0, 0.25));
   event.length = period * random.uniform(0.3, 0.65);
-  for (int axis = 0; axis < 6; ++axis) {
+  for (int axis = 0; axis < 6; ++axis)
     event.wrench[axis] = trajectory_.amplitude[axis] * random.uniform(-1, 1);
-  }
   switch (event.what) {
     case Event::sway:
       event.frequency = random.uniform(0.5, 8.0);
@@ -331,9 +328,7 @@ DeskAct DeskUse::push(Random& random) const {
   act.rise = random.uniform(0.15, 0.5);
   act.fall = random.uniform() < 0.25 ? random.uniform(5e-3, 15e-3) : random.uniform(0.12, 0.5);
   if (act.end < act.rise + act.fall) act.rise = act.fall = 0.5 * act.end;
-  if (random.uniform() < 0.3) {
-    act.turned = size * direction(random).cwiseProduct(amplitude_);
-  }
+  if (random.uniform() < 0.3) act.turned = size * direction(random).cwiseProduct(amplitude_);
   if (random.uniform() < 0.05) add_knock(act, random);
   return act;
 }
@@ -437,9 +432,8 @@ Eigen::Vector3d DeskUse::gravity_change(double time) noexcept {
 
 Vector6 DeskUse::rest_change(double time) noexcept {
   Vector6 sum = Vector6::Zero();
-  for (const Wander& w : wander_) {
+  for (const Wander& w : wander_)
     sum += (std::sin(2 * pi * w.hz * time + w.phase) - std::sin(w.phase)) * w.displacement;
-  }
   return sum;
 }
 

@@ -53,9 +53,8 @@ void copy_times(const CameraTimingInput& input, const CameraTimingFit& fit,
     frame.timed = p.good && p.alone && p.sigma < kTellsTime * input.bit && p.margin > kClear;
     frame.freshness = !p.alone ? Freshness::stale : p.good ? Freshness::fresh : Freshness::strange;
     if (i > 0 && frame.freshness == Freshness::fresh &&
-        fit.cost(i, fit.pictures()[i - 1].time) - fit.own_cost(i) < kClear) {
+        fit.cost(i, fit.pictures()[i - 1].time) - fit.own_cost(i) < kClear)
       frame.freshness = Freshness::undecided;
-    }
     if (frame.freshness == Freshness::strange) frame.exposed = fit.expected(i);
     result.times.push_back(frame);
   }
@@ -64,10 +63,9 @@ void copy_times(const CameraTimingInput& input, const CameraTimingFit& fit,
 /// The median of the intervals between neighbours; lost frames are fewer than others.
 double usual_interval(const std::vector<TimedFrame>& times, double fallback) {
   std::vector<double> intervals;
-  for (std::size_t i = 1; i < times.size(); ++i) {
+  for (std::size_t i = 1; i < times.size(); ++i)
     if (times[i].timed && times[i - 1].timed)
       intervals.push_back(times[i].exposed - times[i - 1].exposed);
-  }
   if (intervals.empty()) return fallback;
   std::sort(intervals.begin(), intervals.end());
   return quantile(intervals, 0.5);
@@ -175,10 +173,9 @@ void fit_rate(const CameraTimingInput& input, bool all, CameraTimingResult& resu
   }
   if (sums.n < kMinTimed) return;
   Line line;
-  for (const TimedFrame& frame : result.times) {
+  for (const TimedFrame& frame : result.times)
     if (usable(frame))
       line.add(static_cast<double>(frame.number), frame.exposed - start, weight_of(frame));
-  }
   if (!line.fit()) return;
   result.frame_rate = {
       1 / line.slope(),
@@ -455,9 +452,8 @@ void measure_global_shutter(const CameraTimingInput& input, CameraTimingFit& fit
     const bool vague = frame.freshness == Freshness::strange;
     if (vague && found.misses[i] < kOffBrightness) frame.freshness = Freshness::fresh;
     if (i > 0 && (vague || was_vague) && frame.freshness == Freshness::fresh &&
-        std::abs(found.changes[i]) < kSameBrightness) {
+        std::abs(found.changes[i]) < kSameBrightness)
       frame.freshness = Freshness::undecided;
-    }
     was_vague = vague;
     frame.exposed = found.times[i];
     frame.sigma = found.sigmas[i];

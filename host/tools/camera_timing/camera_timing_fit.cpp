@@ -453,10 +453,9 @@ void CameraTimingFit::search(std::size_t picture) noexcept {
   p.time = best.time;
   settle(picture);
   p.margin = std::numeric_limits<double>::infinity();
-  for (const Valley& valley : deepest) {
+  for (const Valley& valley : deepest)
     if (std::abs(valley.time - best.time) > kApart * input_.bit)
       p.margin = std::min(p.margin, valley.total - best.total);
-  }
 }
 
 }  // namespace tagwrench

@@ -64,9 +64,9 @@ const WebOptions& with_page(const WebOptions& options) {
   const auto page = options.pages / "flip/index.html";
   std::error_code error;
   if (!std::filesystem::is_regular_file(page, error)) {
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "--screen web: {} is not there: the pages are not built; `./run web` builds them",
-        page.string()));
+        page.string());
   }
   return options;
 }

@@ -69,9 +69,8 @@ std::optional<PatternTiming> BoardPatternLamp::timing() const {
 
 void BoardPatternLamp::service() noexcept {
   pump_();
-  if (session_.state() != link::BoardState::ready || session_.counters().restarts != restarts_) {
+  if (session_.state() != link::BoardState::ready || session_.counters().restarts != restarts_)
     trouble_ = "the board was unplugged or started anew: plug it in and start again";
-  }
   for (link::FaultReading fault; session_.next(fault);) {
     if (fault.code == link::FaultCode::led_limited)
       trouble_ = "the board dimmed its LED, which had become too warm: wait half a minute";

@@ -148,9 +148,8 @@ LightSignal::LightSignal(std::vector<double> edges) : edges_(std::move(edges)) {
   std::size_t edge = 0;
   for (std::size_t i = 0; i < edges_.size(); ++i) {
     while (edge < edges_.size() &&
-           (edges_[edge] - edges_.front()) * buckets_per_second_ < static_cast<double>(i)) {
+           (edges_[edge] - edges_.front()) * buckets_per_second_ < static_cast<double>(i))
       ++edge;
-    }
     buckets_.push_back(edge);
   }
 }

@@ -24,8 +24,8 @@ void wait_until(TimePoint when) {
 [[noreturn]] void no_screen() {
   const std::string why = SDL_GetError();
   SDL_Quit();
-  throw ConfigError(fmt::format(
-      "--screen: no window can be shown ({}): start it from a desktop, or set DISPLAY", why));
+  throw ConfigError(
+      "--screen: no window can be shown ({}): start it from a desktop, or set DISPLAY", why);
 }
 
 }  // namespace

@@ -86,8 +86,7 @@ class Checker {
     const double least = kMinWalls * p_.printing.nozzle;
     if (thickness < least) {
       say(parameter,
-          "{:.2f} mm is thinner than two lines of the {:.2f} mm nozzle; take {:.2f} mm "
-          "or more",
+          "{:.2f} mm is thinner than two lines of the {:.2f} mm nozzle; take {:.2f} mm or more",
           kToMm * thickness, kToMm * p_.printing.nozzle, kToMm * least);
     }
   }
@@ -109,60 +108,59 @@ class Checker {
     const double edge_x = std::min(p_.cover.x_to, -p_.cover.x_from);
     if (half_x + spring + p_.cover.wall > edge_x) {
       say("springs.spacing_mm",
-          "the sockets reach to x = {:.1f} mm, the cover with its wall only to {:.1f} "
-          "mm; bring the springs together or widen cover.x_mm",
+          "the sockets reach to x = {:.1f} mm, the cover with its wall only to {:.1f} mm; bring "
+          "the springs together or widen cover.x_mm",
           kToMm * (half_x + spring), kToMm * (edge_x - p_.cover.wall));
     }
     if (half_y + spring + p_.cover.wall > p_.cover.y_half) {
       say("springs.spacing_mm",
-          "the sockets reach to y = {:.1f} mm, the cover with its wall only to {:.1f} "
-          "mm; bring the springs together or widen cover.y_mm",
+          "the sockets reach to y = {:.1f} mm, the cover with its wall only to {:.1f} mm; bring "
+          "the springs together or widen cover.y_mm",
           kToMm * (half_y + spring), kToMm * (p_.cover.y_half - p_.cover.wall));
     }
     if (std::hypot(half_x, half_y) < g_.bore + spring + p_.printing.nozzle) {
       say("springs.spacing_mm",
-          "springs of {:.2f} mm stand in the way of a lens holder of {:.1f} mm; take "
-          "them {:.1f} mm from the middle at least",
+          "springs of {:.2f} mm stand in the way of a lens holder of {:.1f} mm; take them {:.1f} "
+          "mm from the middle at least",
           kToMm * p_.springs.outer_diameter, kToMm * p_.camera.lens_diameter,
           kToMm * (g_.bore + spring + p_.printing.nozzle));
     }
     const double led = std::abs(p_.light.x) - 0.5 * p_.light.width;
     if (std::abs(p_.light.y) < g_.bore && led < g_.bore + p_.printing.nozzle) {
       say("light.position_mm",
-          "the LED's seat begins {:.1f} mm from the middle, in the hole for the lens, "
-          "which ends at {:.1f} mm; move it out",
+          "the LED's seat begins {:.1f} mm from the middle, in the hole for the lens, which ends "
+          "at {:.1f} mm; move it out",
           kToMm * led, kToMm * g_.bore);
     }
     const double led_end = led + p_.light.width + p_.cover.wall;
     if (led_end > (p_.light.x < 0 ? -p_.cover.x_from : p_.cover.x_to)) {
       say("light.position_mm",
-          "the LED's seat leaves less than a wall to the cover's end; move it in by "
-          "{:.1f} mm or lengthen cover.x_mm",
+          "the LED's seat leaves less than a wall to the cover's end; move it in by {:.1f} mm or "
+          "lengthen cover.x_mm",
           kToMm * (led_end - (p_.light.x < 0 ? -p_.cover.x_from : p_.cover.x_to)));
     }
     if (p_.top.knob && p_.top.knob_diameter < knob_least()) {
       say("top.knob_mm",
-          "{:.1f} mm do not go around the cover and its travel; take "
-          "{:.1f} mm or more",
+          "{:.1f} mm do not go around the cover and its travel; take {:.1f} mm or more",
           kToMm * p_.top.knob_diameter, kToMm * knob_least());
     }
     const double lip = p_.printing.clearance;
     if (g_.plate_x + lip > std::min(-g_.inner_x_from, g_.inner_x_to)) {
       say("cover.x_mm",
-          "the plate on the springs, {:.1f} mm long, does not fit into the shield; "
-          "make the cover longer at its shorter side",
+          "the plate on the springs, {:.1f} mm long, does not fit into the shield; make the cover "
+          "longer at its shorter side",
           kToMm * 2 * g_.plate_x);
     }
     if (g_.plate_y + lip > g_.inner_y) {
       say("cover.y_mm",
-          "the plate on the springs, {:.1f} mm wide, does not fit into the shield; "
-          "make the cover wider",
+          "the plate on the springs, {:.1f} mm wide, does not fit into the shield; make the cover "
+          "wider",
           kToMm * 2 * g_.plate_y);
     }
     if (p_.stops.gap < std::max(p_.stops.x, p_.stops.y)) {
       say("stops.gap_mm",
-          "the walls are {:.1f} mm from the cover and meet it before the stop screws "
-          "do; take {:.1f} mm or more",
+          "the walls are {:.1f} mm from the cover and meet it before the stop screws do; take "
+          "{:.1f} mm or more",
           kToMm * p_.stops.gap, kToMm * std::max(p_.stops.x, p_.stops.y));
     }
     stop_slots();
@@ -177,9 +175,9 @@ class Checker {
       const double under = screw.at.z() - 0.5 * p_.stops.screw - bottom;
       if (under < least - kNothing) {
         say("stops.z_mm",
-            "the stop screws sit {:.1f} mm too low for the wall that they go through; "
-            "lengthen target.lens_distance_mm, or take less travel, a lower "
-            "cover.ledge_mm or shorter springs",
+            "the stop screws sit {:.1f} mm too low for the wall that they go through; lengthen "
+            "target.lens_distance_mm, or take less travel, a lower cover.ledge_mm or shorter "
+            "springs",
             kToMm * (least - under));
         break;
       }
@@ -192,8 +190,8 @@ class Checker {
       const double beside = std::max(0.0, std::abs(screw.at[1 - screw.along]) - across);
       if (inner < 0 || std::hypot(inner, beside) < g_.bore + least - kNothing) {
         say(back ? "stops.x_mm" : "stops.y_mm",
-            "at the end of the travel the stop screw, {:.1f} mm deep in the cover, "
-            "touches the lens; take less travel or a {} cover",
+            "at the end of the travel the stop screw, {:.1f} mm deep in the cover, touches the "
+            "lens; take less travel or a {} cover",
             kToMm * (screw.reach + travel), back ? "longer" : "wider");
         break;
       }
@@ -210,24 +208,24 @@ class Checker {
     const double solid = g_.spring_solid - 2 * p_.springs.socket;
     if (!(g_.spring_solid > 0) || g_.spring_solid >= p_.springs.free_length) {
       say("springs.wire_mm",
-          "with {:.2f} mm of wire, {:.2f} mm wide and {:.2f} N/mm the coils would be "
-          "{:.1f} mm long when closed, of {:.1f} mm in all; check the spring's numbers",
+          "with {:.2f} mm of wire, {:.2f} mm wide and {:.2f} N/mm the coils would be {:.1f} mm "
+          "long when closed, of {:.1f} mm in all; check the spring's numbers",
           kToMm * p_.springs.wire, kToMm * p_.springs.outer_diameter, p_.springs.axial / kToMm,
           kToMm * g_.spring_solid, kToMm * p_.springs.free_length);
       return;
     }
     if (least - kFromSolid < std::max(0.0, solid)) {
       say("stops.z_mm",
-          "the springs' coils close after {:.2f} mm, before the stops at {:.2f} mm; take "
-          "less travel or longer springs",
+          "the springs' coils close after {:.2f} mm, before the stops at {:.2f} mm; take less "
+          "travel or longer springs",
           kToMm * (p_.springs.free_length - g_.spring_solid - kFromSolid), kToMm * deepest());
     }
     const double sideways =
         buckling_deflection(g_.spring_clear, p_.springs.outer_diameter - p_.springs.wire);
     if (deepest() > sideways) {
       say("springs.free_length_mm",
-          "the springs give way sideways when shortened by {:.1f} mm, the stops are at "
-          "{:.1f} mm; take shorter or wider springs, or less stops.z_mm",
+          "the springs give way sideways when shortened by {:.1f} mm, the stops are at {:.1f} mm; "
+          "take shorter or wider springs, or less stops.z_mm",
           kToMm * sideways, kToMm * deepest());
     }
   }
@@ -251,15 +249,15 @@ class Checker {
         nearest = std::min(nearest, p_.target.lens_distance + tag.platform_T_tag.translation().z());
     if (nearest < p_.camera.nearest_focus) {
       say("target.lens_distance_mm",
-          "{:.1f} mm is nearer than {} focuses ({:.0f} mm); take a longer distance or "
-          "another camera",
+          "{:.1f} mm is nearer than {} focuses ({:.0f} mm); take a longer distance or another "
+          "camera",
           kToMm * nearest, p_.camera.name, kToMm * p_.camera.nearest_focus);
     }
     const double tag_px = p_.camera.image.fx_px * p_.target.tag_size / p_.target.lens_distance;
     if (tag_px < kMinTag_px) {
       say("target.tag_size_mm",
-          "tags of {:.2f} mm are {:.0f} px wide at {:.1f} mm, {:.0f} are needed; take "
-          "larger tags, a shorter target.lens_distance_mm, or a camera of more pixels",
+          "tags of {:.2f} mm are {:.0f} px wide at {:.1f} mm, {:.0f} are needed; take larger tags, "
+          "a shorter target.lens_distance_mm, or a camera of more pixels",
           kToMm * p_.target.tag_size, tag_px, kToMm * p_.target.lens_distance, kMinTag_px);
     }
     const double front = g_.lens_front;
@@ -268,8 +266,8 @@ class Checker {
       lowest = std::min(lowest, corner.z());
     if (lowest - p_.stops.z < front + 1e-3) {
       say("target.lens_distance_mm",
-          "at the end of the travel the tags are {:.1f} mm from the lens; take a longer "
-          "distance or less stops.z_mm",
+          "at the end of the travel the tags are {:.1f} mm from the lens; take a longer distance "
+          "or less stops.z_mm",
           kToMm * (lowest - p_.stops.z - front));
     }
   }
@@ -299,21 +297,19 @@ class Checker {
     }
     if (outside) {
       say("target.lens_distance_mm",
-          "at the end of the travel a tag leaves the picture by {:.0f} px; take a longer "
-          "distance, smaller target.tag_size_mm or less travel in stops",
+          "at the end of the travel a tag leaves the picture by {:.0f} px; take a longer distance, "
+          "smaller target.tag_size_mm or less travel in stops",
           most_outside);
     }
-    if (behind_spring) {
+    if (behind_spring)
       say("springs.spacing_mm", "at the end of the travel a spring hides a tag; move them apart");
-    }
     if (behind_cover) {
       say("camera.lens_diameter_mm",
           "the cover's hole for the lens cuts into the view of the tags; the lens sits too deep: "
           "lengthen target.lens_distance_mm or shorten the springs");
     }
-    if (behind_plate) {
+    if (behind_plate)
       say("top.plate_mm", "the edge of the plate's opening hides a tag at the end of the travel");
-    }
   }
 
   bool spring_between(const Vector6& d, const Eigen::Vector3d& corner) const {
@@ -351,9 +347,7 @@ class Checker {
 
   void thread(const char* parameter, double hole, double screw) {
     if (hole < screw - kNothing) return;
-    say(parameter,
-        "a hole of {:.1f} mm gives a screw of {:.1f} mm no thread; take "
-        "about {:.1f} mm",
+    say(parameter, "a hole of {:.1f} mm gives a screw of {:.1f} mm no thread; take about {:.1f} mm",
         kToMm * hole, kToMm * screw, 0.85 * kToMm * screw);
   }
 
@@ -364,8 +358,7 @@ class Checker {
     const double least = kCountersink + 2 * p_.printing.layer;
     if (p_.top.roof < least - kNothing)
       say("top.roof_mm",
-          "{:.1f} mm leave nothing under the heads of the screws; take "
-          "{:.1f} mm or more",
+          "{:.1f} mm leave nothing under the heads of the screws; take {:.1f} mm or more",
           kToMm * p_.top.roof, kToMm * least);
   }
 
@@ -375,29 +368,27 @@ class Checker {
     const double rim = g_.ledge - std::max(g_.overhang_x, g_.overhang_y) - foot;
     if (rim < kRim - kNothing) {
       say("cover.ledge_mm",
-          "the ledge slopes at 45 degrees to what the camera's board stands out, and "
-          "ends {:.1f} mm thin; make it {:.1f} mm or more",
+          "the ledge slopes at 45 degrees to what the camera's board stands out, and ends {:.1f} "
+          "mm thin; make it {:.1f} mm or more",
           kToMm * rim, kToMm * (p_.cover.ledge + kRim - rim));
     } else if (g_.bolt_length - foot < kMinBoltThread - kNothing) {
       say("cover.ledge_mm",
-          "the bolts find {:.1f} mm of thread in the cover, {:.0f} are needed; make the "
-          "ledge {:.1f} mm or more",
+          "the bolts find {:.1f} mm of thread in the cover, {:.0f} are needed; make the ledge "
+          "{:.1f} mm or more",
           std::max(0.0, kToMm * (g_.bolt_length - foot)), kToMm * kMinBoltThread,
           kToMm * (p_.cover.ledge + kMinBoltThread - (g_.bolt_length - foot)));
     }
     const double room = g_.cover_top - foot - p_.light.diffuser;
     if (p_.light.height > room)
       say("light.height_mm",
-          "{:.1f} mm do not fit under the diffuser, where there are "
-          "{:.1f} mm; take a flatter LED",
+          "{:.1f} mm do not fit under the diffuser, where there are {:.1f} mm; take a flatter LED",
           kToMm * p_.light.height, kToMm * room);
     for (const Eigen::Vector2d& at : g_.bolts) {
       const double clear = at.norm() - g_.bore - 0.5 * p_.camera.hole;
       if (clear >= p_.cover.wall - kNothing) continue;
       say("camera",
-          "a mounting hole of {} is {:.1f} mm from the hole for its lens, a "
-          "wall of {:.1f} mm is needed; check hole_spacing_mm and "
-          "lens_diameter_mm",
+          "a mounting hole of {} is {:.1f} mm from the hole for its lens, a wall of {:.1f} mm is "
+          "needed; check hole_spacing_mm and lens_diameter_mm",
           p_.camera.name, kToMm * clear, kToMm * p_.cover.wall);
       break;
     }
@@ -407,9 +398,7 @@ class Checker {
     const double foot = std::max(0.5 * p_.camera.depth, p_.cover.y_half);
     const double inside = 0.5 * p_.mount.width - kEarEdge - p_.mount.hole;
     if (inside < foot + p_.printing.clearance)
-      say("mount.width_mm",
-          "the holes in the ears are under the cover; take {:.0f} mm "
-          "or more",
+      say("mount.width_mm", "the holes in the ears are under the cover; take {:.0f} mm or more",
           std::ceil(2 * kToMm * (foot + p_.printing.clearance + kEarEdge + p_.mount.hole)));
   }
 
@@ -420,21 +409,19 @@ class Checker {
                        p_.top.knob_diameter + 2 * (kRimOutside + kBaseScrewHead + kBaseScrewInset));
     if (p_.mount.width < least - kNothing)
       say("mount.width_mm",
-          "a base of {:.0f} mm has no room for knob, screws and the "
-          "board with its plug; take {:.0f} mm or more",
+          "a base of {:.0f} mm has no room for knob, screws and the board with its plug; take "
+          "{:.0f} mm or more",
           kToMm * p_.mount.width, std::ceil(kToMm * least));
     if (p_.mount.bay_height < kBayLeast)
-      say("mount.bay_height_mm",
-          "{:.1f} mm are too low for the board; take {:.0f} mm "
-          "or more",
+      say("mount.bay_height_mm", "{:.1f} mm are too low for the board; take {:.0f} mm or more",
           kToMm * p_.mount.bay_height, kToMm * kBayLeast);
     const double radius = 0.5 * p_.mount.width - kBaseWall;
     const double most = (1 - kBoardShare) * std::numbers::pi * radius * radius *
                         std::max(0.0, p_.mount.bay_height - kBaseWall) * kWeightDensity;
     if (p_.mount.weight > most)
       say("mount.weight_g",
-          "{:.0f} g of steel do not fit beside the board, about "
-          "{:.0f} g do; take less, or a wider mount.width_mm",
+          "{:.0f} g of steel do not fit beside the board, about {:.0f} g do; take less, or a wider "
+          "mount.width_mm",
           kToMm * p_.mount.weight, kToMm * most);
   }
 
@@ -443,25 +430,25 @@ class Checker {
     const double beside = m.half_y + kCheek + p_.stops.y + 0.5 * p_.springs.outer_diameter;
     if (0.5 * p_.springs.spacing_y < beside)
       say("springs.spacing_mm",
-          "the mirror's holder needs {:.1f} mm between the springs across (y), plus "
-          "their width and travel: {:.1f} mm from axis to axis",
+          "the mirror's holder needs {:.1f} mm between the springs across (y), plus their width "
+          "and travel: {:.1f} mm from axis to axis",
           kToMm * 2 * (m.half_y + kCheek), kToMm * 2 * beside);
     const double top = m.centre.z() + (m.half_slope + kGlassAndBack) * std::sqrt(0.5);
     if (top + p_.stops.z > g_.plate_bottom)
       say("stops.z_mm",
-          "at the end of the travel the plate meets the mirror, {:.1f} mm "
-          "too high; take less travel or a smaller target.tag_size_mm",
+          "at the end of the travel the plate meets the mirror, {:.1f} mm too high; take less "
+          "travel or a smaller target.tag_size_mm",
           kToMm * (top + p_.stops.z - g_.plate_bottom));
     if (p_.cover.x_to < g_.bore + kHolderFoot)
       say("cover.x_mm",
-          "the mirror's holder stands out to x = {:.1f} mm, the cover ends "
-          "at {:.1f} mm; lengthen it",
+          "the mirror's holder stands out to x = {:.1f} mm, the cover ends at {:.1f} mm; lengthen "
+          "it",
           kToMm * (g_.bore + kHolderFoot), kToMm * p_.cover.x_to);
     const double hidden = behind_holder();
     if (hidden > kNothing)
       say("target.ridge_gap_mm",
-          "at the end of the travel the mirror's holder hides the flat tag, {:.2f} mm "
-          "too near to its line of sight; take {:.2f} mm or more, or less stops.x_mm",
+          "at the end of the travel the mirror's holder hides the flat tag, {:.2f} mm too near to "
+          "its line of sight; take {:.2f} mm or more, or less stops.x_mm",
           kToMm * hidden, kToMm * (p_.target.ridge_gap + hidden));
   }
 

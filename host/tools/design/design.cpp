@@ -103,11 +103,10 @@ void warn_of_reach(const Instrument& instrument, Design& design) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Reach& reach = design.reach[axis];
     if (reach.in_view < instrument.range) {
-      design.warnings.push_back(
-          fmt::format("tags leave the image at {:.2f} N along {}, before the range of {:g} N: the "
-                      "platform tilts as it moves; take stiffer springs, smaller tags or a longer "
-                      "way to the lens",
-                      reach.in_view, kAxes[axis], instrument.range));
+      design.warnings.push_back(fmt::format(
+          "tags leave the image at {:.2f} N along {}, before the range of {:g} N: the platform "
+          "tilts as it moves; take stiffer springs, smaller tags or a longer way to the lens",
+          reach.in_view, kAxes[axis], instrument.range));
     }
     if (reach.to_solid && *reach.to_solid < instrument.range) {
       design.warnings.push_back(
@@ -123,14 +122,14 @@ void warn_of_springs(const Instrument& instrument, Design& design) {
     const double solid = solid_length(spring);
     if (solid < spring.free_length) continue;
     const double room = spring.free_length / spring.wire - kEndCoils;
-    design.warnings.push_back(fmt::format(
-        "springs: wire of {:.2f} mm wound to {:.2f} mm takes {:.0f} coils for {:.2f} N/mm, {:.1f} "
-        "mm long when closed, but the spring is {:.1f} mm long: with room for {:.0f} at most it "
-        "has "
-        "more than {:.2f} N/mm; measure the rate, or give --coils. Bottoming out is not predicted",
-        1e3 * spring.wire, 1e3 * spring.outer_diameter, solid / spring.wire, 1e-3 * spring.rate,
-        1e3 * solid, 1e3 * spring.free_length, room,
-        1e-3 * spring.rate * active_coils(spring) / room));
+    design.warnings.push_back(
+        fmt::format("springs: wire of {:.2f} mm wound to {:.2f} mm takes {:.0f} coils for {:.2f} "
+                    "N/mm, {:.1f} mm long when closed, but the spring is {:.1f} mm long: with room "
+                    "for {:.0f} at most it has more than {:.2f} N/mm; measure the rate, or give "
+                    "--coils. Bottoming out is not predicted",
+                    1e3 * spring.wire, 1e3 * spring.outer_diameter, solid / spring.wire,
+                    1e-3 * spring.rate, 1e3 * solid, 1e3 * spring.free_length, room,
+                    1e-3 * spring.rate * active_coils(spring) / room));
     return;
   }
 }
@@ -366,9 +365,8 @@ Design design(const Instrument& instrument, const std::vector<double>& ranges) {
         "no force up to {:g} N moves the tags out of view: no table of ranges; check the stiffness",
         kFarForce));
   } else if (least > 0) {
-    for (const double range : ranges) {
+    for (const double range : ranges)
       result.rows.push_back(row(instrument, result, range, range / least));
-    }
   }
   warn_of_reach(instrument, result);
   warn_of_springs(instrument, result);

@@ -119,15 +119,13 @@ void place_screws(const Parameters& p, Geometry& g) {
 
   const bool board = p.camera.body == CameraBody::board;
   if (board) {
-    for (const double x : {-0.5, 0.5}) {
+    for (const double x : {-0.5, 0.5})
       for (const double y : {-0.5, 0.5})
         g.bolts.emplace_back(x * p.camera.hole_spacing_x, y * p.camera.hole_spacing_y);
-    }
   } else {
-    for (const double x : {p.cover.x_from + kBoltInset, p.cover.x_to - kBoltInset}) {
+    for (const double x : {p.cover.x_from + kBoltInset, p.cover.x_to - kBoltInset})
       for (const double y : {kBoltInset - p.cover.y_half, p.cover.y_half - kBoltInset})
         g.bolts.emplace_back(x, y);
-    }
   }
   // Up to where the ledge's slope, 45 degrees, ends above them.
   double room = std::min(g.ledge, (board ? g.board_top : p.mount.thickness) + kMaxThread);
@@ -233,10 +231,9 @@ Geometry geometry(const Parameters& p) {
   g.inner_y = p.cover.y_half + gap_y(p);
   g.bore = 0.5 * p.camera.lens_diameter + kBore;
   g.socket = 0.5 * p.springs.outer_diameter + p.printing.clearance;
-  for (const double x : {-0.5, 0.5}) {
+  for (const double x : {-0.5, 0.5})
     for (const double y : {-0.5, 0.5})
       g.springs.emplace_back(x * p.springs.spacing_x, y * p.springs.spacing_y);
-  }
   place_screws(p, g);
   if (g.mirror) size_mirror(p, g);
   return g;

@@ -108,10 +108,9 @@ void read_springs(YamlReader& node, hardware::SpringChoice& out) {
   out.lateral = node.has("lateral_n_per_mm") ? node.within("lateral_n_per_mm", 1e-3, 1e4) / kMm
                                              : helix * out.axial;
   const std::vector<double> spacing = node.numbers("spacing_mm", 2);
-  for (const double between : spacing) {
+  for (const double between : spacing)
     if (!(between > 0 && between <= kMax_mm))
       node.fail("spacing_mm", "the distance between spring axes must be above 0");
-  }
   out.spacing_x = kMm * spacing[0];
   out.spacing_y = kMm * spacing[1];
   out.price = node.non_negative("price_usd");
@@ -217,8 +216,7 @@ Parameters load_buildable(const std::string& path) {
   Parameters out = load_hardware(path);
   const auto complaints = hardware::complaints(out, hardware::geometry(out));
   if (complaints.empty()) return out;
-  throw ConfigError(
-      fmt::format("{}: {}: {}", path, complaints.front().parameter, complaints.front().message));
+  throw ConfigError("{}: {}: {}", path, complaints.front().parameter, complaints.front().message);
 }
 
 bool is_hardware(const std::string& path) {

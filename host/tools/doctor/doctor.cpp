@@ -50,9 +50,8 @@ std::vector<fs::path> entries(const fs::path& folder) {
 
 /// The first of these folders that has the file; empty: none.
 fs::path found_in(std::initializer_list<const char*> folders, std::string_view file) {
-  for (const char* folder : folders) {
+  for (const char* folder : folders)
     if (present(fs::path(folder) / file)) return fs::path(folder) / file;
-  }
   return {};
 }
 
@@ -98,8 +97,7 @@ void say_cameras(Report& report) {
   for (const CameraNode& node : nodes) {
     if (node.error == EACCES || node.error == EPERM) {
       report.line(Mark::missing,
-                  "camera {}: no permission; sudo usermod -aG video $USER, then log in "
-                  "again",
+                  "camera {}: no permission; sudo usermod -aG video $USER, then log in again",
                   node.path);
     } else if (node.captures) {
       any = true;
@@ -185,8 +183,7 @@ void say_hidraw(Report& report) {
       report.line(Mark::ok, "{}: a device of tagwrench, readable", node.string());
     } else {
       report.line(Mark::missing,
-                  "{}: a device of tagwrench, but not readable for programs of yours: "
-                  "{}",
+                  "{}: a device of tagwrench, but not readable for programs of yours: {}",
                   node.string(), access_advice(look_at_access(node)));
     }
   }
@@ -206,8 +203,8 @@ void say_bridges(Report& report) {
     return;
   if (starts_at_login(fs::path(config_folder()).parent_path())) {
     report.line(Mark::ok,
-                "it starts when you log in; `systemctl --user status tagwrench` and "
-                "`journalctl --user -u tagwrench` say how it fares");
+                "it starts when you log in; `systemctl --user status tagwrench` and `journalctl "
+                "--user -u tagwrench` say how it fares");
   } else {
     report.line(Mark::absent,
                 "it does not start when you log in: systemctl --user enable --now tagwrench");
@@ -239,10 +236,10 @@ void say_system_socket(Report& report, const SpnavFacts& facts) {
     case SpnavServer::silent: break;
   }
   if (facts.spacenavd) {
-    report.line(Mark::missing,
-                "spacenavd runs (pid {}) but does not answer at {}: sudo systemctl "
-                "restart spacenavd",
-                *facts.spacenavd, kSpnavSystemSocket);
+    report.line(
+        Mark::missing,
+        "spacenavd runs (pid {}) but does not answer at {}: sudo systemctl restart spacenavd",
+        *facts.spacenavd, kSpnavSystemSocket);
   } else if (facts.own != SpnavServer::tagwrench) {
     report.line(Mark::absent,
                 "spacenavd does not run; FreeCAD, Blender and others need it (sudo apt install "
@@ -292,8 +289,8 @@ void say_other_devices(Report& report) {
   if (devices.empty()) report.line(Mark::ok, "no other 6-DOF device competes for spacenavd");
   for (const InputDevice& device : devices) {
     report.line(Mark::missing,
-                "{} ({:04x}:{:04x}): spacenavd serves one device, the one plugged in "
-                "last; start tagwrench after it, or unplug it",
+                "{} ({:04x}:{:04x}): spacenavd serves one device, the one plugged in last; start "
+                "tagwrench after it, or unplug it",
                 device.name, device.vendor, device.product);
   }
 }
@@ -343,8 +340,7 @@ std::string access_advice(const NodeAccess& access) {
   if (access.member && !access.member_now)
     return "you are in group input since after you logged in: log out and in again";
   return "only who sits at this computer, logged in, may, and the group input; over ssh, or "
-         "without "
-         "a desktop: sudo usermod -aG input $USER, then log in again";
+         "without a desktop: sudo usermod -aG input $USER, then log in again";
 }
 
 NodeAccess look_at_access(const fs::path& node) {
@@ -368,10 +364,9 @@ std::vector<std::string> our_hidraw(const fs::path& folder) {
   std::vector<std::string> ours;
   for (const fs::path& entry : entries(folder)) {
     std::ifstream uevent(entry / "device/uevent");
-    for (std::string line; std::getline(uevent, line);) {
+    for (std::string line; std::getline(uevent, line);)
       if (line.starts_with("HID_NAME=") && line.find("tagwrench") != std::string::npos)
         ours.push_back(entry.filename().string());
-    }
   }
   return ours;
 }
@@ -406,9 +401,8 @@ SpnavServer server_at(const fs::path& socket) {
   std::memcpy(address.sun_path, socket.c_str(), socket.native().size());
   const UniqueFd probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!probe ||
-      ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+      ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
     return SpnavServer::silent;
-  }
   // The bridge's own socket lies beside a daemon's.
   return present(socket.string() + ".bridge") ? SpnavServer::tagwrench : SpnavServer::other;
 }
@@ -423,14 +417,14 @@ void say_spnav(Report& report, const SpnavFacts& facts) {
   if (facts.chosen_path.empty()) {
     if (own && facts.system != SpnavServer::tagwrench && facts.system != SpnavServer::other) {
       report.line(Mark::absent,
-                  "SPNAV_SOCKET is not set here, so programs use {}: put SPNAV_SOCKET={} "
-                  "into ~/.config/environment.d/tagwrench.conf and log in again",
+                  "SPNAV_SOCKET is not set here, so programs use {}: put SPNAV_SOCKET={} into "
+                  "~/.config/environment.d/tagwrench.conf and log in again",
                   kSpnavSystemSocket, facts.own_path);
     }
   } else if (facts.chosen == SpnavServer::none || facts.chosen == SpnavServer::silent) {
     report.line(Mark::missing,
-                "SPNAV_SOCKET={}: nobody answers there, so programs started from here "
-                "find no puck; run `tagwrench run --output spnav`, or unset it",
+                "SPNAV_SOCKET={}: nobody answers there, so programs started from here find no "
+                "puck; run `tagwrench run --output spnav`, or unset it",
                 facts.chosen_path);
   }
 }
@@ -451,18 +445,17 @@ std::vector<SandboxedProgram> sandboxed_programs(const std::vector<fs::path>& fl
   for (const Known& known : kKnown) {
     for (const fs::path& folder : flatpak) {
       if (!present(folder / known.application)) continue;
-      found.push_back(
-          {fmt::format("{} of flatpak", known.name),
-           fmt::format("`tagwrench run --output spnav`, and once: flatpak override --user "
-                       "--filesystem=xdg-run/tagwrench "
-                       "--env=SPNAV_SOCKET=$XDG_RUNTIME_DIR/tagwrench/spnav.sock {}",
-                       known.application)});
+      found.push_back({fmt::format("{} of flatpak", known.name),
+                       fmt::format("`tagwrench run --output spnav`, and once: flatpak override "
+                                   "--user --filesystem=xdg-run/tagwrench "
+                                   "--env=SPNAV_SOCKET=$XDG_RUNTIME_DIR/tagwrench/spnav.sock {}",
+                                   known.application)});
       break;
     }
     if (known.snap != nullptr && present(snap / known.snap)) {
-      found.push_back({fmt::format("{} of snap", known.name),
-                       "a snap may not use sockets of others: install it from Debian or as an "
-                       "AppImage"});
+      found.push_back(
+          {fmt::format("{} of snap", known.name),
+           "a snap may not use sockets of others: install it from Debian or as an AppImage"});
     }
   }
   return found;

@@ -55,9 +55,8 @@ std::vector<std::string> value_choices(const command_line::Option& option) {
     return words;
   }
   const std::string description = option.description();
-  for (const std::string_view line : split(description, '\n')) {
+  for (const std::string_view line : split(description, '\n'))
     if (line.starts_with("  ")) add_from_line(line, words);
-  }
   return words;
 }
 
@@ -84,14 +83,13 @@ constexpr std::string_view kFiles =
 std::string escaped(std::string_view text) {
   std::string out;
   if (!text.empty() && (text.front() == '.' || text.front() == '\'')) out = "\\&";
-  for (const char c : text) {
+  for (const char c : text)
     if (c == '\\')
       out += "\\e";
     else if (c == '-')
       out += "\\-";
     else
       out += c;
-  }
   return out;
 }
 
@@ -240,9 +238,8 @@ void add_values(const command_line::Option& option, const std::string& typed,
 }
 
 void add_names(const command_line::Command& verb, const std::string& typed, Completion& out) {
-  for (const command_line::Option& option : verb.options()) {
+  for (const command_line::Option& option : verb.options())
     for (const std::string& name : option.long_names()) add("--" + name, typed, out);
-  }
 }
 
 }  // namespace
@@ -268,9 +265,8 @@ Completion complete(const command_line::Command& program, const std::vector<std:
   } else if (const auto verbs = place.verb.subcommands(); !verbs.empty()) {
     for (const command_line::Command& verb : verbs) add(verb.name(), last, out);
   } else {
-    for (const command_line::Option& option : place.verb.options()) {
+    for (const command_line::Option& option : place.verb.options())
       if (option.is_positional()) add_values(option, last, profiles, out);
-    }
     if (last.empty()) add_names(place.verb, last, out);
   }
   return out;

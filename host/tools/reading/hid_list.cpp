@@ -53,10 +53,9 @@ std::string first_line(std::string_view text) { return shown(text.substr(0, text
 
 /// What follows "KEY=" in a uevent file.
 std::optional<std::string_view> value_of(std::string_view key, std::string_view uevent) {
-  for (const std::string_view line : split(uevent, '\n')) {
+  for (const std::string_view line : split(uevent, '\n'))
     if (line.size() > key.size() && line.starts_with(key) && line[key.size()] == '=')
       return line.substr(key.size() + 1);
-  }
   return std::nullopt;
 }
 
@@ -228,8 +227,7 @@ std::optional<HidNode> HidChoice::among(const std::vector<HidNode>& nodes) const
   if (rivals == 1) return fitting.front();
   std::string list;
   for (const HidNode& node : fitting) list += (list.empty() ? "" : ", ") + node.label();
-  throw ConfigError(
-      fmt::format("{} devices fit: {}; name one by its serial or path", fitting.size(), list));
+  throw ConfigError("{} devices fit: {}; name one by its serial or path", fitting.size(), list);
 }
 
 std::string HidChoice::words() const {
@@ -239,9 +237,8 @@ std::string HidChoice::words() const {
 }
 
 const PuckModel* puck_model(std::uint16_t vendor, std::uint16_t product) noexcept {
-  for (const PuckModel& model : kModels) {
+  for (const PuckModel& model : kModels)
     if (model.vendor == vendor && model.product == product) return &model;
-  }
   return nullptr;
 }
 

@@ -54,9 +54,8 @@ class Line {
     return put("{:.6f}{}{:.6f}{}{:.6f}", values[0], between, values[1], between, values[2]);
   }
   Line& counts(const PuckState& puck, const char* between) {
-    for (std::size_t i = 0; i < puck.counts.size(); ++i) {
+    for (std::size_t i = 0; i < puck.counts.size(); ++i)
       put("{}{}", i > 0 ? between : "", puck.counts[i]);
-    }
     return *this;
   }
   Line& latency(const std::optional<Duration>& value, const char* none) {
@@ -170,7 +169,7 @@ class Reader {
 
   int run() {
     if (!open() && !options_.wait) throw ConfigError(missing());
-    if (!device_) log_info(fmt::format("waiting for a {}", choice_.words()));
+    if (!device_) log_info("waiting for a {}", choice_.words());
     const TimePoint begin = clock_now();
     end_ = options_.time ? begin + *options_.time : TimePoint::max();
     while (!stopped() && clock_now() < end_ && sink_.failure().empty()) {
@@ -219,7 +218,7 @@ class Reader {
       refusal_told_ = true;
       return false;
     }
-    log_info(fmt::format("{} {}: {}", node_ ? "back," : "reading", found->label(), found->name));
+    log_info("{} {}: {}", node_ ? "back," : "reading", found->label(), found->name);
     node_ = found;
     reading_ = {};
     reading_.kind = found->kind;
@@ -298,8 +297,8 @@ class Reader {
     span_.interrupted();
     lost_ = true;
     sink_.end_line();
-    log_info(fmt::format("{}: gone: unplugged, or the bridge has ended; {}", node_->label(),
-                         options_.wait ? "waiting for it" : "--wait would wait for it"));
+    log_info("{}: gone: unplugged, or the bridge has ended; {}", node_->label(),
+             options_.wait ? "waiting for it" : "--wait would wait for it");
   }
 
   int finish(Duration time) {
@@ -427,8 +426,8 @@ std::string_view json_line(ReadingBuffer& buffer, const Reading& reading) noexce
 
 std::string_view csv_header(HidKind kind) noexcept {
   if (kind == HidKind::puck) return "host_ns,x,y,z,rx,ry,rz,buttons\n";
-  return "host_ns,seq,t_ns,status,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,sigma_fx_n,sigma_fy_n,"
-         "sigma_fz_n,sigma_mx_nm,sigma_my_nm,sigma_mz_nm,dropped,missing,latency_us\n";
+  return "host_ns,seq,t_ns,status,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,sigma_fx_n,sigma_fy_n,sigma_fz_"
+         "n,sigma_mx_nm,sigma_my_nm,sigma_mz_nm,dropped,missing,latency_us\n";
 }
 
 std::string_view csv_line(ReadingBuffer& buffer, const Reading& reading) noexcept {
@@ -451,9 +450,8 @@ std::string_view live_line(ReadingBuffer& buffer, const Reading& reading,
   Line line(buffer);
   if (reading.kind == HidKind::puck) {
     constexpr std::array<const char*, 6> kAxes = {"X", "Y", "Z", "RX", "RY", "RZ"};
-    for (std::size_t i = 0; i < kAxes.size(); ++i) {
+    for (std::size_t i = 0; i < kAxes.size(); ++i)
       line.put("{}{:+5d} ", kAxes[i], reading.puck.counts[i]);
-    }
     line.put(" buttons {:x}", reading.puck.buttons);
   } else {
     const tagwrench_sample& s = reading.wrench;

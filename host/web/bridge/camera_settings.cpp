@@ -189,9 +189,8 @@ void PictureFigures::look(const ImageView& picture, std::span<const TagCorners> 
   }
   const LightReading light = read_light(picture, mirrored_, tags);
   nlohmann::json widths = nlohmann::json::array();
-  for (const Edges& edges : edges_) {
+  for (const Edges& edges : edges_)
     if (edges.px > 0) widths.push_back({{"id", edges.id}, {"px", edges.px}});
-  }
   figures_ = {{"white", light.white_counts},
               {"black", picture_quality(picture).dark_counts},
               {"clipped_part", light.clipped_fraction},

@@ -61,13 +61,11 @@ std::string objection_to(const JobVerb& verb, const JobPlace& place) {
         "{}: this sensor has no sensor.yaml to write to; start with `tagwrench run --sensor FILE`",
         verb.name);
   }
-  if (verb.needs == Needs::calibration && !place.calibrated) {
+  if (verb.needs == Needs::calibration && !place.calibrated)
     return fmt::format("{}: the sensor is not calibrated in newtons; do that first", verb.name);
-  }
   if (verb.camera && place.kept) {
     return fmt::format(
-        "{}: needs the camera, but what this run records or compares would end; start without "
-        "them",
+        "{}: needs the camera, but what this run records or compares would end; start without them",
         verb.name);
   }
   if (verb.name == "camera" && kind != SourceKind::camera && kind != SourceKind::images)
@@ -111,10 +109,9 @@ class JobOptions {
   /// Refuses what nobody asked for.
   void done() const {
     if (!options_.is_object()) return;
-    for (const auto& [key, value] : options_.items()) {
+    for (const auto& [key, value] : options_.items())
       if (std::find(taken_.begin(), taken_.end(), key) == taken_.end())
         throw RequestRefused("options: has a key that this job does not know; reload the page");
-    }
   }
 
  private:
@@ -151,10 +148,10 @@ void add_wrench(JobOptions& options, const JobPlace& place, std::vector<std::str
   }
   const ReferenceKind reference = parse_plan(ready->text, ready->name).reference;
   if (reference == ReferenceKind::six_axis && place.source_kind != SourceKind::simulator) {
-    throw RequestRefused(fmt::format(
-        "plan {}: needs the port of the six-axis sensor; run `tagwrench calibrate wrench` in a "
-        "terminal",
-        plan));
+    throw RequestRefused(
+        fmt::format("plan {}: needs the port of the six-axis sensor; run `tagwrench calibrate "
+                    "wrench` in a terminal",
+                    plan));
   }
   if (reference == ReferenceKind::load_cell && place.source_kind != SourceKind::simulator) {
     if (place.board.empty()) {
@@ -224,9 +221,8 @@ JobCommand job_command(std::string_view verb, const json& wished, const JobPlace
 
 std::vector<std::string> possible_jobs(const JobPlace& place) {
   std::vector<std::string> names;
-  for (const JobVerb& verb : job_verbs()) {
+  for (const JobVerb& verb : job_verbs())
     if (objection_to(verb, place).empty()) names.emplace_back(verb.name);
-  }
   return names;
 }
 

@@ -36,8 +36,7 @@ struct Pipe {
 Pipe make_pipe() {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0)
-    throw ConfigError(
-        fmt::format("job: no pipe to be had: {}; end other programs", std::strerror(errno)));
+    throw ConfigError("job: no pipe to be had: {}; end other programs", std::strerror(errno));
   const UniqueFd read(ends[0]);
   const UniqueFd write(ends[1]);
   return {UniqueFd(::fcntl(read.get(), F_DUPFD_CLOEXEC, kAboveOthers)),
@@ -67,9 +66,8 @@ struct Child {
     ::close(go->write.get());
     char told;
     if (::read(go->read.get(), &told, 1) != 1) ::_exit(127);
-    for (std::size_t i = 0; i < fds.size(); ++i) {
+    for (std::size_t i = 0; i < fds.size(); ++i)
       if (::dup2(fds[i], static_cast<int>(i)) < 0) ::_exit(127);
-    }
     close_all_but(kept);
     ::execv(program.c_str(), argv.data());
     ::_exit(127);
@@ -122,23 +120,21 @@ void JobProcess::spawn(const std::string& program, const JobCommand& command) {
   pid_ = ::_Fork();
   if (pid_ == 0) child.become();
   if (pid_ < 0) {
-    throw ConfigError(fmt::format("job: {} cannot be started: {}; end other programs", program,
-                                  std::strerror(errno)));
+    throw ConfigError("job: {} cannot be started: {}; end other programs", program,
+                      std::strerror(errno));
   }
   UniqueFd end(static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)));
   if (!end) {
-    throw ConfigError(fmt::format("job: its end cannot be watched: {}; end other programs",
-                                  std::strerror(errno)));
+    throw ConfigError("job: its end cannot be watched: {}; end other programs",
+                      std::strerror(errno));
   }
   if (::write(go.write.get(), "g", 1) != 1)
-    throw ConfigError(
-        fmt::format("job: {} did not start: {}; try again", program, std::strerror(errno)));
+    throw ConfigError("job: {} did not start: {}; try again", program, std::strerror(errno));
   for (auto [stream, fd] : {std::pair{&out_.stream, &out.read},
                             {&err_.stream, &err.read},
                             {&events_.stream, &events.read},
-                            {&end_, &end}}) {
+                            {&end_, &end}})
     stream->assign(::fcntl(fd->get(), F_DUPFD_CLOEXEC, kAboveOthers));
-  }
   if (command.takes_keys) {
     ::fcntl(in.write.get(), F_SETFL, O_NONBLOCK);
     keys_.assign(::fcntl(in.write.get(), F_DUPFD_CLOEXEC, kAboveOthers));

@@ -170,11 +170,10 @@ void Jobs::start(JobCommand command, bool camera_is_free) {
   std::vector<std::string> keys{"stop"};
   if (command_.takes_keys) keys = {"skip", "redo", "stop"};
   report_.emplace(command_.verb, std::move(keys));
-  if (!command_.needs_camera || camera_is_free) {
+  if (!command_.needs_camera || camera_is_free)
     spawn();
-  } else {
+  else
     hooks_.want_camera();
-  }
   hooks_.changed();
   log_soon();
 }
@@ -195,11 +194,10 @@ void Jobs::spawn() {
   listener.printed = on_line(&JobReport::printed);
   listener.said = on_line(&JobReport::said);
   listener.event = [this](std::string_view line) {
-    if (const std::optional<JobPicture> picture = report_->event(line)) {
+    if (const std::optional<JobPicture> picture = report_->event(line))
       hooks_.show(*picture);
-    } else {
+    else
       log_soon();
-    }
   };
   listener.ended = [this](int status) { ended(status); };
   try {

@@ -54,8 +54,8 @@ bool is_recording_name(std::string_view name) {
 void check_recording_name(std::string_view name) {
   if (is_recording_name(name)) return;
   throw RequestRefused(
-      "name: must be 1 to 64 letters, digits, -, _ and ., beginning with a letter or digit; "
-      "choose another");
+      "name: must be 1 to 64 letters, digits, -, _ and ., beginning with a letter or digit; choose "
+      "another");
 }
 
 fs::path RecordingFolder::new_file(std::string_view name) const {
@@ -67,8 +67,8 @@ fs::path RecordingFolder::new_file(std::string_view name) const {
   std::error_code error;
   fs::create_directories(folder_, error);
   if (error) {
-    throw ConfigError(fmt::format("--recordings {}: cannot be made: {}; name a folder of yours",
-                                  folder_.string(), error.message()));
+    throw ConfigError("--recordings {}: cannot be made: {}; name a folder of yours",
+                      folder_.string(), error.message());
   }
   std::string file(name);
   if (!file.ends_with(kExtension)) file += kExtension;

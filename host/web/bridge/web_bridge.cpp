@@ -30,9 +30,8 @@ constexpr std::string_view kProfileNews = "profile";
 Vector6 shown_range(const SensorConfig& sensor) {
   const WrenchEstimator wrench(sensor.wrench);
   Vector6 range = range_through(wrench.tool(), sensor.wrench.range);
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 6; ++i)
     if (!(range[i] > 0 && range[i] < kUnknownRange)) range[i] = 1.5 * sensor.shaping.full_scale[i];
-  }
   return range;
 }
 
@@ -46,9 +45,8 @@ json hello_of(const RunFacts& facts, const std::string& recordings) {
     calibrated = sensor.wrench_from.date;
   std::istringstream completed(sensor.completed_axes);
   for (std::string axis; completed >> axis;) from_springs.push_back(axis);
-  if (sensor.calibration.empty()) {
+  if (sensor.calibration.empty())
     for (const char* axis : kWrenchAxes) from_springs.push_back(axis);
-  }
   const Vector6 range = shown_range(sensor);
   json mounting = json::array();  // row by row
   for (int i = 0; i < 9; ++i) mounting.push_back(sensor.shaping.hid_R_camera(i / 3, i % 3));
@@ -196,9 +194,8 @@ bool WebBridge::wait_to_resume(Beside beside) {
   while (true) {
     if (::poll(fds.data(), fds.size(), -1) <= 0) continue;
     if (fds[1].revents != 0) return false;
-    for (std::size_t i = 0; i < beside.size(); ++i) {
+    for (std::size_t i = 0; i < beside.size(); ++i)
       if (fds[i + 2].revents != 0) beside[i]->service();
-    }
     if (fds[0].revents == 0) continue;
     clear_event(resume_);
     return true;

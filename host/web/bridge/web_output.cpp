@@ -101,10 +101,9 @@ std::string_view WebOutput::service() noexcept {
 bool WebOutput::notice(std::string_view line) noexcept {
   if (recording_ != nullptr) recording_->note(line);
   std::vector<std::string> programs;
-  if (parts_.programs != nullptr) {
+  if (parts_.programs != nullptr)
     for (const SpnavPeer& peer : parts_.programs->programs())
       programs.emplace_back(peer.name.data());
-  }
   parts_.news(std::string(line), std::move(programs));
   return false;
 }

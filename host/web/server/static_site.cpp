@@ -18,10 +18,10 @@ constexpr std::string_view kNobody =
 constexpr std::string_view kTheTab =
     "camera=(self), serial=(self), hid=(self), microphone=(), geolocation=(), usb=(), payment=()";
 constexpr std::string_view kNotBuilt =
-    "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>tagwrench</title>"
-    "<h1>The pages are not built</h1>"
-    "<p>The bridge runs. What you wanted to see needs node, which builds the pages: run "
-    "<code>./run web</code> in tagwrench's source folder, then load this page again.</p></html>\n";
+    "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>tagwrench</title><h1>The "
+    "pages are not built</h1><p>The bridge runs. What you wanted to see needs node, which builds "
+    "the pages: run <code>./run web</code> in tagwrench's source folder, then load this page "
+    "again.</p></html>\n";
 
 struct RefusalRow {
   unsigned status;
@@ -93,15 +93,15 @@ std::string page_policy(const SitePath& path, std::string_view host) {
   const std::string& name = path.names.back();
   const bool tab = path.names.front() == "sensor";
   if (is_script(name) && tab)
-    return "default-src 'none'; script-src 'self' 'wasm-unsafe-eval' 'unsafe-eval'; "
-           "connect-src 'self'";
+    return "default-src 'none'; script-src 'self' 'wasm-unsafe-eval' 'unsafe-eval'; connect-src "
+           "'self'";
   if (is_script(name)) return "default-src 'none'; script-src 'self'; connect-src 'self'";
   if (!is_html(name)) return std::string(kNothingAllowed);
   return fmt::format(
       "default-src 'none'; script-src 'self'{}; style-src 'self'; img-src 'self' data: blob:; "
       "font-src 'self'; media-src 'self' blob:; connect-src 'self' ws://{}; worker-src 'self'; "
-      "manifest-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; "
-      "frame-ancestors 'none'",
+      "manifest-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors "
+      "'none'",
       tab ? " 'wasm-unsafe-eval'" : "", host);
 }
 
@@ -199,12 +199,11 @@ WebAnswer StaticSite::file(const WebRequest& request, const SitePath& path) cons
   if (!file) return plain_answer(404, "There is no such file here.");
   // A document of its own: it may look as it likes, and do nothing.
   const bool document = is_html(path.names.back());
-  std::string headers =
-      fields(content_type(path.names.back()),
-             document ? "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; "
-                        "frame-ancestors 'self'"
-                      : kNothingAllowed,
-             kNobody, "no-cache");
+  std::string headers = fields(content_type(path.names.back()),
+                               document ? "sandbox; default-src 'none'; style-src 'unsafe-inline'; "
+                                          "img-src data:; frame-ancestors 'self'"
+                                        : kNothingAllowed,
+                               kNobody, "no-cache");
   if (single == files_.end()) headers += "Content-Disposition: attachment\r\n";
   return from_file(request, *std::move(file), std::move(headers));
 }

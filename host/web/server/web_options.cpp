@@ -91,10 +91,8 @@ WebOptions parse_web(const std::string& option, const std::string& place) {
       options.address.back() == ']')
     options.address = options.address.substr(1, options.address.size() - 2);
   if (colon == std::string::npos || options.address.empty() || parsed != end ||
-      error != std::errc()) {
-    throw ConfigError(
-        fmt::format("{}:{}: is no ADDRESS:PORT; use web, or web:127.0.0.1:8137", option, place));
-  }
+      error != std::errc())
+    throw ConfigError("{}:{}: is no ADDRESS:PORT; use web, or web:127.0.0.1:8137", option, place);
   return options;
 }
 

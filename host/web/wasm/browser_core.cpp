@@ -157,10 +157,9 @@ SensorConfig Session::read(const std::string& yaml, const std::string& name, con
   if (files.measured.empty()) return parse_sensor(yaml, name);
   const fs::path folder = measured_folder(name);
   std::list<MemoryFile> measured;
-  for (const auto& [file, bytes] : files.measured) {
+  for (const auto& [file, bytes] : files.measured)
     if (std::find(kMeasuredFiles.begin(), kMeasuredFiles.end(), file) != kMeasuredFiles.end())
       measured.emplace_back(folder, file, bytes);
-  }
   return parse_sensor(yaml, name, WrenchCalibration::use, folder);
 }
 

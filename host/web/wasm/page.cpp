@@ -152,10 +152,9 @@ TagPattern tag_pattern(TagFamily family, int id, double size, double border) {
   pattern.border = border;
   pattern.white.assign(static_cast<std::size_t>(pattern.cells * pattern.cells), 0);
   for (int row = 0; row < bits; ++row) {
-    for (int column = 0; column < bits; ++column) {
+    for (int column = 0; column < bits; ++column)
       if (is_white_cell(family, id, row, column))
         pattern.white[static_cast<std::size_t>((row + 1) * pattern.cells + column + 1)] = 1;
-    }
   }
   return pattern;
 }
@@ -175,9 +174,8 @@ std::optional<int> identify_tag(TagFamily family, const std::vector<std::uint8_t
     return true;
   };
   for (int id = 0; id < id_count(family); ++id) {
-    for (int turns = 0; turns < 4; ++turns) {
+    for (int turns = 0; turns < 4; ++turns)
       if (is(id, turns)) return id;
-    }
   }
   return std::nullopt;
 }

@@ -14,10 +14,9 @@ int main() {
     for (int id = 0; id < id_count(family); ++id) {
       const TagPattern pattern = tag_pattern(family, id, 1, 0);
       std::uint64_t bits = 0;
-      for (int row = 1; row + 1 < pattern.cells; ++row) {
+      for (int row = 1; row + 1 < pattern.cells; ++row)
         for (int column = 1; column + 1 < pattern.cells; ++column)
           bits = bits << 1 | (pattern.is_white(row, column) ? 1 : 0);
-      }
       std::printf("%s0x%llx", id == 0 ? "" : ",", static_cast<unsigned long long>(bits));
     }
     std::printf("};\n");
