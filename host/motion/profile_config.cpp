@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "host/core/config_error.h"
-#include "host/core/yaml/yaml_edit.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/motion/focus_watch.h"
 #include "host/wrench/estimate.h"
@@ -68,11 +67,10 @@ CurveOptions read_points(YamlReader& node) {
     if (curve.count > 0) {
       const CurvePoint& last = curve.points[curve.count - 1];
       if (next.in < last.in + 1e-3 || next.out < last.out || next.out > 1) {
-        node.fail("points",
-                  fmt::format("the curve goes backwards, or beyond 1, at [{}, {}]; each point "
-                              "needs a larger first number (by 0.001) and a second one that is "
-                              "not smaller than the last one's and at most 1",
-                              next.in, next.out));
+        node.fail("points", fmt::format("the curve goes backwards, or beyond 1, at [{}, {}]; each "
+                                        "point needs a larger first number (by 0.001) and a second "
+                                        "one that is not smaller than the last one's and at most 1",
+                                        next.in, next.out));
       }
     }
     curve.points[curve.count++] = next;
@@ -195,19 +193,18 @@ GestureAction read_action(YamlReader& node, const char* key) {
   std::vector<GestureAction> known = {
       {}, {-1, GestureCommand::zero}, {-1, GestureCommand::next_profile}};
   for (int button = 0; button < kMaxButtons; ++button) known.push_back({button});
-  for (const GestureAction& action : known) {
+  for (const GestureAction& action : known)
     if (action_text(action) == text) return action;
-  }
-  node.fail(key, fmt::format("'{}' is not known; use one of: none, zero, next_profile, button 1 "
-                             "to button {}",
-                             text, kMaxButtons));
+  node.fail(
+      key,
+      fmt::format("'{}' is not known; use one of: none, zero, next_profile, button 1 to button {}",
+                  text, kMaxButtons));
 }
 
 void read_gestures(YamlReader node, GestureOptions& gestures) {
   const auto all = actions(gestures);
-  for (std::size_t i = 0; i < all.size(); ++i) {
+  for (std::size_t i = 0; i < all.size(); ++i)
     if (node.has(kGestures[i])) *all[i] = read_action(node, kGestures[i]);
-  }
   const auto scale = [&](const char* key, double& value) {
     if (node.has(key)) value = node.within(key, kFinestScale, kCoarsestScale);
   };
@@ -328,9 +325,8 @@ std::vector<std::string> yaml_files(const std::string& folder) {
   std::vector<std::string> found;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
+       entry.increment(error))
     if (entry->path().extension() == ".yaml") found.push_back(entry->path());
-  }
   if (error)
     throw ConfigError(folder + ": cannot be read: " + error.message() +
                       "; give --profile a folder of yours");
@@ -354,8 +350,8 @@ Profile load_profile(const std::string& name_or_file, const Profile& defaults) {
   }
   std::error_code error;
   if (!std::filesystem::is_regular_file(name_or_file, error)) {
-    throw ConfigError(fmt::format(
-        "{}: neither a ready-made profile ({}) nor a file; check the path", name_or_file, names));
+    throw ConfigError("{}: neither a ready-made profile ({}) nor a file; check the path",
+                      name_or_file, names);
   }
   return read_profile(YamlReader::from_file(name_or_file), named_after(name_or_file, defaults));
 }
@@ -381,37 +377,6 @@ std::string profile_text(const Profile& profile) {
   out += fmt::format("dominant: {}\nlock: {}\nfilter: {}\n", dominant_text(shaping.dominant),
                      lock_text(shaping.lock), filter_text(shaping.filter));
   return out + gestures_text(profile.gestures);
-}
-
-std::string with_changes(const std::string& text, const std::string& file, const Profile& before,
-                         const Profile& after) {
-  std::string changed = text;
-  const auto put = [&](const std::vector<std::string>& path, const auto& was, const auto& is) {
-    if (was != is) changed = with_value(changed, path, fmt::format("{}", is), file);
-  };
-  const ShapingOptions& was = before.shaping;
-  const ShapingOptions& is = after.shaping;
-  put({"translation"}, was.translation, is.translation);
-  put({"rotation"}, was.rotation, is.rotation);
-  put({"curve"}, curve_text(was.axes[0].curve), curve_text(is.axes[0].curve));
-  put({"dominant"}, dominant_text(was.dominant), dominant_text(is.dominant));
-  put({"lock"}, lock_text(was.lock), lock_text(is.lock));
-  put({"filter"}, filter_text(was.filter), filter_text(is.filter));
-  for (int i = 0; i < 6; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const std::string axis(kAxes[at]);
-    const std::string unit = is_force(is.axes[at].source) ? "n" : "nm";
-    put({"axes", axis, "full_scale_" + unit}, was.full_scale[i], is.full_scale[i]);
-    put({"axes", axis, "dead_zone_" + unit}, was.dead_zone[i], is.dead_zone[i]);
-    put({"axes", axis, "invert"}, was.axes[at].invert, is.axes[at].invert);
-  }
-  const GestureOptions& felt = before.gestures;
-  const GestureOptions& feels = after.gestures;
-  put({"gestures", "tap_force_n"}, felt.tap_force, feels.tap_force);
-  put({"gestures", "press_force_n"}, felt.press_force, feels.press_force);
-  put({"gestures", "twist_torque_nm"}, felt.twist_torque, feels.twist_torque);
-  put({"gestures", "press_ms"}, press_ms(felt), press_ms(feels));
-  return changed;
 }
 
 bool serves(const Profile& profile, std::string_view application) {
@@ -440,10 +405,9 @@ ProfileFiles::ProfileFiles(const std::vector<std::string>& chosen, Profile defau
   }
   if (profiles_.empty()) profiles_.push_back(defaults_);
   for (auto a = profiles_.begin(); a != profiles_.end(); ++a) {
-    for (auto b = std::next(a); b != profiles_.end(); ++b) {
+    for (auto b = std::next(a); b != profiles_.end(); ++b)
       if (a->name == b->name)
         throw ConfigError("profile " + a->name + ": two have this name; change `name:` in one");
-    }
   }
   if (!files_.empty()) watch();
 }
@@ -481,9 +445,8 @@ void ProfileFiles::watch() {
 }
 
 std::string ProfileFiles::file_of(std::size_t profile) const {
-  for (const File& file : files_) {
+  for (const File& file : files_)
     if (file.profile == profile) return file.folder + "/" + file.name;
-  }
   return {};
 }
 
@@ -498,9 +461,8 @@ std::vector<ProfileFiles::Change> ProfileFiles::reread() {
   while (::read(watch_.get(), events.data(), events.size()) > 0) any = true;
   std::vector<Change> changes;
   if (!any) return changes;
-  for (File& file : files_) {
+  for (File& file : files_)
     if (std::optional<Change> change = look_again(file)) changes.push_back(std::move(*change));
-  }
   return changes;
 }
 

@@ -54,11 +54,6 @@ Profile parse_profile(const std::string& text, const std::string& file, const Pr
 /// What parse_profile() reads back to the same, over any defaults of the same sensor.
 std::string profile_text(const Profile& profile);
 
-/// The text of `before` with what differs in `after` written into it: comments and all else stay.
-/// Throws ConfigError, naming `file`, if the text is no YAML mapping.
-std::string with_changes(const std::string& text, const std::string& file, const Profile& before,
-                         const Profile& after);
-
 /// Whether the profile is meant for a program, by its name or its window's class: one of the
 /// profile's applications is part of it, in capitals or not.
 bool serves(const Profile& profile, std::string_view application);

@@ -86,9 +86,15 @@ test('a page sees samples and state, and its requests are answered', { skip: lac
   const tried = await page.ask('try', { name: 'cad', text: shown.text.replace(/rate_hz: \d+/, 'rate_hz: 60') });
   assert.ok(tried.ok, tried.text);
   assert.match(tried.text, /rate_hz: 60/);
-  const saved = await page.ask('save_profile', { name: 'cad', text: tried.text });
+  assert.match(shown.data.written, /^# /, 'what people are told about it');
+  const mine = { name: 'cad', as: 'cad-mine', text: tried.text.replace('"cad"', '"cad-mine"') };
+  await refused(page, 'save_profile', { ...mine, text: tried.text }, /its name is cad, and not cad-mine/);
+  await refused(page, 'save_profile', { ...mine, file_text: 'curve: {powr: 2}' }, /file_text:1: curve/);
+  const saved = await page.ask('save_profile', { ...mine, file_text: `# mine\n${mine.text}` });
   assert.ok(saved.ok, saved.text);
-  assert.match(readFileSync(at('config', 'tagwrench', 'profiles', 'cad-mine.yaml'), 'utf8'), /rate_hz: 60/);
+  const file = at('config', 'tagwrench', 'profiles', 'cad-mine.yaml');
+  assert.equal(readFileSync(file, 'utf8'), `# mine\n${mine.text}`);
+  await refused(page, 'save_profile', mine, /is there already; choose another/);
 
   await refused(page, 'profile', { name: 'chess' }, /no profile 'chess'/);
   await refused(page, 'profile', { name: 'a\nb' }, /one line/);

@@ -219,6 +219,22 @@ onBridge('a slider is tried as it moves, reverted and kept', async ({ bridge, pa
   assert.equal((await asked(bridge, page, 'profile')).name, 'game');
 });
 
+onBridge('a profile is saved as the text of its file, and a ready-made one under a name of its own', async ({ bridge, page }) => {
+  const written = `# mine\n${bridge.state.profile.text}`;
+  bridge.replies.show = () => ({ text: bridge.state.profile.text, data: { file: '', written } });
+  await page.goto(`${page.url()}#device`);
+  await page.getByRole('slider', { name: 'sensitivity, translation' }).press('ArrowRight');
+  await asked(bridge, page, 'try');
+  await page.getByRole('button', { name: 'Save to a file' }).click();
+  const saved = await asked(bridge, page, 'save_profile');
+  assert.deepEqual([saved.name, saved.as], ['cad', 'cad-mine']);
+  assert.equal(
+    saved.file_text,
+    written.replace('name: "cad"', 'name: "cad-mine"').replace('\ntranslation: 1\n', '\ntranslation: 1.01\n'),
+  );
+  assert.match(saved.text, /^name: "cad-mine"\n/);
+});
+
 onBridge('what is reverted to is said by name', async ({ bridge, page }) => {
   await page.goto(`${page.url()}#device`);
   await page.getByRole('slider', { name: 'sensitivity, translation' }).press('ArrowRight');

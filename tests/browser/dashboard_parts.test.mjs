@@ -145,6 +145,28 @@ test('a changed profile differs in what was changed alone; comments and order st
   assert.ok(new ProfileText('a: [').broken);
 });
 
+test('what is saved keeps what a person wrote around it', { skip }, async () => {
+  const { ProfileText, withChanges } = await loadModule('dashboard/profile_text.ts');
+  const mine =
+    '# what I like\nname: cad        # and its name\naxes:\n  x: {full_scale_n: 0.5}   # light\n' +
+    'dominant:\n  ratio: 1.3      # one at a time\n# the end\n';
+  const saved = (file, ...changes) =>
+    withChanges(file, kProfileText, new ProfileText(kProfileText).with(changes));
+  assert.equal(saved(mine), mine);
+  const moved = saved(mine, [['axes', 'x', 'full_scale_n'], 0.75], [['dominant', 'ratio'], 2], [['name'], 'my: own']);
+  assert.equal(moved, mine.replace('0.5}', '0.75}').replace('1.3 ', '2 ').replace('cad ', '"my: own" '));
+
+  const axes = ['x', 'y', 'z', 'rx', 'ry', 'rz'];
+  const curves = (power, among = axes) => among.map((axis) => [['axes', axis, 'curve', 'power'], power]);
+  const added = saved(mine, [['rotation'], 2], [['gestures', 'tap_force_n'], 0.3], ...curves(1.7));
+  assert.equal(new ProfileText(added).number(['rotation'], 0), 2);
+  assert.equal(new ProfileText(added).number(['gestures', 'tap_force_n'], 0), 0.3);
+  assert.match(added, /\ncurve: \{power: 1.7\}\n/);
+  for (const comment of mine.match(/#.*/g)) assert.ok(added.includes(comment), comment);
+  assert.equal(saved('{name: cad, lock: none}\n', [['lock'], 'rotation']), '{name: cad, lock: rotation}\n');
+  assert.equal(saved('name: cad\n', ...curves(1.7, ['ry'])), 'name: cad\naxes:\n  ry:\n    curve: {power: 1.7}\n');
+});
+
 test('every knob writes where it reads, within its bounds', { skip }, async () => {
   const { ProfileText } = await loadModule('dashboard/profile_text.ts');
   const { knobsOf, placeOf, valueAt } = await loadModule('dashboard/knobs.ts');

@@ -40,8 +40,8 @@ YamlReader YamlReader::from_file(const std::string& path) {
   std::ifstream in(path);
   std::ostringstream text;
   if (!in || !(text << in.rdbuf())) {
-    throw ConfigError(fmt::format(
-        "{}: cannot be read; check the path and that it is a readable, non-empty file", path));
+    throw ConfigError(
+        "{}: cannot be read; check the path and that it is a readable, non-empty file", path);
   }
   return from_text(text.str(), path);
 }
@@ -51,14 +51,11 @@ YamlReader YamlReader::from_text(const std::string& text, const std::string& nam
   try {
     root = YAML::Load(text);
   } catch (const YAML::Exception& e) {
-    throw ConfigError(
-        fmt::format("{}:{}: not YAML: {}; check indentation, colons and brackets there", name,
-                    e.mark.line + 1, e.msg));
+    throw ConfigError("{}:{}: not YAML: {}; check indentation, colons and brackets there", name,
+                      e.mark.line + 1, e.msg);
   }
-  if (!root.IsMap()) {
-    throw ConfigError(
-        fmt::format("{}: expected 'key: value' lines at the top level, found none", name));
-  }
+  if (!root.IsMap())
+    throw ConfigError("{}: expected 'key: value' lines at the top level, found none", name);
   return YamlReader(root, name, "");
 }
 
@@ -67,7 +64,7 @@ std::string YamlReader::full(const std::string& key) const { return path_ + key;
 void YamlReader::fail(const std::string& key, const std::string& message) const {
   const YAML::Node node = node_[key];
   const int line = (node ? node.Mark().line : node_.Mark().line) + 1;
-  throw ConfigError(fmt::format("{}:{}: {}: {}", file_, line, full(key), message));
+  throw ConfigError("{}:{}: {}: {}", file_, line, full(key), message);
 }
 
 bool YamlReader::has(const std::string& key) {
@@ -84,9 +81,8 @@ YAML::Node YamlReader::required(const std::string& key) {
 
 std::string YamlReader::keys_here() const {
   std::string out;
-  for (const auto& entry : node_) {
+  for (const auto& entry : node_)
     if (entry.first.IsScalar()) out += (out.empty() ? "" : ", ") + entry.first.Scalar();
-  }
   return out.empty() ? "none" : out;
 }
 
@@ -192,9 +188,8 @@ std::vector<std::vector<double>> YamlReader::points(const std::string& key, std:
     fail(key, fmt::format("must be a list of [{} numbers]", dimension));
   std::vector<std::vector<double>> out;
   for (const YAML::Node& row : node) {
-    if (!row.IsSequence() || row.size() != dimension) {
+    if (!row.IsSequence() || row.size() != dimension)
       fail(key, fmt::format("entry {} must have {} numbers", out.size() + 1, dimension));
-    }
     out.emplace_back();
     for (const YAML::Node& item : row) out.back().push_back(finite(key, item));
   }
@@ -203,9 +198,8 @@ std::vector<std::vector<double>> YamlReader::points(const std::string& key, std:
 
 std::size_t YamlReader::one_of(const std::string& key, const std::vector<std::string_view>& names) {
   const std::string value = text(key);
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  for (std::size_t i = 0; i < names.size(); ++i)
     if (names[i] == value) return i;
-  }
   fail(key, fmt::format("'{}' is not known; use one of: {}", value, joined(names)));
 }
 
@@ -231,19 +225,17 @@ std::vector<double> YamlReader::numbers_or(const std::string& key, std::vector<d
 void YamlReader::finish() {
   std::set<std::string> seen;
   for (const auto& entry : node_) {
-    if (!entry.first.IsScalar()) {
-      throw ConfigError(
-          fmt::format("{}:{}: a key must be plain text", file_, entry.first.Mark().line + 1));
-    }
+    if (!entry.first.IsScalar())
+      throw ConfigError("{}:{}: a key must be plain text", file_, entry.first.Mark().line + 1);
     const std::string key = entry.first.Scalar();
     if (!seen.insert(key).second) {
-      throw ConfigError(fmt::format("{}:{}: {}: stands here twice; remove one", file_,
-                                    entry.first.Mark().line + 1, full(key)));
+      throw ConfigError("{}:{}: {}: stands here twice; remove one", file_,
+                        entry.first.Mark().line + 1, full(key));
     }
     if (asked_.count(key) == 0) {
       std::vector<std::string_view> known(asked_.begin(), asked_.end());
-      throw ConfigError(fmt::format("{}:{}: {}: unknown key; known keys here: {}", file_,
-                                    entry.first.Mark().line + 1, full(key), joined(known)));
+      throw ConfigError("{}:{}: {}: unknown key; known keys here: {}", file_,
+                        entry.first.Mark().line + 1, full(key), joined(known));
     }
   }
 }

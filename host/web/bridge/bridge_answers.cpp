@@ -9,7 +9,6 @@
 #include "host/calibration/wrench/plan.h"
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
-#include "host/core/yaml/yaml_edit.h"
 #include "host/motion/profile_config.h"
 #include "host/sensor/sensor_config.h"
 #include "host/web/bridge/web_bridge.h"
@@ -40,41 +39,33 @@ double number_of(const PageRequest& request, const char* key, double least, doub
 }
 
 record::Keep keep_of(const std::string& word) {
-  for (const record::Keep keep : {record::Keep::raw, record::Keep::region, record::Keep::none}) {
+  for (const record::Keep keep : {record::Keep::raw, record::Keep::region, record::Keep::none})
     if (word == record::name(keep)) return keep;
-  }
   if (word.empty()) return record::Keep::raw;
   throw RequestRefused("keep: must be raw, region or none");
 }
-
-// A profile as a page has changed it, written where it came from: comments and all else in that
-// file stay.
 
 namespace fs = std::filesystem;
 
 /// What a profile that has no file is made from.
 std::string text_of_ready(const std::string& name) {
-  for (const ReadyProfile& ready : ready_profiles()) {
+  for (const ReadyProfile& ready : ready_profiles())
     if (ready.name == name) return ready.text;
-  }
   return "name: " + name + "\n";
 }
 
-/// Whatever their names are.
-bool same_profile(Profile a, const Profile& b) {
-  a.name = b.name;
-  return profile_text(a) == profile_text(b);
-}
-
-/// `before` with what `text` says instead; `text` itself if it says more than can be put in there.
-std::string merged(const std::string& before, const std::string& file, const std::string& text,
-                   const SensorConfig& sensor) {
-  const Profile defaults = default_profile(sensor);
+/// `file_text`, in which a page has kept the person's comments, if it says the same as `text`;
+/// otherwise `text`. Throws RequestRefused: a fault in one of them, or another name than `name`.
+std::string checked_profile(const std::string& text, const std::string& file_text,
+                            const std::string& name, const SensorConfig& sensor) {
   try {
-    const Profile was = parse_profile(before, file, defaults);
+    const Profile defaults = default_profile(sensor);
     const Profile wanted = parse_profile(text, "text", defaults);
-    const std::string changed = with_changes(before, file, was, wanted);
-    return same_profile(parse_profile(changed, file, defaults), wanted) ? changed : text;
+    if (wanted.name != name)
+      throw ConfigError("text: its name is {}, and not {}; change `name:`", wanted.name, name);
+    if (file_text.empty()) return text;
+    const Profile same = parse_profile(file_text, "file_text", defaults);
+    return profile_text(same) == profile_text(wanted) ? file_text : text;
   } catch (const ConfigError& e) {
     throw RequestRefused(e.what());
   }
@@ -85,28 +76,23 @@ struct SavedProfile {
   bool is_new = false;  ///< the sensor does not read it by itself
 };
 
-/// `file` is where the desk has the profile from, empty if it is a ready-made one or the sensor's
-/// own: then `name` says what becomes of it, NAME.yaml in the folder `own`, which must not be there
-/// yet. Throws RequestRefused: a fault in the text, or a name that cannot be; ConfigError and
-/// std::runtime_error: it cannot be written.
-SavedProfile write_profile(const std::string& of, const std::string& name, const std::string& text,
-                           const std::string& file, const fs::path& own,
-                           const SensorConfig& sensor) {
+/// `file` is where the profile in force was read from, empty if it is a ready-made one or the
+/// sensor's own: then it goes to NAME.yaml in the folder `own`, which must not be there yet. Throws
+/// RequestRefused: a name that cannot be; ConfigError and std::runtime_error: it cannot be written.
+SavedProfile write_profile(const std::string& name, const std::string& text,
+                           const std::string& file, const fs::path& own) {
   if (!file.empty()) {
-    write_atomically(file, merged(read_text(file), file, text, sensor));
+    write_atomically(file, text);
     return {file, false};
   }
   check_recording_name(name);
   std::error_code error;
   fs::create_directories(own, error);
   const fs::path target = own / (name + ".yaml");
-  if (error)
-    throw ConfigError(fmt::format("{}: cannot be made: {}", own.string(), error.message()));
-  if (fs::exists(fs::symlink_status(target, error))) {
+  if (error) throw ConfigError("{}: cannot be made: {}", own.string(), error.message());
+  if (fs::exists(fs::symlink_status(target, error)))
     throw RequestRefused(fmt::format("name: {} is there already; choose another", target.string()));
-  }
-  const std::string changed = merged(text_of_ready(of), target.string(), text, sensor);
-  write_atomically(target, with_value(changed, {"name"}, "\"" + name + "\"", target.string()));
+  write_atomically(target, text);
   return {target, true};
 }
 
@@ -185,14 +171,19 @@ void WebBridge::next_profile(const PageRequest& request) {
 }
 
 void WebBridge::show_profile(const PageRequest& request) {
-  profiles().ask("show " + line_of(request, "name", false),
-                 [this, request](const ControlAnswer& shown) {
-                   const std::size_t line_end = shown.text.find('\n');
-                   if (!shown.ok || line_end == std::string::npos)
-                     return answer(request, false, shown.text);
-                   answer(request, true, shown.text.substr(line_end + 1),
-                          {{"file", shown.text.substr(0, line_end)}});
-                 });
+  const std::string name = line_of(request, "name", false);
+  profiles().ask("show " + name, [this, request, name](const ControlAnswer& shown) {
+    const std::size_t line_end = shown.text.find('\n');
+    if (!shown.ok || line_end == std::string::npos) return answer(request, false, shown.text);
+    const std::string file = shown.text.substr(0, line_end);
+    try {
+      const std::string written = file.empty() ? text_of_ready(name) : read_text(file);
+      answer(request, true, shown.text.substr(line_end + 1),
+             {{"file", file}, {"written", written}});
+    } catch (const std::exception& e) {
+      answer(request, false, e.what());
+    }
+  });
 }
 
 void WebBridge::try_profile(const PageRequest& request) {
@@ -234,14 +225,18 @@ void WebBridge::revert_profile(const PageRequest& request) {
 
 void WebBridge::save_profile(const PageRequest& request) {
   const std::string of = line_of(request, "name");
-  const std::string text = text_of(request, "text");
-  const std::string given = line_of(request, "as", false);
-  const std::string name = given.empty() ? of + "-mine" : given;
-  profiles().ask("show " + of, [this, request, of, text, name](const ControlAnswer& shown) {
+  const std::string as = line_of(request, "as", false);
+  const std::string file_text =
+      request.arguments.contains("file_text") ? text_of(request, "file_text") : "";
+  ControlLink& link = profiles();
+  const std::string text =
+      checked_profile(text_of(request, "text"), file_text, as.empty() ? of : as, facts_->sensor);
+  link.ask("show " + of, [this, request, text,
+                          name = as.empty() ? of : as](const ControlAnswer& shown) {
     if (!shown.ok) return answer(request, false, shown.text);
     const std::string file = shown.text.substr(0, shown.text.find('\n'));
     try {
-      const SavedProfile saved = write_profile(of, name, text, file, own_profiles_, facts_->sensor);
+      const SavedProfile saved = write_profile(name, text, file, own_profiles_);
       answer(request, true,
              saved.is_new ? fmt::format("saved; from the next start on: tagwrench run --profile {}",
                                         saved.file.string())

@@ -246,6 +246,8 @@ export class FakeBridge {
             { name: 'load_cell', needs: 'a load cell on the board', minutes: 5, steps: 18 },
           ],
         };
+      case 'show':
+        return { text: this.state.profile.text, data: { file: '', written: this.state.profile.text } };
       case 'try':
         Object.assign(this.state.profile, { text: ask.text, trial: true });
         this.tellState();

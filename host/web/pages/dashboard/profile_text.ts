@@ -1,5 +1,5 @@
 // A profile's YAML: what can be moved in it, and the text with something moved. Comments and order stay.
-import { type Document, isMap, isScalar, isSeq, parseDocument } from 'yaml';
+import { CST, Composer, type Document, Parser, isMap, isScalar, isSeq, parseDocument } from 'yaml';
 
 export const PROFILE_AXES = ['x', 'y', 'z', 'rx', 'ry', 'rz'] as const;
 export type ProfileAxis = (typeof PROFILE_AXES)[number];
@@ -25,6 +25,59 @@ export interface AxisShape {
 }
 
 export type Path = readonly string[];
+type Change = readonly [Path, unknown];
+type Mapping = Readonly<Record<string, unknown>>;
+
+const isMapping = (value: unknown): value is Mapping =>
+  typeof value === 'object' && value !== null && !Array.isArray(value);
+const sameText = (a: unknown, b: unknown): boolean => JSON.stringify(a) === JSON.stringify(b);
+
+/** What differs, down to where the keys do. */
+function changesBetween(was: unknown, wanted: unknown, path: Path = []): Change[] {
+  if (sameText(was, wanted)) return [];
+  if (!isMapping(was) || !isMapping(wanted) || !sameText(Object.keys(was), Object.keys(wanted)))
+    return [[path, wanted]];
+  return Object.entries(wanted).flatMap(([key, value]) => changesBetween(was[key], value, [...path, key]));
+}
+
+/** One curve for all axes, where they have the same: so people write it. */
+function withOneCurve(changes: readonly Change[], wanted: unknown): readonly Change[] {
+  const axes = isMapping(wanted) && isMapping(wanted['axes']) ? Object.values(wanted['axes']) : [];
+  const [curve, ...others] = axes.map((axis) => (isMapping(axis) ? axis['curve'] : undefined));
+  const ofCurves = ([path]: Change): boolean => path[0] === 'axes' && path[2] === 'curve';
+  if (!changes.some(ofCurves) || !others.every((other) => sameText(other, curve))) return changes;
+  return [...changes.filter((change) => !ofCurves(change)), [['curve'], curve]];
+}
+
+/**
+ * `file`, the text that a person wrote, saying what `wanted` says and `was` does not; both are texts of whole profiles. Values
+ * that stand there already are changed to the letter, all else stays; where keys are missing, blanks may change, comments not.
+ */
+export function withChanges(file: string, was: string, wanted: string): string {
+  const meant: unknown = parseDocument(wanted).toJS();
+  const changes = withOneCurve(changesBetween(parseDocument(was).toJS(), meant), meant);
+  const tokens = [...new Parser().parse(file)];
+  const [written] = new Composer({ keepSourceTokens: true }).compose(tokens);
+  const missing = changes.filter(([path, value]) => {
+    const token = written?.getIn(path, true);
+    if (!isScalar(token) || !token.srcToken || typeof value === 'object') return true;
+    CST.setScalarValue(token.srcToken, String(value));
+    return false;
+  });
+  const placed = tokens.map((token) => CST.stringify(token)).join('');
+  if (missing.length === 0) return placed;
+  const document = parseDocument(placed);
+  for (const [path, value] of missing) {
+    const node = document.createNode(value, { flow: true });
+    const old = document.getIn(path, true);
+    if (isScalar(old) || isMap(old)) node.comment = old.comment ?? null;
+    document.setIn(path, node);
+  }
+  return asWritten(document);
+}
+
+const asWritten = (document: Document): string =>
+  document.toString({ lineWidth: 0, flowCollectionPadding: false });
 
 export class ProfileText {
   private readonly document: Document;
@@ -65,7 +118,7 @@ export class ProfileText {
       if (isScalar(node)) node.value = value;
       else changed.setIn(path, value);
     }
-    return changed.toString({ lineWidth: 0, flowCollectionPadding: false });
+    return asWritten(changed);
   }
 
   shape(axis: ProfileAxis): AxisShape {

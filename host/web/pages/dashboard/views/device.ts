@@ -5,7 +5,7 @@ import { button, field, make, panel, present, say } from '../../common/elements'
 import { type Sample, carriesNumbers } from '../../common/sample';
 import { CurvePlot } from '../curve_plot';
 import { KnobPanel } from '../knob_panel';
-import { type AxisShape, PROFILE_AXES, ProfileText } from '../profile_text';
+import { type AxisShape, PROFILE_AXES, ProfileText, withChanges } from '../profile_text';
 import type { BridgeState, ProfileState } from '../protocol';
 import type { App, View } from '../view';
 
@@ -193,13 +193,15 @@ export class DeviceView implements View {
 
   private async save(): Promise<void> {
     if (!this.saveName.reportValidity()) return;
-    const as = this.saveName.value.trim();
     await this.tries;
-    await this.app.request('save_profile', {
-      name: this.shown_?.name ?? '',
-      text: this.text.with([]),
-      ...(as === '' ? {} : { as }),
-    });
+    const name = this.shown_?.name ?? '';
+    const shown = await this.app.link.ask('show', { name });
+    const { file = '', written = '' } = (shown.data ?? {}) as { file?: string; written?: string };
+    // A ready-made one has no file: it goes on as one of one's own.
+    const as = file === '' ? this.saveName.value.trim() || `${name}-mine` : name;
+    const text = this.text.with([[['name'], as]]);
+    const file_text = shown.ok && !this.text.broken ? withChanges(written, shown.text, text) : text;
+    await this.app.request('save_profile', { name, text, file_text, as });
   }
 
   private drawNow(): void {
