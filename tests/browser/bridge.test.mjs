@@ -89,7 +89,7 @@ test('a page sees samples and state, and its requests are answered', { skip: lac
   assert.match(shown.data.written, /^# /, 'what people are told about it');
   const mine = { name: 'cad', as: 'cad-mine', text: tried.text.replace('"cad"', '"cad-mine"') };
   await refused(page, 'save_profile', { ...mine, text: tried.text }, /its name is cad, and not cad-mine/);
-  await refused(page, 'save_profile', { ...mine, file_text: 'curve: {powr: 2}' }, /file_text:1: curve/);
+  await refused(page, 'save_profile', { ...mine, file_text: 'curve: {powr: 2}' }, /cad-mine.yaml:1: curve/);
   const saved = await page.ask('save_profile', { ...mine, file_text: `# mine\n${mine.text}` });
   assert.ok(saved.ok, saved.text);
   const file = at('config', 'tagwrench', 'profiles', 'cad-mine.yaml');

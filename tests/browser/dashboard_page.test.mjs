@@ -220,8 +220,9 @@ onBridge('a slider is tried as it moves, reverted and kept', async ({ bridge, pa
 });
 
 onBridge('a profile is saved as the text of its file, and a ready-made one under a name of its own', async ({ bridge, page }) => {
-  const written = `# mine\n${bridge.state.profile.text}`;
-  bridge.replies.show = () => ({ text: bridge.state.profile.text, data: { file: '', written } });
+  const { text } = bridge.state.profile;
+  const written = `# mine\n${text}`;
+  bridge.replies.show = () => ({ text, data: { file: '', written } });
   await page.goto(`${page.url()}#device`);
   await page.getByRole('slider', { name: 'sensitivity, translation' }).press('ArrowRight');
   await asked(bridge, page, 'try');

@@ -164,7 +164,9 @@ test('what is saved keeps what a person wrote around it', { skip }, async () => 
   assert.match(added, /\ncurve: \{power: 1.7\}\n/);
   for (const comment of mine.match(/#.*/g)) assert.ok(added.includes(comment), comment);
   assert.equal(saved('{name: cad, lock: none}\n', [['lock'], 'rotation']), '{name: cad, lock: rotation}\n');
-  assert.equal(saved('name: cad\n', ...curves(1.7, ['ry'])), 'name: cad\naxes:\n  ry:\n    curve: {power: 1.7}\n');
+  const aliased = 'axes: {x: &x {full_scale_n: 1}, y: *x}\n';
+  assert.match(saved(aliased, [['axes', 'y', 'full_scale_n'], 2]), /^name: "cad"\n/, 'all of it');
+  assert.equal(saved('name: cad\n', ...curves(1.7, ['ry'])), 'name: cad\naxes:\n  ry:\n    curve:\n      power: 1.7\n');
 });
 
 test('every knob writes where it reads, within its bounds', { skip }, async () => {

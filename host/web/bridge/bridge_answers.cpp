@@ -60,11 +60,12 @@ std::string checked_profile(const std::string& text, const std::string& file_tex
                             const std::string& name, const SensorConfig& sensor) {
   try {
     const Profile defaults = default_profile(sensor);
-    const Profile wanted = parse_profile(text, "text", defaults);
+    const std::string file = name + ".yaml";  // a text without `name:` is called so
+    const Profile wanted = parse_profile(text, file, defaults);
     if (wanted.name != name)
-      throw ConfigError("text: its name is {}, and not {}; change `name:`", wanted.name, name);
+      throw ConfigError("{}: its name is {}, and not {}; change `name:`", file, wanted.name, name);
     if (file_text.empty()) return text;
-    const Profile same = parse_profile(file_text, "file_text", defaults);
+    const Profile same = parse_profile(file_text, file, defaults);
     return profile_text(same) == profile_text(wanted) ? file_text : text;
   } catch (const ConfigError& e) {
     throw RequestRefused(e.what());

@@ -52,6 +52,7 @@ function withOneCurve(changes: readonly Change[], wanted: unknown): readonly Cha
 /**
  * `file`, the text that a person wrote, saying what `wanted` says and `was` does not; both are texts of whole profiles. Values
  * that stand there already are changed to the letter, all else stays; where keys are missing, blanks may change, comments not.
+ * A file that cannot take a change becomes `wanted`.
  */
 export function withChanges(file: string, was: string, wanted: string): string {
   const meant: unknown = parseDocument(wanted).toJS();
@@ -68,6 +69,8 @@ export function withChanges(file: string, was: string, wanted: string): string {
   if (missing.length === 0) return placed;
   const document = parseDocument(placed);
   for (const [path, value] of missing) {
+    const above = path.map((_, depth) => document.getIn(path.slice(0, depth), true));
+    if (!above.every((node) => node === undefined || isMap(node))) return wanted; // an alias, or nothing, where a mapping belongs
     const node = document.createNode(value, { flow: true });
     const old = document.getIn(path, true);
     if (isScalar(old) || isMap(old)) node.comment = old.comment ?? null;
