@@ -8,7 +8,6 @@
 
 #include "host/app/input.h"
 #include "host/calibration/target/recorder.h"
-#include "host/calibration/target/verdict.h"
 #include "host/commands/commands.h"
 #include "host/commands/events.h"
 #include "host/commands/measured_results.h"

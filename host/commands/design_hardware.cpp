@@ -15,8 +15,6 @@
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
 #include "host/source/simulator/folder_export.h"
-#include "host/tools/design/checks.h"
-#include "host/tools/design/drawing.h"
 #include "host/tools/design/geometry.h"
 #include "host/tracker/target.h"
 

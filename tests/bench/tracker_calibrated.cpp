@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "host/calibration/target/recorder.h"
-#include "host/calibration/target/verdict.h"
 #include "host/tracker/rotation.h"
 #include "tests/bench/tracker_clip.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "host/board/cell_calibration.h"
-#include "host/calibration/wrench/reference.h"
+#include "host/calibration/wrench/record.h"
 #include "host/source/simulator/bench.h"
 #include "tests/firmware/lockstep_camera.h"
 

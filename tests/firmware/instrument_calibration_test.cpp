@@ -9,8 +9,8 @@
 
 #include "host/board/sample_history.h"
 #include "host/calibration/wrench/guide.h"
-#include "host/calibration/wrench/observations.h"
 #include "host/calibration/wrench/plan.h"
+#include "host/calibration/wrench/record.h"
 #include "host/commands/calibrate_wrench/simulated_person.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"

@@ -11,9 +11,9 @@
 
 #include "host/app/scenario_config.h"
 #include "host/source/simulator/simulator_source.h"
+#include "host/tools/camera_timing/flip_patches.h"
 #include "host/tools/camera_timing/measurement.h"
 #include "host/tools/camera_timing/pattern_lamp.h"
-#include "host/tools/camera_timing/screen_window.h"
 
 namespace tagwrench::test {
 namespace {

@@ -1,8 +1,7 @@
 // Room calibration/camera: pictures of a printed board -> the lens.
 // In:  corners of the board, px of the camera's picture; the board's squares, m.
 // Out: CameraModel: focal lengths and centre in px, OpenCV's distortion, with standard deviations.
-// Then: collector.h (takes views by itself), board.h (finds the board), verdict.cpp (what is
-// missing).
+// Then: collector.h (takes views by itself), board.h (finds the board).
 //
 // Views of a board -> camera. Uses OpenCV inside.
 #pragma once

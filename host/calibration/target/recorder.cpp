@@ -1,10 +1,15 @@
 #include "host/calibration/target/recorder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
+#include "host/core/algebra/decompositions.h"
+#include "host/core/config_error.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/rotation.h"
@@ -32,6 +37,49 @@ double distance(const Vector6& a, const Vector6& b) {
   constexpr double kLever = 20e-3;  // m
   const Vector6 d = a - b;
   return std::sqrt(d.head<3>().squaredNorm() + kLever * kLever * d.tail<3>().squaredNorm());
+}
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kMinView = 1.5 * kDegree;
+constexpr double kMinFollowed = 0.5;  // of the frames in motion
+constexpr double kMaxNoise_px = 0.3;  // of one edge
+constexpr double kMaxFocalError = 0.01;
+constexpr double kFocalSigmas = 3.0;
+constexpr double kReadoutSigmas = 8;
+constexpr double kMinReadoutGain = 0.05;     // of an edge's variance
+constexpr double kMaxPositionSigma = 10e-6;  // m
+constexpr double kMaxRotationSigma = 2e-3;   // rad
+constexpr double kBetterFraction = 0.9;      // of a sigma, to be called better known
+constexpr double kLearnedFraction = 0.98;    // and for the motion to have told anything
+
+template <class... Args>
+[[noreturn]] void refuse(fmt::format_string<Args...> line, Args&&... args) {
+  throw ConfigError("calibrate target: " + fmt::format(line, std::forward<Args>(args)...));
+}
+
+void refuse_without_rest(const TargetRecorder::Counts& counts, std::size_t tags, int rest_frames) {
+  if (counts.frames == 0) refuse("the source gave no frame; check --source");
+  if (counts.flipped) {
+    refuse(
+        "the tags can be read only in the flipped image; change `mirrored` of sensor.yaml's camera "
+        "and start again");
+  }
+  if (counts.most_tags_seen == 0) {
+    refuse("no tag was seen in {} frames; check light, focus, and sensor.yaml's family and ids",
+           counts.frames);
+  }
+  if (counts.most_tags_seen < static_cast<int>(tags)) {
+    refuse(
+        "{} of {} tags were seen in {} frames; all must be in view at rest, check what covers them "
+        "and sensor.yaml's ids",
+        counts.most_tags_seen, tags, counts.frames);
+  }
+  if (counts.moved > 0) {
+    refuse("the platform never stood still for {} frames; keep your hands off at first",
+           rest_frames);
+  }
+  refuse("{} frames do not make a rest of {} frames with all tags held; record more", counts.frames,
+         rest_frames);
 }
 
 }  // namespace
@@ -169,6 +217,181 @@ void KeyframeSet::add(Keyframe frame) {
     for (Keyframe& kept : all)
       if (wants(kept.displacement)) frames_.push_back(std::move(kept));
   }
+}
+
+ViewSpan view_span(const std::vector<Keyframe>& frames,
+                   const Eigen::Isometry3d& rest_camera_T_platform) {
+  constexpr int kDirections = 36;
+  std::vector<Eigen::Vector2d> views;
+  const auto add = [&](const Eigen::Isometry3d& pose) {
+    const Eigen::Vector3d lens = pose.inverse().translation();
+    views.emplace_back(std::atan2(lens.x(), -lens.z()), std::atan2(lens.y(), -lens.z()));
+  };
+  add(rest_camera_T_platform);
+  for (const Keyframe& frame : frames) add(moved(rest_camera_T_platform, frame.displacement));
+  ViewSpan span{0, 1e9};
+  for (int i = 0; i < kDirections; ++i) {
+    const double angle = std::numbers::pi * i / kDirections;
+    const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
+    double low = 1e9;
+    double high = -1e9;
+    for (const Eigen::Vector2d& view : views) {
+      low = std::min(low, along.dot(view));
+      high = std::max(high, along.dot(view));
+    }
+    span.widest = std::max(span.widest, high - low);
+    span.narrowest = std::min(span.narrowest, high - low);
+  }
+  return span;
+}
+
+void check_record(const TargetRecorder& record, const TargetDescription& target,
+                  const ReferenceOptions& rest) {
+  const TargetRecorder::Counts& counts = record.counts();
+  if (target.tags.size() < 2) {
+    refuse(
+        "one tag alone moves like the platform itself, so that motion tells nothing of its place; "
+        "leave it to be learned at rest");
+  }
+  if (!record.rest_known()) refuse_without_rest(counts, target.tags.size(), rest.frames);
+  if (counts.moving == 0) {
+    refuse(
+        "all frames were needed for the rest; record more, and move the platform about after it");
+  }
+  if (counts.followed < kMinFollowed * counts.moving) {
+    refuse(
+        "all tags were held in only {} of {} frames; keep them in view, lit and in focus, and move "
+        "more slowly",
+        counts.followed, counts.moving);
+  }
+  const ViewSpan span =
+      view_span(record.keyframes(), midpoint_frame(record.at_rest().camera_T_tag));
+  if (span.narrowest < kMinView) {
+    const bool still = span.widest < kMinView;
+    refuse(
+        "the platform {}: the view of the tags turned by {:.1f} degrees one way and {:.1f} the "
+        "other, {:.1f} are needed both ways; tilt it, or push it sideways, along x and along y",
+        still ? "hardly moved" : "moved in one plane only", span.widest / kDegree,
+        span.narrowest / kDegree, kMinView / kDegree);
+  }
+  if (record.keyframes().size() < kMinKeyframes) {
+    refuse("{} different pictures are too few, {} are needed; move for longer",
+           record.keyframes().size(), kMinKeyframes);
+  }
+}
+
+void check_estimate(const TargetEstimate& estimate, const CameraModel& camera) {
+  if (!estimate.solved) {
+    refuse(
+        "the recording does not determine the tags' places; record again with slow, large motions "
+        "along every axis");
+  }
+  const double off = std::abs(estimate.focal_ratio - 1);
+  if (off > kMaxFocalError && off > kFocalSigmas * estimate.focal_sigma) {
+    refuse(
+        "the focal length that fits best is {:.1f} +- {:.1f} px, sensor.yaml says {:.1f}; run "
+        "`tagwrench calibrate camera`, or check tag_size_mm",
+        camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px);
+  }
+  if (!(estimate.noise_px < kMaxNoise_px)) {
+    refuse(
+        "edges lie {:.2f} px off where a rigid target would show them, {:.1f} is the limit; check "
+        "that the tags sit firmly on the platform, then run `tagwrench calibrate camera`",
+        estimate.noise_px, kMaxNoise_px);
+  }
+  if (better_known(estimate, kLearnedFraction) == 0) {
+    refuse(
+        "the motion tells nothing that the rest image does not; tilt and push further, with better "
+        "light");
+  }
+  double position = 0;
+  double rotation = 0;
+  for (const Vector6& sigma : platform_sigmas(estimate.covariance)) {
+    position = std::max(position, sigma.head<3>().maxCoeff());
+    rotation = std::max(rotation, sigma.tail<3>().maxCoeff());
+  }
+  if (position > kMaxPositionSigma || rotation > kMaxRotationSigma) {
+    refuse(
+        "the tags' places stay uncertain by {:.1f} um and {:.2f} mrad, {:.0f} and {:.0f} are the "
+        "limit; move further and longer, and check focus, light and print",
+        position * 1e6, rotation * 1e3, kMaxPositionSigma * 1e6, kMaxRotationSigma * 1e3);
+  }
+}
+
+std::vector<Vector6> platform_sigmas(const Eigen::MatrixXd& covariance) {
+  const Eigen::Index tags = covariance.rows() / 6;
+  std::vector<Vector6> out;
+  for (Eigen::Index t = 0; t < tags; ++t) {
+    Eigen::MatrixXd map = Eigen::MatrixXd::Zero(6, covariance.rows());
+    map.middleCols<6>(6 * t).setIdentity();
+    for (Eigen::Index other = 0; other < tags; ++other)
+      map.block<3, 3>(0, 6 * other) -= Eigen::Matrix3d::Identity() / static_cast<double>(tags);
+    const Eigen::MatrixXd own = map * covariance * map.transpose();
+    out.emplace_back(own.diagonal().cwiseMax(0.0).cwiseSqrt());
+  }
+  return out;
+}
+
+int better_known(const TargetEstimate& estimate, double part) {
+  const Eigen::VectorXd shares =
+      generalized_eigenvalues(estimate.covariance, estimate.covariance_at_rest);
+  return static_cast<int>((shares.array() < part * part).count());
+}
+
+bool readout_is_clear(const TargetEstimate& estimate) {
+  return estimate.readout > kReadoutSigmas * estimate.readout_sigma &&
+         estimate.readout_gain > kMinReadoutGain;
+}
+
+std::vector<std::string> describe(const TargetRecorder& record, const TargetEstimate& estimate,
+                                  const TargetDescription& target, const CameraModel& camera) {
+  const TargetRecorder::Counts& counts = record.counts();
+  const Vector6 range = record.range();
+  const ViewSpan span =
+      view_span(record.keyframes(), midpoint_frame(record.at_rest().camera_T_tag));
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format(
+      "{} frames at rest; then {} of {} with all tags held; {} different pictures, {} edge points",
+      record.at_rest().image.frames, counts.followed, counts.moving, record.keyframes().size(),
+      estimate.points));
+  lines.push_back(fmt::format(
+      "excited: x {:.2f}, y {:.2f}, z {:.2f} mm; about x {:.1f}, y {:.1f}, z {:.1f} degrees; the "
+      "view turned by {:.1f} and {:.1f} degrees ({:.1f} needed both ways)",
+      range[0] * 1e3, range[1] * 1e3, range[2] * 1e3, range[3] / kDegree, range[4] / kDegree,
+      range[5] / kDegree, span.widest / kDegree, span.narrowest / kDegree, kMinView / kDegree));
+  const Eigen::Isometry3d platform = midpoint_frame(estimate.camera_T_tag);
+  const std::vector<Vector6> after = platform_sigmas(estimate.covariance);
+  const std::vector<Vector6> before = platform_sigmas(estimate.covariance_at_rest);
+  for (std::size_t t = 0; t < target.tags.size(); ++t) {
+    const Vector6 pose = motion_between(Eigen::Isometry3d::Identity(),
+                                        platform.inverse() * estimate.camera_T_tag[t]);
+    const auto three = [](const Vector6& v, Eigen::Index from, double scale, int digits) {
+      return fmt::format("{:.{}f} {:.{}f} {:.{}f}", v[from] * scale, digits, v[from + 1] * scale,
+                         digits, v[from + 2] * scale, digits);
+    };
+    lines.push_back(
+        fmt::format("tag {}: position {} mm +- {} um (from the rest alone +- {}); rotation {} rad "
+                    "+- {} mrad (+- {})",
+                    target.tags[t].id, three(pose, 0, 1e3, 4), three(after[t], 0, 1e6, 2),
+                    three(before[t], 0, 1e6, 2), three(pose, 3, 1, 5), three(after[t], 3, 1e3, 2),
+                    three(before[t], 3, 1e3, 2)));
+  }
+  const int all = static_cast<int>(estimate.covariance.rows());
+  const int better = better_known(estimate, kBetterFraction);
+  lines.push_back(
+      fmt::format("{} of {} combinations of these are known better than from the rest; the other "
+                  "{} hang on the print, whose edges scatter by {:.1f} um",
+                  better, all, all - better, estimate.print_scatter * 1e6));
+  lines.push_back(fmt::format(
+      "focal length: {:.2f} +- {:.2f} px fits best, sensor.yaml says {:.2f}; residual {:.3f} px",
+      camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px,
+      estimate.residual_px));
+  lines.push_back(fmt::format(
+      "read-out: {:.1f} +- {:.1f} ms from the first row to the last, sensor.yaml says {:.1f}{}",
+      std::round(estimate.readout * 1e4) * 0.1 + 0.0,  // never "-0"
+      estimate.readout_sigma * 1e3, camera.readout * 1e3,
+      readout_is_clear(estimate) ? "" : "; not clearly other than 0"));
+  return lines;
 }
 
 }  // namespace tagwrench

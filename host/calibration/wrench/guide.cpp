@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/calibration/wrench/reference.h"
+#include "host/calibration/wrench/record.h"
 
 namespace tagwrench {
 namespace {

@@ -2,7 +2,7 @@
 // In:  a plan (masses in kg, points in m of the platform frame), tracks, readings of references.
 // Out: observations (displacement m and rad, wrench N and N m, covariances) for wrench/fit.h, and
 //      what people are asked to do.
-// Then: plan.h, record.h (and when it is steady), load.h (what a step applies), observations.h.
+// Then: plan.h (and what a step applies), record.h (when it is steady, what is made of it).
 //
 // Leads through a plan: asks for step after step, looks at frames and readings, accepts what is
 // steady and as it should be, and says what is not. Pure: it has no clock, no descriptor and no
@@ -14,7 +14,6 @@
 #include <string>
 #include <vector>
 
-#include "host/calibration/wrench/load.h"
 #include "host/calibration/wrench/plan.h"
 #include "host/calibration/wrench/record.h"
 #include "host/core/types.h"

@@ -1,11 +1,11 @@
-#include "host/calibration/wrench/observations.h"
-
+// What was recorded -> observations for the fit, and a trial for analysis and certificate.
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 
-#include "host/calibration/wrench/load.h"
+#include "host/calibration/wrench/plan.h"
+#include "host/calibration/wrench/record.h"
 #include "host/core/algebra/decompositions.h"
 #include "host/core/config_error.h"
 

@@ -11,7 +11,6 @@
 #include "host/app/input.h"
 #include "host/calibration/wrench/plan.h"
 #include "host/calibration/wrench/record.h"
-#include "host/calibration/wrench/reference.h"
 #include "host/recording/reader.h"
 #include "host/recording/writer.h"
 

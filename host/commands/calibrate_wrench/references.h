@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/calibration/wrench/plan.h"
-#include "host/calibration/wrench/reference.h"
+#include "host/calibration/wrench/record.h"
 #include "host/core/os/unique_fd.h"
 #include "host/source/simulator/bench.h"
 

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "host/calibration/wrench/observations.h"
 #include "host/calibration/wrench/plan.h"
 #include "host/calibration/wrench/record.h"
 #include "host/sensor/calibration_file.h"

@@ -7,7 +7,7 @@
 
 #include "host/app/input.h"
 #include "host/calibration/wrench/guide.h"
-#include "host/calibration/wrench/reference.h"
+#include "host/calibration/wrench/record.h"
 #include "host/commands/calibrate_wrench/recording.h"
 #include "host/commands/calibrate_wrench/result.h"
 #include "host/commands/events.h"

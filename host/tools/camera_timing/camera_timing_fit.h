@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "host/tools/camera_timing/camera_timing.h"
-#include "host/tools/camera_timing/row_profile.h"
 
 namespace tagwrench {
 

@@ -2,7 +2,7 @@
 // In:  pictures of a light that flashes a known pattern, or of a screen that flips; their stamps.
 // Out: frame rate (Hz), latency, jitter, read-out, exposure (s), stale and missing pictures, each
 //      with its standard deviation. Formulas: docs/theory.md.
-// Then: camera_timing.h (the model), camera_timing_fit.h, row_profile.h, pattern_lamp.h.
+// Then: camera_timing.h (the model), camera_timing_fit.h, pattern_lamp.h, flip_patches.h.
 //
 // `tagwrench camera-timing` without its options: a camera, a lamp, and what is done with them.
 #pragma once
@@ -14,7 +14,6 @@
 
 #include "host/source/frame_source.h"
 #include "host/tools/camera_timing/camera_timing.h"
-#include "host/tools/camera_timing/row_profile.h"
 
 namespace tagwrench {
 

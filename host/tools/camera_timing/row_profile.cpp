@@ -1,10 +1,11 @@
-#include "host/tools/camera_timing/row_profile.h"
-
+// What bands of rows see of a flashing light.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "host/tools/camera_timing/camera_timing.h"
 
 namespace tagwrench {
 namespace {

@@ -1,11 +1,11 @@
-#include "host/tools/design/checks.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include "host/tools/design/geometry.h"
 
 namespace tagwrench::hardware {
 namespace {

@@ -2,7 +2,7 @@
 // In:  camera (px, mm), tags, springs (N/mm), gaps; a file of hardware/sensors.
 // Out: resolution, range (N, N m), bandwidth (Hz), whether it can be built; what the parts, the tag
 //      sheet, sensor.yaml and the simulator take from it. SI inside, mm in files.
-// Then: parameters.h, geometry.h, checks.h.
+// Then: parameters.h, geometry.h.
 //
 // The instrument on paper: what a choice of camera, lens, tags and springs can measure, before
 // anything is built.

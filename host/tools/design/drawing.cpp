@@ -1,5 +1,3 @@
-#include "host/tools/design/drawing.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 #include <string_view>
+
+#include "host/tools/design/geometry.h"
 
 namespace tagwrench::hardware {
 namespace {

@@ -1,14 +1,17 @@
 // Where everything of a chosen sensor is, how far it moves, and what it bears: from the parameters
 // alone, pure. The drawing takes its heights from here, so that the checks see what is printed.
+// Then whether it can be built (checks.cpp), and its drawing (drawing.cpp).
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "host/core/types.h"
 #include "host/tools/design/parameters.h"
+#include "host/tracker/edges.h"
 
 namespace tagwrench::hardware {
 
@@ -98,5 +101,51 @@ bool stopped(const Parameters& parameters, const Geometry& geometry, const Vecto
 /// opposite, something is about to be met.
 double share_of_travel(const Parameters& parameters, const Geometry& geometry,
                        const Vector6& displacement);
+
+// Can it be built, and will it work? Each complaint names the parameter as the file writes it.
+
+struct Complaint {
+  std::string parameter;  ///< "target.lens_distance_mm"
+  std::string message;    ///< what is wrong and what to do
+};
+
+/// Empty: it can be built. Looked at over the whole travel: walls and the nozzle, room for springs,
+/// lens and LED, springs before they are solid, tags inside the picture and not hidden by springs,
+/// cover, plate or the mirror's holder, the lens' focus.
+std::vector<Complaint> complaints(const Parameters& parameters, const Geometry& geometry);
+
+/// Where a point of the drawing is seen, px. Behind the lens: not finite.
+Eigen::Vector2d seen_at(const Parameters& parameters, const Geometry& geometry,
+                        const Eigen::Vector3d& point);
+
+/// The corners of all papers, displaced, drawing frame; those of a tag in the mirror where they
+/// seem to be.
+std::vector<Eigen::Vector3d> paper_corners(const Parameters& parameters, const Geometry& geometry,
+                                           const Vector6& displacement);
+
+/// By how much a helical spring may be shortened before it gives way sideways, m; `length` and
+/// `mean_diameter` of the free coils, clamped at both ends, one of which moves sideways. Steel;
+/// EN 13906-1, critical deflection with seating coefficient 1. Infinite: never.
+double buckling_deflection(double length, double mean_diameter);
+
+// Where a known weight is hung from a finished sensor.
+
+/// Of the thread, which lies between a screw's head and the wall.
+constexpr double kThreadOffWall = 0.5e-3;
+
+/// Right (+x), left, lower (+y), upper; platform frame. In the middle of the roof's edges, half-way
+/// up, or in a knob's side at the height of the tags.
+std::array<Eigen::Vector3d, 4> load_points(const Parameters& parameters, const Geometry& geometry);
+
+/// What to hang there, kg: the largest usual weight that stays clear of the stops in every
+/// direction, with force and torque together.
+double load_mass(const Parameters& parameters, const Geometry& geometry);
+
+/// The sensor as OpenSCAD takes it, every number that the parts need, in mm and degrees.
+/// Assignments, one a line: of what stands in the file under its own name without the unit
+/// (`springs_free_length = 25.4;`), and of what follows from it (`z_cover_top = ...;`).
+/// `patterns`: what is printed on each of the geometry's tags.
+std::string scad_parameters(const Parameters& parameters, const Geometry& geometry,
+                            const std::vector<TagPattern>& patterns);
 
 }  // namespace tagwrench::hardware

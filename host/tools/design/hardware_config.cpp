@@ -9,7 +9,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/yaml/yaml_reader.h"
-#include "host/tools/design/checks.h"
+#include "host/tools/design/geometry.h"
 #include "host/tools/design/parameters.h"
 #include "host/tracker/target.h"
 

@@ -140,7 +140,7 @@ struct Parameters {
 namespace tagwrench {
 
 // hardware/sensors/NAME.yaml -> hardware::Parameters, and what a simulator makes of them. Every
-// check of a single value is here; whether they go together, host/tools/design/checks.h says.
+// check of a single value is here; whether they go together, host/tools/design/geometry.h says.
 
 /// The camera comes from ../cameras/NAME.yaml, seen from the file. Throws ConfigError with file,
 /// line and key.

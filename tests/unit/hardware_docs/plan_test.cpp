@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "host/commands/design_hardware.h"
-#include "host/tools/design/drawing.h"
+#include "host/tools/design/geometry.h"
 #include "host/tools/design/parameters.h"
 
 namespace tagwrench {

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "host/tools/camera_timing/page_patch.h"
+#include "host/tools/camera_timing/flip_patches.h"
 
 namespace tagwrench {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "host/tools/camera_timing/page_patch.h"
+#include "host/tools/camera_timing/flip_patches.h"
 
 namespace tagwrench {
 namespace {

@@ -1,7 +1,7 @@
 // Calibrating the target's geometry on the simulated sensor, which shares no maths with it.
 #include <gtest/gtest.h>
 
-#include "host/calibration/target/verdict.h"
+#include "host/calibration/target/recorder.h"
 #include "host/core/config_error.h"
 #include "host/tracker/tracker.h"
 #include "tests/unit/calibration/target/target_record.h"

@@ -6,7 +6,6 @@
 #include <iterator>
 #include <set>
 
-#include "host/calibration/wrench/load.h"
 #include "host/core/config_error.h"
 #include "tests/unit/calibration/wrench/wrench_bench.h"
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "host/calibration/wrench/guide.h"
-#include "host/calibration/wrench/load.h"
+#include "host/calibration/wrench/plan.h"
 
 namespace tagwrench::test {
 

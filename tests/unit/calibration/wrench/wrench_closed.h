@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "host/calibration/wrench/guide.h"
-#include "host/calibration/wrench/observations.h"
 #include "host/calibration/wrench/plan.h"
+#include "host/calibration/wrench/record.h"
 #include "host/commands/calibrate_wrench/simulated_person.h"
 #include "host/source/simulator/bench.h"
 #include "host/source/simulator/mechanics.h"

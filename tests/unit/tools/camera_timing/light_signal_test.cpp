@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "host/tools/camera_timing/row_profile.h"
+#include "host/tools/camera_timing/camera_timing.h"
 
 namespace tagwrench {
 namespace {

@@ -1,8 +1,8 @@
-#include "host/tools/camera_timing/row_profile.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "host/tools/camera_timing/camera_timing.h"
 
 namespace tagwrench {
 namespace {

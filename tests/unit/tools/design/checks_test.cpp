@@ -1,10 +1,9 @@
-#include "host/tools/design/checks.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
 
+#include "host/tools/design/geometry.h"
 #include "tests/unit/tools/design/published.h"
 
 namespace tagwrench::hardware {

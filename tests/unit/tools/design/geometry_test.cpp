@@ -4,7 +4,6 @@
 
 #include <Eigen/LU>
 
-#include "host/tools/design/drawing.h"
 #include "tests/unit/tools/design/published.h"
 
 namespace tagwrench::hardware {

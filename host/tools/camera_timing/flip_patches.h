@@ -1,4 +1,5 @@
-// A page that flips, in any browser: a phone or a tablet before the camera is the screen.
+// What flips before the camera: a page, in any browser, so that a phone or a tablet is the screen;
+// or a window of this computer.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +11,9 @@
 #include "host/core/types.h"
 #include "host/tools/camera_timing/measurement.h"
 #include "host/web/server/web_server.h"
+
+struct SDL_Window;
+struct SDL_Renderer;
 
 namespace tagwrench {
 
@@ -86,6 +90,30 @@ class PagePatch final : public FlipPatch, private PageRequestHandler {
   std::int64_t flip_ = 0;  ///< number of the last order
   TimePoint flip_sent_{};
   std::optional<TimePoint> shown_;
+};
+
+// A window that is black or white all over.
+
+class ScreenWindow final : public FlipPatch {
+ public:
+  /// Throws ConfigError if there is no screen.
+  ScreenWindow();
+  ~ScreenWindow() override;
+
+  /// Waits for `when`.
+  void show(bool white, TimePoint when) override;
+  std::optional<TimePoint> shown() override { return shown_; }
+  std::string ended() override;
+  std::string description() const;
+
+ private:
+  void paint();
+
+  SDL_Window* window_ = nullptr;
+  SDL_Renderer* renderer_ = nullptr;
+  bool white_ = false;
+  TimePoint shown_{};
+  bool closed_ = false;
 };
 
 }  // namespace tagwrench

@@ -1,5 +1,6 @@
-#include "host/tools/camera_timing/page_patch.h"
+#include "host/tools/camera_timing/flip_patches.h"
 
+#include <SDL.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/eventfd.h>
@@ -7,7 +8,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <ctime>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
@@ -29,29 +32,6 @@ Duration from_ms(double ms) { return Duration(std::llround(1e6 * ms)); }
 Duration drift(Duration since) {
   return Duration(std::llround(kDrift * static_cast<double>(since.count())));
 }
-
-}  // namespace
-
-bool PageClock::exchange(TimePoint sent, double page_ms, TimePoint received) noexcept {
-  if (!is_reading(page_ms) || received < sent) return false;
-  ++exchanges_;
-  last_ = received;
-  const Duration half = (received - sent) / 2;
-  if (exchanges_ > 1 && half > error()) return true;
-  half_ = half;
-  offset_ = (sent + half).time_since_epoch() - from_ms(page_ms);
-  measured_ = received;
-  return true;
-}
-
-std::optional<TimePoint> PageClock::host_time(double page_ms) const noexcept {
-  if (exchanges_ == 0 || !is_reading(page_ms)) return std::nullopt;
-  return TimePoint(from_ms(page_ms) + offset_);
-}
-
-Duration PageClock::error() const noexcept { return half_ + drift(last_ - measured_); }
-
-namespace {
 
 using Clock = std::chrono::steady_clock;
 using nlohmann::json;
@@ -83,8 +63,43 @@ bool is_number(const json& arguments, const char* key, std::int64_t wanted) {
          found->get<std::int64_t>() == wanted;
 }
 
+constexpr int kEdge_px = 700;  // of the window
+
+void wait_until(TimePoint when) {
+  const auto ns = when.time_since_epoch().count();
+  const timespec time{static_cast<time_t>(ns / 1'000'000'000),
+                      static_cast<long>(ns % 1'000'000'000)};
+  while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
+  }
+}
+
+[[noreturn]] void no_screen() {
+  const std::string why = SDL_GetError();
+  SDL_Quit();
+  throw ConfigError(
+      "--screen: no window can be shown ({}): start it from a desktop, or set DISPLAY", why);
+}
+
 }  // namespace
 
+bool PageClock::exchange(TimePoint sent, double page_ms, TimePoint received) noexcept {
+  if (!is_reading(page_ms) || received < sent) return false;
+  ++exchanges_;
+  last_ = received;
+  const Duration half = (received - sent) / 2;
+  if (exchanges_ > 1 && half > error()) return true;
+  half_ = half;
+  offset_ = (sent + half).time_since_epoch() - from_ms(page_ms);
+  measured_ = received;
+  return true;
+}
+
+std::optional<TimePoint> PageClock::host_time(double page_ms) const noexcept {
+  if (exchanges_ == 0 || !is_reading(page_ms)) return std::nullopt;
+  return TimePoint(from_ms(page_ms) + offset_);
+}
+
+Duration PageClock::error() const noexcept { return half_ + drift(last_ - measured_); }
 PagePatch::PagePatch(const WebOptions& options)
     : server_(with_page(options)), news_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   url_ = server_.url() + "flip/#screen";
@@ -225,6 +240,55 @@ void PagePatch::end(std::string why) {
 void PagePatch::tell_loop() const {
   const std::uint64_t one = 1;
   (void)!::write(news_.get(), &one, sizeof one);
+}
+
+ScreenWindow::ScreenWindow() {
+  SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
+  if (SDL_Init(SDL_INIT_VIDEO) != 0) no_screen();
+  window_ = SDL_CreateWindow("tagwrench camera-timing", SDL_WINDOWPOS_CENTERED,
+                             SDL_WINDOWPOS_CENTERED, kEdge_px, kEdge_px, SDL_WINDOW_SHOWN);
+  if (window_ == nullptr) no_screen();
+  // No waiting for the screen's refresh: its time is part of what is measured.
+  renderer_ = SDL_CreateRenderer(window_, -1, 0);
+  if (renderer_ == nullptr) {
+    SDL_DestroyWindow(window_);
+    no_screen();
+  }
+  paint();
+}
+
+ScreenWindow::~ScreenWindow() {
+  SDL_DestroyRenderer(renderer_);
+  SDL_DestroyWindow(window_);
+  SDL_Quit();
+}
+
+void ScreenWindow::paint() {
+  const std::uint8_t level = white_ ? 255 : 0;
+  SDL_SetRenderDrawColor(renderer_, level, level, level, 255);
+  SDL_RenderClear(renderer_);
+  SDL_RenderPresent(renderer_);
+}
+
+void ScreenWindow::show(bool white, TimePoint when) {
+  wait_until(when);
+  white_ = white;
+  shown_ = Clock::now();
+  paint();
+}
+
+std::string ScreenWindow::ended() {
+  for (SDL_Event event; SDL_PollEvent(&event) != 0;) {
+    if (event.type == SDL_QUIT) closed_ = true;
+    // What another window had covered is painted anew.
+    if (event.type == SDL_WINDOWEVENT && event.window.event == SDL_WINDOWEVENT_EXPOSED) paint();
+  }
+  return closed_ ? "the window was closed" : "";
+}
+
+std::string ScreenWindow::description() const {
+  return fmt::format("window of {0}x{0} pixels, video driver {1}", kEdge_px,
+                     SDL_GetCurrentVideoDriver());
 }
 
 }  // namespace tagwrench
