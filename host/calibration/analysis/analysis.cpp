@@ -85,8 +85,7 @@ std::vector<Range> usable_ranges(const std::vector<CleanTrial>& trials) {
 }
 
 struct FoldPlan {
-  std::vector<Range> held_out;
-  std::vector<Range> learned;
+  std::vector<Range> held_out, learned;
 };
 
 struct FoldPlans {
@@ -104,8 +103,7 @@ FoldPlan block(const CleanTrial& trial, const std::vector<Range>& ranges, Eigen:
     to = std::min(to, range.first + range.count);
     if (to > from) ranges_of_plan.push_back({range.trial, from, to - from});
   };
-  Eigen::Index before = first;
-  Eigen::Index after = end;
+  Eigen::Index before = first, after = end;
   while (before > 0 && trial.time[before - 1] > trial.time[first] - guard) --before;
   while (after < trial.time.size() && trial.time[after] < trial.time[end - 1] + guard) ++after;
   for (const Range& range : ranges) {
@@ -246,8 +244,7 @@ void cross_validate(const std::vector<CleanTrial>& trials, const std::vector<Fol
 
 void describe(const std::vector<CleanTrial>& trials, Analysis& analysis) {
   analysis.feature_names = trials[0].feature_names;
-  double reading_period = 0;
-  double reference_period = 0;
+  double reading_period = 0, reference_period = 0;
   for (const CleanTrial& trial : trials) {
     analysis.names.push_back(trial.name);
     analysis.references += trial.reference_time.size();

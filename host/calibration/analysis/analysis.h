@@ -2,8 +2,6 @@
 // In:  trials: times (s), features (m, rad), loads (N, N m); of calibrations, recordings, CSV.
 // Out: per axis R^2, RMSE (N, N m), lag (s), cross-talk, and why an axis is not calibrated.
 // Then: trial_csv.h, lag.h, analysis_steps.h.
-//
-// Trials -> what a certificate says about an instrument.
 #pragma once
 
 #include <Eigen/Core>

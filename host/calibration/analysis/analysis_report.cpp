@@ -36,8 +36,7 @@ int digits(double value) { return static_cast<int>(std::floor(std::log10(value))
 /// smallest full scale, if that leaves room for the largest.
 int range_decimals(const Analysis& a) {
   constexpr int kRoom = 9;  // digits
-  int decimals = 0;
-  int most = kRoom;
+  int decimals = 0, most = kRoom;
   for (const AxisReport& axis : a.axis) {
     if (axis.full_scale <= 0) continue;
     if (axis.calibrated) decimals = std::max(decimals, 4 - digits(axis.full_scale));

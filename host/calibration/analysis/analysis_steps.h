@@ -28,8 +28,7 @@ CleanTrial check_trial(const Trial& trial, const AnalysisOptions& options,
 /// Readings that follow each other, of one trial.
 struct Range {
   std::size_t trial = 0;
-  Eigen::Index first = 0;
-  Eigen::Index count = 0;
+  Eigen::Index first = 0, count = 0;
 };
 
 /// Readings of some ranges and what the reference felt then.
@@ -66,8 +65,9 @@ struct LinearModel {
   Eigen::MatrixXd predict(const Eigen::MatrixXd& features) const;
   /// Standard deviation of the error of each prediction, fit and residuals together: k x q.
   Eigen::MatrixXd sigma(const Eigen::MatrixXd& features) const;
-  Eigen::MatrixXd matrix() const;  ///< q x p: y = matrix() * features + constant()
-  Eigen::VectorXd constant() const;
+  /// q x p: y = matrix() * features + constant()
+  Eigen::MatrixXd matrix() const { return weights.transpose() * scale.asDiagonal(); }
+  Eigen::VectorXd constant() const { return offset - matrix() * mean; }
 };
 
 /// Least squares with the penalty ridge * n * |weights|^2 on standardised features. Combinations of

@@ -155,8 +155,7 @@ void note_saturation(const CleanTrial& clean, Warnings& warnings) {
     for (const double extreme : {low, high}) {
       // Zero exactly, again and again, is what an unloaded ideal reference says.
       if (extreme == 0) continue;
-      int run = 0;
-      int longest = 0;
+      int run = 0, longest = 0;
       for (const double value : values) {
         run = value == extreme ? run + 1 : 0;
         longest = std::max(longest, run);
@@ -211,8 +210,7 @@ constexpr double kCoarseStep = 0.02;      // of full scale
 
 void warn_of_dependence(Analysis& analysis) {
   std::vector<std::string> together;
-  double least = kLittleIndependent;
-  double most = 0;
+  double least = kLittleIndependent, most = 0;
   for (int k = 0; k < 6; ++k) {
     const AxisReport& axis = analysis.axis[k];
     if (!axis.calibrated || axis.independent >= kLittleIndependent) continue;
@@ -251,8 +249,7 @@ void warn_of_excitation(Analysis& analysis) {
 }
 
 void warn_of_steps(Analysis& analysis) {
-  std::vector<std::string> axes;
-  std::vector<std::string> steps;
+  std::vector<std::string> axes, steps;
   for (int k = 0; k < 6; ++k) {
     const AxisReport& axis = analysis.axis[k];
     const double share = axis.reference_step / axis.full_scale;
@@ -309,8 +306,7 @@ void warn_of_clocks(const std::vector<CleanTrial>& trials, const AnalysisOptions
 /// its own translation or rotation.
 void warn_of_sign(const Rows& all, Analysis& analysis) {
   if (analysis.feature_names != displacement_names()) return;
-  int with = 0;
-  int against = 0;
+  int with = 0, against = 0;
   for (int k = 0; k < 6; ++k) {
     if (!analysis.axis[k].calibrated) continue;
     const Eigen::VectorXd moved = all.features.col(k).array() - all.features.col(k).mean();
@@ -332,8 +328,7 @@ CleanTrial check_trial(const Trial& trial, const AnalysisOptions& options, Warni
   check_shapes(trial);
   check_times(trial.time, trial.name, "reading");
   check_times(trial.reference_time, trial.name, "row of the reference");
-  Eigen::Index first = 0;
-  Eigen::Index reference_first = 0;
+  Eigen::Index first = 0, reference_first = 0;
   if (options.drop_backlog && !trial.held) {
     first = backlog_rows(trial.time, trial.name, "readings", warnings);
     reference_first =

@@ -1,5 +1,4 @@
 // Other people's CSV files -> a Trial.
-#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>

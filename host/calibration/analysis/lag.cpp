@@ -129,10 +129,7 @@ class LagScan {
       const auto [at, is_new] = models.try_emplace(blocks[b].model, blocks[b]);
       if (!is_new) at->second += blocks[b];
     }
-    double sum = 0;
-    double shares = 0;
-    double weight = 0;
-    double least = 1;
+    double sum = 0, shares = 0, weight = 0, least = 1;
     for (auto& [model, s] : models) {
       const Eigen::Index p = s.xx.rows();
       if (s.n < static_cast<double>(3 * p)) continue;
@@ -159,8 +156,7 @@ class LagScan {
  private:
   std::vector<Prepared> prepared_;
   double ridge_;
-  Eigen::Index rows_ = 0;
-  Eigen::Index block_rows_ = 1;
+  Eigen::Index rows_ = 0, block_rows_ = 1;
 };
 
 /// Readings and reference by one triangle, wide enough that what is left of the reference's noise

@@ -88,8 +88,7 @@ double nonlinearity(const Series& s, const AxisReport& axis) {
 
 double hysteresis(const Series& s, const Eigen::VectorXi& segment, const AxisReport& axis) {
   if (!(axis.range_high > axis.range_low)) return 0;
-  std::vector<Eigen::Index> rising;
-  std::vector<Eigen::Index> falling;
+  std::vector<Eigen::Index> rising, falling;
   for (Eigen::Index i = 1; i + 1 < s.felt.size(); ++i) {
     if (segment[i - 1] != segment[i + 1]) continue;
     const double change = s.felt[i + 1] - s.felt[i - 1];
@@ -101,8 +100,7 @@ double hysteresis(const Series& s, const Eigen::VectorXi& segment, const AxisRep
 
 /// Rows in which the load stands still.
 struct Window {
-  Eigen::Index first = 0;
-  Eigen::Index count = 0;
+  Eigen::Index first = 0, count = 0;
 
   Eigen::VectorXd of(const Eigen::VectorXd& column) const { return column.segment(first, count); }
 };
@@ -141,10 +139,7 @@ std::vector<Window> windows_at_rest(const Rows& course, const Analysis& analysis
 /// sqrt(2 period) times the Allan deviation at one period (IEEE Std 952, annex C).
 void measure_noise(const Eigen::VectorXd& time, const Eigen::VectorXd& predicted,
                    const std::vector<Window>& windows, double period, AxisReport& axis) {
-  double squares = 0;
-  double freedom = 0;
-  double differences = 0;
-  double pairs = 0;
+  double squares = 0, freedom = 0, differences = 0, pairs = 0;
   for (const Window& w : windows) {
     const Eigen::VectorXd t = w.of(time);
     const Eigen::VectorXd p = w.of(predicted);
@@ -262,10 +257,6 @@ Eigen::MatrixXd LinearModel::sigma(const Eigen::MatrixXd& features) const {
   return (1 + leverage).sqrt().matrix() * variance.cwiseSqrt().transpose();
 }
 
-Eigen::MatrixXd LinearModel::matrix() const { return weights.transpose() * scale.asDiagonal(); }
-
-Eigen::VectorXd LinearModel::constant() const { return offset - matrix() * mean; }
-
 LinearModel fit_linear(const Eigen::MatrixXd& features, const Eigen::MatrixXd& values,
                        double ridge) {
   LinearModel model;
@@ -287,8 +278,7 @@ LinearModel fit_linear(const Eigen::MatrixXd& features, const Eigen::MatrixXd& v
   const Eigen::VectorXd& lambda = eigen.values;
   const double largest = lambda.size() > 0 ? lambda[lambda.size() - 1] : 0;
   Eigen::VectorXd inverse = Eigen::VectorXd::Zero(lambda.size());
-  double freedom = 1;
-  double smallest = largest;
+  double freedom = 1, smallest = largest;
   for (Eigen::Index i = 0; i < lambda.size(); ++i) {
     if (lambda[i] <= kRankTolerance * largest) continue;
     inverse[i] = 1 / ((lambda[i] + ridge) * n);

@@ -1,6 +1,5 @@
 #include "host/calibration/analysis/trial_csv.h"
 
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -87,8 +86,7 @@ void add_row(Out out, const Eigen::MatrixXd& matrix, Eigen::Index row) {
 
 /// The columns of one kind of row; which columns of the file hold them.
 struct Columns {
-  std::vector<std::size_t> values;
-  std::vector<std::size_t> sigmas;
+  std::vector<std::size_t> values, sigmas;
 };
 
 class TrialReader {
@@ -105,8 +103,7 @@ class TrialReader {
   }
 
   Trial read() {
-    std::vector<std::size_t> readings;
-    std::vector<std::size_t> references;
+    std::vector<std::size_t> readings, references;
     for (std::size_t row = 0; row < text_.rows(); ++row) {
       const std::string_view kind = text_.field(row, 0);
       if (kind != "reading" && kind != "reference")
@@ -275,10 +272,6 @@ DelimitedText::DelimitedText(const std::filesystem::path& file, char separator, 
   if (lines_.empty()) throw ConfigError("{}: a header, but no rows in it", name_);
 }
 
-std::string DelimitedText::place(std::size_t row) const {
-  return fmt::format("{}:{}", name_, lines_[row]);
-}
-
 double DelimitedText::number(std::size_t row, std::size_t column, double largest) const {
   const std::string_view text = field(row, column);
   const std::optional<double> value = parse_number(text);
@@ -392,8 +385,7 @@ std::string trial_to_csv(const Trial& trial) {
   const auto out = std::back_inserter(text);
   const std::string no_features(std::count(features.begin(), features.end(), ','), ',');
   const std::string no_loads(std::count(loads.begin(), loads.end(), ','), ',');
-  Eigen::Index reading = 0;
-  Eigen::Index reference = 0;
+  Eigen::Index reading = 0, reference = 0;
   while (reading < trial.time.size() || reference < trial.reference_time.size()) {
     const bool reads =
         reference == trial.reference_time.size() ||

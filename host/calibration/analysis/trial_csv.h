@@ -12,6 +12,8 @@
 // as a whole; the predictions of one reading may be empty.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <cstddef>
 #include <filesystem>
@@ -83,7 +85,7 @@ class DelimitedText {
   static constexpr double kMax = 1e12;  ///< squares and sums of it stay finite
 
   /// FILE:LINE, for messages.
-  std::string place(std::size_t row) const;
+  std::string place(std::size_t row) const { return fmt::format("{}:{}", name_, lines_[row]); }
   const std::string& name() const noexcept { return name_; }
 
   /// Throws ConfigError unless it is a number of at most `largest`, either way.
@@ -98,11 +100,9 @@ class DelimitedText {
   std::vector<std::size_t> find(std::string_view columns) const;
 
  private:
-  std::string name_;
-  std::string text_;
+  std::string name_, text_;
   std::size_t columns_ = 0;
-  std::vector<std::string> header_;
-  std::vector<std::string> comments_;
+  std::vector<std::string> header_, comments_;
   std::vector<std::string_view> fields_;
   std::vector<std::size_t> lines_;  ///< of each row, counted from 1
 };
@@ -137,8 +137,7 @@ struct CsvMapping {
   std::filesystem::path reference;  ///< empty: in the same file, at the same times
   char separator = 0;               ///< 0: found out
   std::size_t skip_lines = 0;       ///< at the top of each file
-  std::string reading_time = "1";
-  std::string reference_time = "1";
+  std::string reading_time = "1", reference_time = "1";
   double time_unit = 1;  ///< s
   double reference_time_unit = 1;
   std::vector<FeatureColumns> features;

@@ -122,8 +122,7 @@ Markers read_markers(const cv::Mat& image) {
 cv::Point2f place(int id, int columns) {
   const int pair = 2 * columns;  // squares of two rows hold `columns` markers
   const int rows = id / columns * 2;
-  int square = 0;
-  int left = id % columns;
+  int square = 0, left = id % columns;
   for (; square < pair; ++square) {
     const bool white = (square / columns + square % columns) % 2 == 1;
     if (white && left-- == 0) break;

@@ -39,13 +39,6 @@ double difference_px(const std::vector<BoardCorner>& a, const std::vector<BoardC
 ViewCollector::ViewCollector(const BoardSpec& board, const CameraModel& camera, bool live)
     : board_(board), camera_(camera), live_(live), finder_(board, camera.mirrored) {}
 
-bool ViewCollector::still(const std::vector<BoardCorner>& corners) {
-  const bool now = difference_px(previous_, corners) < kStill * camera_.width_px;
-  still_frames_ = now ? still_frames_ + 1 : 0;
-  previous_ = corners;
-  return still_frames_ >= kStillFrames;
-}
-
 void ViewCollector::keep(const ImageView& image) {
   if (undetected_.size() >= kMaxUndetected) return;
   std::vector<std::uint8_t>& copy = undetected_.emplace_back();
@@ -64,7 +57,12 @@ ViewResult ViewCollector::look(const ImageView& image, const std::string& name) 
   ++looked_;
   if (sighting.look == BoardView::no_board || sighting.look == BoardView::other_board) keep(image);
   if (sighting.look != BoardView::board) return ViewResult::no;
-  if (live_ && !still(sighting.corners)) return ViewResult::moving;
+  if (live_) {
+    const bool still = difference_px(previous_, sighting.corners) < kStill * camera_.width_px;
+    still_frames_ = still ? still_frames_ + 1 : 0;
+    previous_ = sighting.corners;
+    if (still_frames_ < kStillFrames) return ViewResult::moving;
+  }
   const auto alike = [&](const CameraView& view) {
     return difference_px(view.corners, sighting.corners) < kAlike * camera_.width_px;
   };
@@ -113,20 +111,16 @@ std::string ViewCollector::what_was_seen() const {
   return listed(parts);
 }
 
-std::string ViewCollector::other_board() const {
-  std::vector<ImageView> images;
-  for (const auto& pixels : undetected_)
-    images.push_back({pixels.data(), camera_.width_px, camera_.height_px, camera_.width_px});
-  return guess_board(images, board_);
-}
-
 void ViewCollector::check() const {
   const std::string asked = describe(board_);
   const auto found = looks_.find(BoardView::board);
   const int count = found == looks_.end() ? 0 : found->second;
   // Part of a checkerboard may pass for a smaller one here and there.
   if (static_cast<int>(views_.size()) < kMinCameraViews) {
-    if (const std::string guess = other_board(); !guess.empty()) {
+    std::vector<ImageView> images;
+    for (const auto& pixels : undetected_)
+      images.push_back({pixels.data(), camera_.width_px, camera_.height_px, camera_.width_px});
+    if (const std::string guess = guess_board(images, board_); !guess.empty()) {
       throw ConfigError(
           "--board {}: found in {} of {} images; the board in the others looks like {}: correct "
           "--board, or show all of it",

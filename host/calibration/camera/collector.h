@@ -45,9 +45,7 @@ class ViewCollector {
   void check() const;
 
  private:
-  bool still(const std::vector<BoardCorner>& corners);
   std::string what_was_seen() const;
-  std::string other_board() const;
   void keep(const ImageView& image);
 
   BoardSpec board_;
@@ -59,8 +57,7 @@ class ViewCollector {
   int still_frames_ = 0;
   BoardView last_look_ = BoardView::no_board;
   std::map<BoardView, int> looks_;
-  int looked_ = 0;
-  int alike_ = 0;
+  int looked_ = 0, alike_ = 0;
   std::vector<std::vector<std::uint8_t>> undetected_;  ///< images in which the board was not found
 };
 

@@ -80,8 +80,7 @@ struct Model {
 struct Print {
   double sign = 1;  ///< +1: the quadrants where u and v have the same sign are white
   bool markers = false;
-  double gap_u_px = 0;
-  double gap_v_px = 0;
+  double gap_u_px = 0, gap_v_px = 0;
 };
 
 Model model(const Parameters& p, const Eigen::Vector2d& pixel, const Print& print) {
@@ -195,9 +194,7 @@ Print print_at(const BoardCorner& corner, const LocalGrid& grid, const SquareFil
 
 struct Crossing {
   Eigen::Vector2d pixel;
-  double blur_px;
-  double contrast;
-  double white;
+  double blur_px, contrast, white;
 };
 
 std::optional<Crossing> crossing_near(const ImageView& image, const Eigen::Vector2d& start,
@@ -223,9 +220,7 @@ std::optional<Crossing> crossing_near(const ImageView& image, const Eigen::Vecto
 RefinedCorners refine_corners(const ImageView& image, const std::vector<BoardCorner>& rough,
                               const SquareFill& fill) {
   RefinedCorners out;
-  std::vector<double> blur;
-  std::vector<double> spacing;
-  std::vector<double> contrast;
+  std::vector<double> blur, spacing, contrast;
   int clipped = 0;
   for (std::size_t i = 0; i < rough.size(); ++i) {
     const std::optional<LocalGrid> grid = local_grid(rough, i);

@@ -1,6 +1,5 @@
 #include "host/calibration/camera/fit.h"
 
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -55,8 +54,7 @@ std::vector<std::size_t> every(const std::vector<Points>& views) {
 struct Solution {
   cv::Matx33d matrix = cv::Matx33d::eye();
   cv::Mat distortion = cv::Mat::zeros(1, 5, CV_64F);
-  std::vector<cv::Mat> rotations;
-  std::vector<cv::Mat> translations;
+  std::vector<cv::Mat> rotations, translations;
   cv::Mat sigma;     ///< of the intrinsics
   cv::Mat view_rms;  ///< px
   double rms_px = 0;
@@ -299,8 +297,7 @@ void Coverage::add(const std::vector<BoardCorner>& corners, const BoardPose& pos
     const int column = std::clamp(static_cast<int>(3 * (corner.pixel.x() + 0.5) / width_), 0, 2);
     const int row = std::clamp(static_cast<int>(3 * (corner.pixel.y() + 0.5) / height_), 0, 2);
     ++corners_[static_cast<std::size_t>(3 * row + column)];
-    low_ = low_.cwiseMin(corner.pixel);
-    high_ = high_.cwiseMax(corner.pixel);
+    corners_box_.extend(corner.pixel);
   }
   // Where the normal leans to x, the plane comes nearer there.
   const Eigen::Vector3d& n = pose.normal;
@@ -342,8 +339,8 @@ std::vector<std::string> Coverage::missing() const {
 }
 
 double Coverage::span() const {
-  const Eigen::Vector2d part = (high_ - low_).cwiseQuotient(Eigen::Vector2d(width_, height_));
-  return std::max(0.0, part.minCoeff());
+  if (corners_box_.isEmpty()) return 0;
+  return corners_box_.sizes().cwiseQuotient(Eigen::Vector2d(width_, height_)).minCoeff();
 }
 
 void check_views(const std::vector<CameraView>& views, const Coverage& coverage) {

@@ -2,11 +2,10 @@
 // In:  corners of the board, px of the camera's picture; the board's squares, m.
 // Out: CameraModel: focal lengths and centre in px, OpenCV's distortion, with standard deviations.
 // Then: collector.h (takes views by itself), board.h (finds the board).
-//
-// Views of a board -> camera. Uses OpenCV inside.
+// Uses OpenCV inside.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <string>
 #include <vector>
@@ -69,15 +68,11 @@ class Coverage {
   double span() const;
 
  private:
-  int width_;
-  int height_;
+  int width_, height_;
   std::array<int, 9> corners_{};  ///< per region, reading order
   std::array<bool, 4> tilted_{};  ///< left, right, top, bottom edge nearer to the lens
-  double largest_tilt_ = 0;
-  double nearest_ = 0;
-  double farthest_ = 0;
-  Eigen::Vector2d low_ = Eigen::Vector2d::Constant(1e9);
-  Eigen::Vector2d high_ = Eigen::Vector2d::Constant(-1e9);
+  double largest_tilt_ = 0, nearest_ = 0, farthest_ = 0;
+  Eigen::AlignedBox2d corners_box_;  ///< px
 };
 
 /// Least squares on the reprojection error (OpenCV's calibrateCamera, after Zhang, "A flexible new

@@ -2,8 +2,6 @@
 // In:  the figures of calibration/analysis, N and N m; facts about sensor, plan and program.
 // Out: three files that bear the same number, a hash of the contents.
 // Then: html.cpp, render.cpp.
-//
-// What a certificate says: the figures of an analysis, and what they rest on.
 #pragma once
 
 #include <chrono>
@@ -32,8 +30,7 @@ struct Certificate {
   std::string number;    ///< of its contents; empty until they are complete
   std::string issued;    ///< YYYY-MM-DD
   std::string software;  ///< "tagwrench 0.1.0"
-  std::vector<Fact> sensor;
-  std::vector<Fact> procedure;
+  std::vector<Fact> sensor, procedure;
   std::vector<CertificateData> data;
   study::Analysis analysis;
 };

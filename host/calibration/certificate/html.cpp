@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -327,24 +328,20 @@ std::string range_text(double low, double high, int axis) {
 }
 
 std::string escaped(std::string_view text) {
+  constexpr std::array<std::pair<char, const char*>, 5> kEntities{
+      {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}}};
   std::string out;
   for (std::size_t i = 0; i < text.size();) {
     const std::size_t length = utf8_length(text.substr(i));
     const char c = text[i];
+    const auto entity = std::find_if(kEntities.begin(), kEntities.end(),
+                                     [c](const auto& known) { return known.first == c; });
     if (length == 0)
       out += "\uFFFD";
     else if (length > 1)
       out += text.substr(i, length);
-    else if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else if (c == '"')
-      out += "&quot;";
-    else if (c == '\'')
-      out += "&#39;";
+    else if (entity != kEntities.end())
+      out += entity->second;
     else
       out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
     i += std::max<std::size_t>(1, length);

@@ -215,8 +215,7 @@ std::string trace_data(const Analysis& a, const Eigen::VectorXd& time,
     if (begin > 0 && !goes_on(a, begin)) text += "\n";
     Eigen::Index end = begin + 1;
     while (end < time.size() && end < begin + most && goes_on(a, end)) ++end;
-    Eigen::Index low = 0;
-    Eigen::Index high = 0;
+    Eigen::Index low = 0, high = 0;
     values.col(axis).segment(begin, end - begin).minCoeff(&low);
     values.col(axis).segment(begin, end - begin).maxCoeff(&high);
     add(begin + std::min(low, high));

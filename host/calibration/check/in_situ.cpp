@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "host/core/algebra/decompositions.h"
+#include "host/tracker/rotation.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -30,8 +31,7 @@ bool scale_is_off(double scale, double sigma) {
 /// Displacement of the platform's origin -> of a point of it, for small turns.
 Matrix6 at_point(const Eigen::Vector3d& point) {
   Matrix6 m = Matrix6::Identity();
-  m.topRightCorner<3, 3>() << 0, point.z(), -point.y(), -point.z(), 0, point.x(), point.y(),
-      -point.x(), 0;
+  m.topRightCorner<3, 3>() = cross_matrix(-point);
   return m;
 }
 
@@ -56,11 +56,9 @@ Disagreement disagreement(const TagAtRest& a, const TagAtRest& b, const AtRest& 
   const Matrix6 to_a = at_point(a.centre);
   const Matrix6 covariance =
       to_a * (mean_covariance(a, rest) + mean_covariance(b, rest)) * to_a.transpose();
-  Disagreement result;
-  result.move = to_a * (a.displacement - b.displacement);
+  const Vector6 move = to_a * (a.displacement - b.displacement);
   const Vector6 limit = kSigmas * covariance.diagonal().cwiseMax(0).cwiseSqrt() + kFloor;
-  result.share = largest_share(result.move, limit);
-  return result;
+  return {largest_share(move, limit), move};
 }
 
 InSituFinding judge_light(const AtRest& rest) {
@@ -255,15 +253,6 @@ InSituFinding judge(const ReferenceMonitor& monitor) {
   return finding;
 }
 
-/// West, "Updating mean and variance estimates", CACM 22(9), 1979.
-void ReferenceMonitor::take(double weight, double force, double measured) noexcept {
-  weight_ += weight;
-  const double part = weight / weight_;
-  const Eigen::Vector2d off = Eigen::Vector2d(force, measured) - mean_;
-  mean_ += part * off;
-  scatter_ += weight * (1 - part) * off * off.transpose();
-}
-
 void ReferenceMonitor::fit() noexcept {
   slope_sigma_ = zero_sigma_ = kNever;
   if (independent_ < kMinPairs || !(scatter_(0, 0) > 0)) return;
@@ -311,7 +300,12 @@ ReferenceFault ReferenceMonitor::add(TimePoint time, const Vector6& wrench, cons
     const double off = std::abs(measured - zero_ - slope_ * force) / residual_;
     weight = std::min(1.0, kHuber / std::max(off, 1e-9));
   }
-  take(weight, force, measured);
+  // West, "Updating mean and variance estimates", CACM 22(9), 1979.
+  weight_ += weight;
+  const double part = weight / weight_;
+  const Eigen::Vector2d off_mean = Eigen::Vector2d(force, measured) - mean_;
+  mean_ += part * off_mean;
+  scatter_ += weight * (1 - part) * off_mean * off_mean.transpose();
   independent_ += weight * std::min(1.0, dt / kCorrelation);
   fit();
 

@@ -2,8 +2,7 @@
 // In:  means over seconds: tags (m, rad), light (grey levels), blur (px^2), loads (N).
 // Out: findings: fine or off, by how much, and what to do again.
 //
-// Whether a calibrated sensor is still the one that was calibrated: numbers from a few seconds with
-// hands off, and from a known load, in; what is wrong, out.
+// The numbers come from a few seconds with hands off, and from a known load.
 #pragma once
 
 #include <cstdint>
@@ -75,11 +74,8 @@ enum class Fault : std::uint8_t {
 struct InSituFinding {
   Subject subject = Subject::light;
   Fault fault = Fault::none;
-  double amount = 0;
-  double expected = 0;
-  double sigma = 0;
-  int tag = 0;
-  int axis = 0;
+  double amount = 0, expected = 0, sigma = 0;
+  int tag = 0, axis = 0;
   Vector6 move = Vector6::Zero();  ///< of the tag's centre, m and rad, camera axes
 
   bool fine() const { return fault == Fault::none; }
@@ -118,7 +114,6 @@ class ReferenceMonitor {
     double lasted = 0;  ///< s
     bool told = false;
   };
-  void take(double weight, double force, double measured) noexcept;
   void fit() noexcept;
   bool confirmed(Suspicion& suspicion, bool now, double dt) const noexcept;
 

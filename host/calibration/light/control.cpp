@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace tagwrench {
@@ -44,16 +45,13 @@ struct Histogram {
     return 0;
   }
   std::uint32_t clipped() const {
-    std::uint32_t sum = 0;
-    for (auto level = static_cast<std::size_t>(LightControl::kClipped_counts); level < 256; ++level)
-      sum += count[level];
-    return sum;
+    constexpr int kFirst = static_cast<int>(LightControl::kClipped_counts);
+    return std::accumulate(count.begin() + kFirst, count.end(), 0U);
   }
 };
 
 bool within(const std::array<Eigen::Vector2d, 4>& corners, double x, double y) {
-  bool left = false;
-  bool right = false;
+  bool left = false, right = false;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d& a = corners[i];
     const Eigen::Vector2d edge = corners[(i + 1) % 4] - a;
@@ -65,21 +63,15 @@ bool within(const std::array<Eigen::Vector2d, 4>& corners, double x, double y) {
 }
 
 Histogram tag_histogram(const ImageView& image, bool mirrored, const FoundTag& tag) {
-  double x0 = image.width, x1 = -1, y0 = image.height, y1 = -1;
-  for (const Eigen::Vector2d& corner : tag.corners_px) {
-    x0 = std::min(x0, corner.x());
-    x1 = std::max(x1, corner.x());
-    y0 = std::min(y0, corner.y());
-    y1 = std::max(y1, corner.y());
-  }
-  const auto clamped = [](double value, int limit) {
-    return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(limit - 1)));
-  };
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : tag.corners_px) box.extend(corner);
+  const Eigen::Vector2d end(image.width - 1, image.height - 1);
+  const Eigen::Vector2i low = box.min().cwiseMin(end).cwiseMax(0).cast<int>();
+  const Eigen::Vector2i high = box.max().cwiseMin(end).cwiseMax(0).cast<int>();
   Histogram histogram;
-  if (x1 < x0 || y1 < y0) return histogram;
-  for (int y = clamped(y0, image.height); y <= clamped(y1, image.height); ++y) {
+  for (int y = low.y(); y <= high.y(); ++y) {
     const std::uint8_t* row = image.pixels + static_cast<std::ptrdiff_t>(y) * image.stride;
-    for (int x = clamped(x0, image.width); x <= clamped(x1, image.width); ++x)
+    for (int x = low.x(); x <= high.x(); ++x)
       if (within(tag.corners_px, x, y)) histogram.add(row[mirrored ? image.width - 1 - x : x]);
   }
   return histogram;
@@ -92,11 +84,6 @@ constexpr int kMaxPictures = 24;
 constexpr Duration kPatience = std::chrono::seconds(3);  // for one frame
 constexpr double kMaxGain = 16;  // of a camera whose gain has no unit: as if its range were 1..16
 constexpr double kMuchAmbient = 0.3;
-
-/// The camera's own gain for one of 1..kMaxGain.
-double raw_gain(const CameraLight::Range& range, double gain) {
-  return range.least + (gain - 1) / (kMaxGain - 1) * (range.most - range.least);
-}
 
 struct Settling {
   FrameSource& source;
@@ -126,14 +113,11 @@ struct Settling {
   }
 
   LightLimits limits() const {
-    LightLimits limits;
-    limits.led_permille = lamp.range_permille();
-    limits.exposure_us = {1, 1};
-    limits.gain = {1, 1};
+    LightLimits limits{{1, 1}, lamp.range_permille(), {1, 1}};
     if (const CameraLight* camera = source.camera_light()) {
       const CameraLight::Range exposure = camera->exposure_range_us();
       limits.exposure_us = {exposure.least, exposure.most};
-      if (exposure.most <= exposure.least)
+      if (!limits.exposure_us.settable())
         limits.exposure_us = {camera->exposure_us(), camera->exposure_us()};
       const CameraLight::Range gain = camera->gain_range();
       if (gain.most > gain.least) limits.gain = {1, kMaxGain};
@@ -148,7 +132,8 @@ struct Settling {
     const CameraLight::Range exposure = camera->exposure_range_us();
     if (exposure.most > exposure.least) camera->set_exposure_us(setting.exposure_us);
     const CameraLight::Range gain = camera->gain_range();
-    if (gain.most > gain.least) camera->set_gain(raw_gain(gain, setting.gain));
+    const double share = (setting.gain - 1) / (kMaxGain - 1);
+    if (gain.most > gain.least) camera->set_gain(gain.least + share * (gain.most - gain.least));
   }
 
   /// The share of light that stays when the LED is off, in the same places.
@@ -166,10 +151,8 @@ struct Settling {
   /// The first picture that shows the present setting.
   bool look() {
     for (int frames = 0; frames < kFramesUntilSeen; ++frames) {
-      if (!next_picture()) {
-        report.stopped = true;
-        return false;
-      }
+      report.stopped = !next_picture();
+      if (report.stopped) return false;
     }
     return true;
   }
@@ -232,8 +215,7 @@ void LightControl::scale(double factor) noexcept {
 
 LightReading read_light(const ImageView& image, bool mirrored, const std::vector<FoundTag>& tags) {
   LightReading reading;
-  std::uint32_t clipped = 0;
-  std::uint32_t total = 0;
+  std::uint32_t clipped = 0, total = 0;
   for (const FoundTag& tag : tags) {
     const Histogram histogram = tag_histogram(image, mirrored, tag);
     reading.white_counts = std::max(reading.white_counts, histogram.exceeded_by(kTagShare));

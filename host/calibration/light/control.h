@@ -2,8 +2,7 @@
 // In:  what a picture shows of the tags' white, grey levels 0..255; what can be set.
 // Out: exposure (us), LED (permille), gain to set next, until white is at 190 and nothing clips.
 //
-// How bright: exposure, LED and gain such that the white of the tags has a set level. Pure: it is
-// told what a picture showed, and says what to set next.
+// LightControl is pure: it is told what a picture showed, and says what to set next.
 #pragma once
 
 #include <cstdint>
@@ -33,9 +32,7 @@ struct LightLimits {
 };
 
 struct LightSetting {
-  double exposure_us = 0;
-  double led_permille = 0;
-  double gain = 0;
+  double exposure_us = 0, led_permille = 0, gain = 0;
 };
 
 struct LightReading {

@@ -16,7 +16,6 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
-#include "host/tracker/target.h"
 
 namespace tagwrench {
 namespace {
@@ -43,10 +42,7 @@ constexpr double kLetterWidth = 0.61;  // of a typewriter face, of its height
 
 /// Where items may lie.
 struct Rectangle {
-  double left_mm = 0;
-  double top_mm = 0;
-  double right_mm = 0;
-  double bottom_mm = 0;
+  double left_mm = 0, top_mm = 0, right_mm = 0, bottom_mm = 0;
 };
 
 /// Something to cut out, and what is written under it.

@@ -2,9 +2,6 @@
 // In:  families, ids and sizes, mm.
 // Out: drawings in mm on A4 or letter, as PDF or SVG, with bars of 50.0 mm to measure.
 // Then: board_spec.h (a board in one word).
-//
-// What `tagwrench tags` prints: sheets of tags, calibration boards and the published sheet, as
-// drawings.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +18,7 @@ namespace tagwrench {
 // A printed page as plain data. Millimetres from the top left corner of the paper, x right, y down.
 
 struct PagePoint {
-  double x_mm = 0;
-  double y_mm = 0;
+  double x_mm = 0, y_mm = 0;
 };
 
 /// Closed polygons filled black as one shape, even-odd: what lies inside two of them is white.
@@ -46,8 +42,7 @@ struct Text {
 };
 
 struct Drawing {
-  double width_mm = 0;
-  double height_mm = 0;
+  double width_mm = 0, height_mm = 0;
   std::vector<Area> areas;
   std::vector<Line> lines;
   std::vector<Text> texts;
@@ -60,8 +55,7 @@ void write_vector_file(const Drawing& drawing, const std::filesystem::path& path
 
 struct Paper {
   std::string_view name;
-  double width_mm = 0;
-  double height_mm = 0;
+  double width_mm = 0, height_mm = 0;
 };
 
 constexpr Paper kA4 = {"a4", 210.0, 297.0};
@@ -71,8 +65,7 @@ constexpr Paper kLetter = {"letter", 215.9, 279.4};
 // a seam between neighbours.
 
 struct CellGrid {
-  int columns = 0;
-  int rows = 0;
+  int columns = 0, rows = 0;
   std::vector<bool> black;  ///< row by row from the top left
 
   bool is_black(int column, int row) const {

@@ -123,17 +123,178 @@ struct Problem {
     return {rest.image.level.data(), rest.image.width, rest.image.height, rest.image.width};
   }
 
-  void keep_visible();
-  EdgeTag edges(const State& state, std::size_t tag) const;
+  /// Leaves out the points that have no clear edge in the rest image.
+  void keep_visible() {
+    const EdgeMeter meter(rest.camera);
+    first.assign(1, 0);
+    for (std::size_t t = 0; t < printed.size(); ++t) {
+      EdgeTag& tag = printed[t];
+      tag.platform_T_tag = rest_pose.inverse() * rest.camera_T_tag[t];
+      std::vector<EdgeMeasurement> seen(tag.points.size());
+      meter.measure(rest_view(), tag, rest_pose, kHalf_px, false, seen);
+      const double least = kMinContrastFraction * median_contrast(seen);
+      std::vector<EdgePoint> kept;
+      for (std::size_t i = 0; i < seen.size(); ++i) {
+        if (!seen[i].valid || seen[i].contrast < least) continue;
+        kept.push_back(tag.points[i]);
+        kept.back().contrast = static_cast<float>(seen[i].contrast);
+      }
+      tag.points = std::move(kept);
+      first.push_back(first.back() + static_cast<Eigen::Index>(tag.points.size()));
+    }
+    points = first.back();
+  }
+
+  EdgeTag edges(const State& state, std::size_t tag) const {
+    EdgeTag out = printed[tag];
+    out.platform_T_tag = rest_pose.inverse() * state.camera_T_tag[tag];
+    for (std::size_t i = 0; i < out.points.size(); ++i)
+      out.points[i] =
+          shifted(out.points[i], state.shift[first[tag] + static_cast<Eigen::Index>(i)]);
+    return out;
+  }
+
+  /// How far (m, along its normal) the rolling shutter shows each point off its place.
+  Eigen::VectorXd lateness(const std::vector<Observation>& seen, double readout) const {
+    Eigen::VectorXd late = Eigen::VectorXd::Zero(points);
+    for (std::size_t p = 0; p < seen.size(); ++p)
+      if (seen[p].valid)
+        late[static_cast<Eigen::Index>(p)] = seen[p].by.readout * readout / seen[p].by.normal;
+    return late;
+  }
+
+  /// Profiles are taken `late` off the points' places, and offsets count from there.
   template <class Pixel>
   void observe(const EdgeMeter& meter, const PixelView<Pixel>& image, const State& state,
                const Eigen::Isometry3d& pose, const Eigen::VectorXd& late,
-               std::vector<Observation>& out) const;
-  Eigen::VectorXd lateness(const std::vector<Observation>& seen, double readout) const;
-  void observe_all(const std::vector<Keyframe>& frames, const State& state);
-  void learn_noise();
-  TargetNormal equations(const State& state, bool at_rest_only) const;
-  bool iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal);
+               std::vector<Observation>& out) const {
+    out.assign(static_cast<std::size_t>(points), {});
+    for (std::size_t t = 0; t < printed.size(); ++t) {
+      EdgeTag tag = edges(state, t);
+      for (std::size_t i = 0; i < tag.points.size(); ++i)
+        tag.points[i] = shifted(tag.points[i], late[first[t] + static_cast<Eigen::Index>(i)]);
+      std::vector<EdgeMeasurement> measured(tag.points.size());
+      meter.measure(image, tag, pose, kHalf_px, false, measured);
+      const double gain = median_gain(measured);
+      for (std::size_t i = 0; i < measured.size(); ++i) {
+        if (!measured[i].valid) continue;
+        Observation& seen = out[static_cast<std::size_t>(first[t]) + i];
+        seen.valid = true;
+        seen.by = edge_derivatives(meter.camera(), measured[i], pose, rest_pose,
+                                   state.camera_T_tag[t], {tag.points[i].x, tag.points[i].y, 0});
+        seen.offset = measured[i].offset_px / gain;
+      }
+    }
+  }
+
+  void observe_all(const std::vector<Keyframe>& frames, const State& state) {
+    observe(EdgeMeter(with_focal(rest.camera, state.focal_ratio)), rest_view(), state, rest_pose,
+            Eigen::VectorXd::Zero(points), at_rest);
+    moving.resize(frames.size());
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      const Keyframe& frame = frames[k];
+      // Profiles are short: an edge that is far from where it is looked for is found too near.
+      const Eigen::VectorXd late = lateness(moving[k], state.readout);
+      observe(EdgeMeter(with_focal(frame.camera, state.focal_ratio)), frame.view(), state,
+              state.poses[k], late, moving[k]);
+      // A row is read before or after the middle one, by its part of the read-out time.
+      const double middle = 0.5 * (frame.image_rows - 1) - frame.first_row;
+      for (std::size_t p = 0; p < moving[k].size(); ++p) {
+        Observation& seen = moving[k][p];
+        seen.by.readout =
+            seen.by.frame.dot(frame.velocity) * (seen.by.row_px - middle) / frame.image_rows;
+        seen.offset +=
+            late[static_cast<Eigen::Index>(p)] * seen.by.normal - seen.by.readout * state.readout;
+      }
+    }
+  }
+
+  /// Of each point, from its own offsets in all keyframes: points differ in contrast and in the
+  /// length of their profiles.
+  void learn_noise() {
+    noise_px = Eigen::VectorXd::Zero(points);
+    std::vector<double> all;
+    for (Eigen::Index p = 0; p < points; ++p) {
+      std::vector<double> offsets;
+      for (const auto& frame : moving) {
+        const Observation& seen = frame[static_cast<std::size_t>(p)];
+        if (seen.valid) offsets.push_back(std::abs(seen.offset));
+      }
+      if (offsets.size() < kFewSeen) continue;
+      noise_px[p] = kMadToSigma * median(offsets);
+      all.push_back(noise_px[p]);
+    }
+    const double typical = std::max(kMinNoise_px, median(all));
+    for (double& noise : noise_px)
+      noise = noise > 0 ? std::max(noise, kMinNoiseFraction * typical) : typical;
+  }
+
+  TargetNormal equations(const State& state, bool at_rest_only) const {
+    const int frames = at_rest_only ? 0 : static_cast<int>(moving.size());
+    TargetNormal normal(frames, static_cast<int>(printed.size()), points);
+    normal.add_prior(normal.readout_index(), -state.readout, 1 / (kReadoutPrior * kReadoutPrior));
+    for (std::size_t t = 0; t < printed.size(); ++t) {
+      const int tag = static_cast<int>(t);
+      normal.add_prior(normal.spread_index(tag), -state.spread[t],
+                       1 / (kSpreadPrior * kSpreadPrior));
+      for (Eigen::Index p = first[t]; p < first[t + 1]; ++p) {
+        const double off_print = state.shift[p] - state.spread[t];
+        const double print = biweight(off_print / (kTukey95 * scatter.robust)) /
+                             (scatter.effective * scatter.effective);
+        // A point off the print tells nothing of the scale, but still of the motion.
+        normal.add_print(p, tag, -off_print, std::max(print, 1 / (kSpreadPrior * kSpreadPrior)));
+        const double variance = noise_px[p] * noise_px[p];
+        const auto add = [&](const Observation& seen, int frame, double weight) {
+          if (seen.valid && weight > 0) normal.add({frame, tag, p, seen.by, seen.offset, weight});
+        };
+        add(at_rest[static_cast<std::size_t>(p)], -1,
+            1 / (variance / std::max(1, rest.image.frames) + kRestFloor_px * kRestFloor_px));
+        for (int k = 0; k < frames; ++k) {
+          const Observation& seen =
+              moving[static_cast<std::size_t>(k)][static_cast<std::size_t>(p)];
+          add(seen, k,
+              biweight(seen.offset / (kTukey95 * noise_px[p])) /
+                  (variance + frames * kModel_px * kModel_px));
+        }
+      }
+    }
+    return normal;
+  }
+
+  /// One step; true once it is so small that another would change nothing. Throws nothing; a step
+  /// without a solution leaves NaN in the state.
+  bool iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal) {
+    observe_all(frames, state);
+    learn_noise();
+    scatter = print_scatter(printed, first, state.shift, state.spread);
+    TargetNormal normal = equations(state, false);
+    const Eigen::VectorXd shared =
+        normal.reduce() ? normal.shared_step(free_focal) : Eigen::VectorXd();
+    if (shared.size() == 0) {
+      state.focal_ratio = std::nan("");
+      return true;
+    }
+    const Eigen::VectorXd moved_frames = normal.frame_steps(shared);
+    state.shift += normal.point_steps(shared, moved_frames);
+    for (std::size_t k = 0; k < state.poses.size(); ++k) {
+      state.poses[k] =
+          moved(state.poses[k], moved_frames.segment<6>(6 * static_cast<Eigen::Index>(k)));
+      renormalise(state.poses[k]);
+    }
+    bool still = true;
+    for (std::size_t t = 0; t < state.camera_T_tag.size(); ++t) {
+      const Vector6 step = shared.segment<6>(6 * static_cast<Eigen::Index>(t));
+      state.camera_T_tag[t] = moved(state.camera_T_tag[t], step);
+      renormalise(state.camera_T_tag[t]);
+      state.spread[t] += shared[normal.spread_index(static_cast<int>(t))];
+      still =
+          still && step.head<3>().norm() < kStillPosition && step.tail<3>().norm() < kStillRotation;
+    }
+    state.readout += shared[normal.readout_index()];
+    const double zoom = std::clamp(shared[normal.focal_index()], -kMaxFocalStep, kMaxFocalStep);
+    state.focal_ratio *= std::exp(zoom);
+    return still && std::abs(zoom) < kStillFocal;
+  }
 
   const TargetAtRest& rest;
   Eigen::Isometry3d rest_pose;
@@ -146,176 +307,6 @@ struct Problem {
   Eigen::VectorXd noise_px;                      // of each point in one keyframe
   PrintScatter scatter;
 };
-
-/// Leaves out the points that have no clear edge in the rest image.
-void Problem::keep_visible() {
-  const EdgeMeter meter(rest.camera);
-  first.assign(1, 0);
-  for (std::size_t t = 0; t < printed.size(); ++t) {
-    EdgeTag& tag = printed[t];
-    tag.platform_T_tag = rest_pose.inverse() * rest.camera_T_tag[t];
-    std::vector<EdgeMeasurement> seen(tag.points.size());
-    meter.measure(rest_view(), tag, rest_pose, kHalf_px, false, seen);
-    const double least = kMinContrastFraction * median_contrast(seen);
-    std::vector<EdgePoint> kept;
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      if (!seen[i].valid || seen[i].contrast < least) continue;
-      kept.push_back(tag.points[i]);
-      kept.back().contrast = static_cast<float>(seen[i].contrast);
-    }
-    tag.points = std::move(kept);
-    first.push_back(first.back() + static_cast<Eigen::Index>(tag.points.size()));
-  }
-  points = first.back();
-}
-
-EdgeTag Problem::edges(const State& state, std::size_t tag) const {
-  EdgeTag out = printed[tag];
-  out.platform_T_tag = rest_pose.inverse() * state.camera_T_tag[tag];
-  for (std::size_t i = 0; i < out.points.size(); ++i)
-    out.points[i] = shifted(out.points[i], state.shift[first[tag] + static_cast<Eigen::Index>(i)]);
-  return out;
-}
-
-/// How far (m, along its normal) the rolling shutter shows each point off its place.
-Eigen::VectorXd Problem::lateness(const std::vector<Observation>& seen, double readout) const {
-  Eigen::VectorXd late = Eigen::VectorXd::Zero(points);
-  for (std::size_t p = 0; p < seen.size(); ++p)
-    if (seen[p].valid)
-      late[static_cast<Eigen::Index>(p)] = seen[p].by.readout * readout / seen[p].by.normal;
-  return late;
-}
-
-/// Profiles are taken `late` off the points' places, and offsets count from there.
-template <class Pixel>
-void Problem::observe(const EdgeMeter& meter, const PixelView<Pixel>& image, const State& state,
-                      const Eigen::Isometry3d& pose, const Eigen::VectorXd& late,
-                      std::vector<Observation>& out) const {
-  out.assign(static_cast<std::size_t>(points), {});
-  for (std::size_t t = 0; t < printed.size(); ++t) {
-    EdgeTag tag = edges(state, t);
-    for (std::size_t i = 0; i < tag.points.size(); ++i)
-      tag.points[i] = shifted(tag.points[i], late[first[t] + static_cast<Eigen::Index>(i)]);
-    std::vector<EdgeMeasurement> measured(tag.points.size());
-    meter.measure(image, tag, pose, kHalf_px, false, measured);
-    const double gain = median_gain(measured);
-    for (std::size_t i = 0; i < measured.size(); ++i) {
-      if (!measured[i].valid) continue;
-      Observation& seen = out[static_cast<std::size_t>(first[t]) + i];
-      seen.valid = true;
-      seen.by = edge_derivatives(meter.camera(), measured[i], pose, rest_pose,
-                                 state.camera_T_tag[t], {tag.points[i].x, tag.points[i].y, 0});
-      seen.offset = measured[i].offset_px / gain;
-    }
-  }
-}
-
-void Problem::observe_all(const std::vector<Keyframe>& frames, const State& state) {
-  observe(EdgeMeter(with_focal(rest.camera, state.focal_ratio)), rest_view(), state, rest_pose,
-          Eigen::VectorXd::Zero(points), at_rest);
-  moving.resize(frames.size());
-  for (std::size_t k = 0; k < frames.size(); ++k) {
-    const Keyframe& frame = frames[k];
-    // Profiles are short: an edge that is far from where it is looked for is found too near.
-    const Eigen::VectorXd late = lateness(moving[k], state.readout);
-    observe(EdgeMeter(with_focal(frame.camera, state.focal_ratio)), frame.view(), state,
-            state.poses[k], late, moving[k]);
-    // A row is read before or after the middle one, by its part of the read-out time.
-    const double middle = 0.5 * (frame.image_rows - 1) - frame.first_row;
-    for (std::size_t p = 0; p < moving[k].size(); ++p) {
-      Observation& seen = moving[k][p];
-      seen.by.readout =
-          seen.by.frame.dot(frame.velocity) * (seen.by.row_px - middle) / frame.image_rows;
-      seen.offset +=
-          late[static_cast<Eigen::Index>(p)] * seen.by.normal - seen.by.readout * state.readout;
-    }
-  }
-}
-
-/// Of each point, from its own offsets in all keyframes: points differ in contrast and in the
-/// length of their profiles.
-void Problem::learn_noise() {
-  noise_px = Eigen::VectorXd::Zero(points);
-  std::vector<double> all;
-  for (Eigen::Index p = 0; p < points; ++p) {
-    std::vector<double> offsets;
-    for (const auto& frame : moving) {
-      const Observation& seen = frame[static_cast<std::size_t>(p)];
-      if (seen.valid) offsets.push_back(std::abs(seen.offset));
-    }
-    if (offsets.size() < kFewSeen) continue;
-    noise_px[p] = kMadToSigma * median(offsets);
-    all.push_back(noise_px[p]);
-  }
-  const double typical = std::max(kMinNoise_px, median(all));
-  for (double& noise : noise_px)
-    noise = noise > 0 ? std::max(noise, kMinNoiseFraction * typical) : typical;
-}
-
-TargetNormal Problem::equations(const State& state, bool at_rest_only) const {
-  const int frames = at_rest_only ? 0 : static_cast<int>(moving.size());
-  TargetNormal normal(frames, static_cast<int>(printed.size()), points);
-  normal.add_prior(normal.readout_index(), -state.readout, 1 / (kReadoutPrior * kReadoutPrior));
-  for (std::size_t t = 0; t < printed.size(); ++t) {
-    const int tag = static_cast<int>(t);
-    normal.add_prior(normal.spread_index(tag), -state.spread[t], 1 / (kSpreadPrior * kSpreadPrior));
-    for (Eigen::Index p = first[t]; p < first[t + 1]; ++p) {
-      const double off_print = state.shift[p] - state.spread[t];
-      const double print = biweight(off_print / (kTukey95 * scatter.robust)) /
-                           (scatter.effective * scatter.effective);
-      // A point off the print tells nothing of the scale, but still of the motion.
-      normal.add_print(p, tag, -off_print, std::max(print, 1 / (kSpreadPrior * kSpreadPrior)));
-      const double variance = noise_px[p] * noise_px[p];
-      const auto add = [&](const Observation& seen, int frame, double weight) {
-        if (seen.valid && weight > 0) normal.add({frame, tag, p, seen.by, seen.offset, weight});
-      };
-      add(at_rest[static_cast<std::size_t>(p)], -1,
-          1 / (variance / std::max(1, rest.image.frames) + kRestFloor_px * kRestFloor_px));
-      for (int k = 0; k < frames; ++k) {
-        const Observation& seen = moving[static_cast<std::size_t>(k)][static_cast<std::size_t>(p)];
-        add(seen, k,
-            biweight(seen.offset / (kTukey95 * noise_px[p])) /
-                (variance + frames * kModel_px * kModel_px));
-      }
-    }
-  }
-  return normal;
-}
-
-/// One step; true once it is so small that another would change nothing. Throws nothing; a step
-/// without a solution leaves NaN in the state.
-bool Problem::iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal) {
-  observe_all(frames, state);
-  learn_noise();
-  scatter = print_scatter(printed, first, state.shift, state.spread);
-  TargetNormal normal = equations(state, false);
-  const Eigen::VectorXd shared =
-      normal.reduce() ? normal.shared_step(free_focal) : Eigen::VectorXd();
-  if (shared.size() == 0) {
-    state.focal_ratio = std::nan("");
-    return true;
-  }
-  const Eigen::VectorXd moved_frames = normal.frame_steps(shared);
-  state.shift += normal.point_steps(shared, moved_frames);
-  for (std::size_t k = 0; k < state.poses.size(); ++k) {
-    state.poses[k] =
-        moved(state.poses[k], moved_frames.segment<6>(6 * static_cast<Eigen::Index>(k)));
-    renormalise(state.poses[k]);
-  }
-  bool still = true;
-  for (std::size_t t = 0; t < state.camera_T_tag.size(); ++t) {
-    const Vector6 step = shared.segment<6>(6 * static_cast<Eigen::Index>(t));
-    state.camera_T_tag[t] = moved(state.camera_T_tag[t], step);
-    renormalise(state.camera_T_tag[t]);
-    state.spread[t] += shared[normal.spread_index(static_cast<int>(t))];
-    still =
-        still && step.head<3>().norm() < kStillPosition && step.tail<3>().norm() < kStillRotation;
-  }
-  state.readout += shared[normal.readout_index()];
-  const double zoom = std::clamp(shared[normal.focal_index()], -kMaxFocalStep, kMaxFocalStep);
-  state.focal_ratio *= std::exp(zoom);
-  return still && std::abs(zoom) < kStillFocal;
-}
 
 using Places = Eigen::Matrix<Eigen::Index, 6, 1>;
 

@@ -98,10 +98,7 @@ void TargetRecorder::learn(const ImageView& image) {
   const ReferenceEstimator::Progress progress = learner_.add(image, finding);
   counts_.most_tags_seen = std::max(counts_.most_tags_seen, learner_.tags_seen());
   if (progress == ReferenceEstimator::Progress::moved) ++counts_.moved;
-  if (progress == ReferenceEstimator::Progress::done) finish();
-}
-
-void TargetRecorder::finish() {
+  if (progress != ReferenceEstimator::Progress::done) return;
   at_rest_.camera = camera_;
   at_rest_.image = learner_.learned().image;
   at_rest_.patterns = acquirer_.patterns();
@@ -165,17 +162,14 @@ Track TargetRecorder::add(const Frame& frame) {
 
 Keyframe cropped(const ImageView& image, const CameraModel& camera,
                  const std::vector<Eigen::Vector3d>& points_camera) {
-  Eigen::Array2d low(1e9, 1e9);
-  Eigen::Array2d high(-1e9, -1e9);
+  Eigen::AlignedBox2d seen;
   for (const Eigen::Vector3d& p : points_camera) {
     const ProjectedPoint projected = project(camera, p);
-    if (!projected.valid || !projected.pixel.allFinite()) continue;
-    low = low.min(projected.pixel.array());
-    high = high.max(projected.pixel.array());
+    if (projected.valid && projected.pixel.allFinite()) seen.extend(projected.pixel);
   }
   const Eigen::Array2d last(image.width - 1, image.height - 1);
-  low = (low - kMargin_px).floor().max(0.0);
-  high = (high + kMargin_px).ceil().min(last);
+  const Eigen::Array2d low = (seen.min().array() - kMargin_px).floor().max(0.0);
+  const Eigen::Array2d high = (seen.max().array() + kMargin_px).ceil().min(last);
   Keyframe frame;
   frame.camera = camera;
   if (!(low <= high).all()) return frame;
@@ -222,25 +216,21 @@ void KeyframeSet::add(Keyframe frame) {
 ViewSpan view_span(const std::vector<Keyframe>& frames,
                    const Eigen::Isometry3d& rest_camera_T_platform) {
   constexpr int kDirections = 36;
-  std::vector<Eigen::Vector2d> views;
-  const auto add = [&](const Eigen::Isometry3d& pose) {
-    const Eigen::Vector3d lens = pose.inverse().translation();
-    views.emplace_back(std::atan2(lens.x(), -lens.z()), std::atan2(lens.y(), -lens.z()));
-  };
-  add(rest_camera_T_platform);
-  for (const Keyframe& frame : frames) add(moved(rest_camera_T_platform, frame.displacement));
+  Eigen::Matrix2Xd views(2, frames.size() + 1);
+  for (std::size_t i = 0; i <= frames.size(); ++i) {
+    const Vector6 displacement = i > 0 ? frames[i - 1].displacement : Vector6::Zero();
+    const Eigen::Vector3d lens =
+        moved(rest_camera_T_platform, displacement).inverse().translation();
+    views.col(i) << std::atan2(lens.x(), -lens.z()), std::atan2(lens.y(), -lens.z());
+  }
   ViewSpan span{0, 1e9};
   for (int i = 0; i < kDirections; ++i) {
     const double angle = std::numbers::pi * i / kDirections;
     const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
-    double low = 1e9;
-    double high = -1e9;
-    for (const Eigen::Vector2d& view : views) {
-      low = std::min(low, along.dot(view));
-      high = std::max(high, along.dot(view));
-    }
-    span.widest = std::max(span.widest, high - low);
-    span.narrowest = std::min(span.narrowest, high - low);
+    const Eigen::RowVectorXd seen = along.transpose() * views;
+    const double width = seen.maxCoeff() - seen.minCoeff();
+    span.widest = std::max(span.widest, width);
+    span.narrowest = std::min(span.narrowest, width);
   }
   return span;
 }
@@ -304,8 +294,7 @@ void check_estimate(const TargetEstimate& estimate, const CameraModel& camera) {
         "the motion tells nothing that the rest image does not; tilt and push further, with better "
         "light");
   }
-  double position = 0;
-  double rotation = 0;
+  double position = 0, rotation = 0;
   for (const Vector6& sigma : platform_sigmas(estimate.covariance)) {
     position = std::max(position, sigma.head<3>().maxCoeff());
     rotation = std::max(rotation, sigma.tail<3>().maxCoeff());

@@ -4,8 +4,8 @@
 //      camera frame, the picture at rest, the shutter's read-out (s).
 // Then: adjust.h (the least squares).
 //
-// From a source's frames to what a calibration of the target works on: first the platform at rest,
-// then in motion; and whether that, and what was found, is good enough to be written.
+// First the platform is seen at rest, then in motion; then whether that, and what was found, is
+// good enough to be written.
 #pragma once
 
 #include <optional>
@@ -77,7 +77,6 @@ class TargetRecorder {
     Eigen::Isometry3d pose;
   };
   void learn(const ImageView& image);
-  void finish();
   void follow(const Frame& frame, const Track& track);
 
   CameraModel camera_;
@@ -102,8 +101,7 @@ class TargetRecorder {
 /// where the tags' planes lie. Tilting and pushing sideways both change it. rad, over all keyframes
 /// and the rest, along the directions of the largest and of the smallest change.
 struct ViewSpan {
-  double widest = 0;
-  double narrowest = 0;
+  double widest = 0, narrowest = 0;
 };
 
 ViewSpan view_span(const std::vector<Keyframe>& frames,

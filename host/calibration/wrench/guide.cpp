@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/calibration/wrench/record.h"
 
 namespace tagwrench {
 namespace {
@@ -34,8 +33,7 @@ constexpr double kSettled = 0.5;  // s
 
 /// Part of `felt` along `expected`, and the cosine between them.
 struct Likeness {
-  double ratio = 0;
-  double cosine = 0;
+  double ratio = 0, cosine = 0;
 };
 Likeness likeness(const Vector6& felt, const Vector6& expected) {
   const double dot = felt.dot(expected);
@@ -51,12 +49,6 @@ std::string axes_text(const Vector6& scaled) {
           fmt::format("{}{} {:+.0f} %", out.empty() ? "" : ", ", wrench_axis(i), 100 * scaled[i]);
   }
   return out;
-}
-
-std::string worst_text(const Vector6& scaled) {
-  int axis = 0;
-  const double worst = scaled.cwiseAbs().maxCoeff(&axis);
-  return fmt::format("{:.1f} % of full load in {}", 100 * worst, wrench_axis(axis));
 }
 
 }  // namespace
@@ -303,7 +295,9 @@ void WrenchGuide::skip() {
     todo_.pop_front();
   } while (first_rest && !todo_.empty() && step().visit == visit && step().kind != StepKind::rest);
   attempts_ = 0;
-  const std::string missing = still_missing();
+  WrenchCoverage all = coverage_;  // if nothing else were skipped
+  for (const int s : todo_) all.add_expected(plan_, s);
+  const std::string missing = fmt::format("{}", fmt::join(all.missing(), "; "));
   say(missing.empty() ? Line::note : Line::warning,
       fmt::format("skipped: {}{}", name, missing.empty() ? "" : "; then " + missing));
   ask();
@@ -370,13 +364,6 @@ std::string coverage_bar(const WrenchCoverage& coverage) {
   return out;
 }
 
-/// What the plan would leave open if nothing else were skipped.
-std::string WrenchGuide::still_missing() const {
-  WrenchCoverage all = coverage_;
-  for (const int s : todo_) all.add_expected(plan_, s);
-  return fmt::format("{}", fmt::join(all.missing(), "; "));
-}
-
 std::string WrenchGuide::most_useful() const {
   const auto gain = [&](int s) { return coverage_.gain(expected_load(plan_, s)); };
   const auto which = std::ranges::max_element(todo_, {}, gain);
@@ -411,13 +398,6 @@ std::string WrenchGuide::live() const {
 
 // The guide at rests and masses: what is steady, and whether it is what the step asks for.
 
-/// Whether anything has happened to the platform since it was asked for.
-bool WrenchGuide::has_moved(const Hold& hold) {
-  const Vector6 way = hold_.scaled(hold_.frames().back().displacement - *asked_at_);
-  moved_ = moved_ || way.cwiseAbs().maxCoeff() > kMoved || hold.unrest > 3;
-  return moved_ || (repeated_ && now_ - *asked_time_ > kTimeToAct);  // it may be right as it hangs
-}
-
 void WrenchGuide::watch_hold() {
   const Hold hold = hold_.look();
   const bool of_cell = plan_.reference != ReferenceKind::masses;
@@ -426,7 +406,10 @@ void WrenchGuide::watch_hold() {
     return;
   }
   const bool had_moved = moved_;
-  const bool moved = has_moved(hold);
+  // Whether anything has happened to the platform since it was asked for.
+  const Vector6 way = hold_.scaled(hold_.frames().back().displacement - *asked_at_);
+  moved_ = moved_ || way.cwiseAbs().maxCoeff() > kMoved || hold.unrest > 3;
+  const bool as_it_hangs = repeated_ && now_ - *asked_time_ > kTimeToAct;  // it may be right
   if (moved_ && !had_moved) {  // what was steady until now is what was asked for before
     hold_.clear();
     steady_since_.reset();
@@ -438,12 +421,12 @@ void WrenchGuide::watch_hold() {
   }
   if (!steady_since_) steady_since_ = now_;
   if (step().kind == StepKind::mass) {
-    if (moved) watch_mass(hold);
+    if (moved_ || as_it_hangs) watch_mass(hold);
     return;
   }
   // The first rest of a mounting comes after the sensor was turned, but for the very first one.
   const bool settled = now_ - *steady_since_ >= kSettled;
-  if (settled && (last_rest() != nullptr || moved || asks_ == 1)) watch_rest(hold);
+  if (settled && (last_rest() != nullptr || moved_ || as_it_hangs || asks_ == 1)) watch_rest(hold);
 }
 
 void WrenchGuide::watch_rest(const Hold& hold) {
@@ -532,9 +515,12 @@ void WrenchGuide::take_again_from_rest(const Vector6& by) {
     lost.insert(lost.begin(), records_.back().step);
     records_.pop_back();
   }
-  std::string text =
-      fmt::format("the rest is {} from where it was: the sensor was bumped, or a tag has slipped",
-                  worst_text(by));
+  int axis = 0;
+  const double worst = by.cwiseAbs().maxCoeff(&axis);
+  std::string text = fmt::format(
+      "the rest is {:.1f} % of full load in {} from where it was: the sensor was bumped, or a tag "
+      "has slipped",
+      100 * worst, wrench_axis(axis));
   if (options_.attempts > 0 && ++bumps_ > kMaxBumps) {
     failure_ = text + " again and again; fix it better";
     return;

@@ -97,8 +97,6 @@ class WrenchGuide {
   void recount();
   void leave_out(const std::string& why);
   const StepRecord* last_rest() const;
-  bool has_moved(const Hold& hold);
-  std::string still_missing() const;
   std::string most_useful() const;
   bool check_mounting(const Hold& hold);
   std::string waiting_for() const;

@@ -25,7 +25,6 @@ constexpr double kPushEvery = 1.0;  // s
 // own, 2 zeta / omega: with a twentieth of critical damping 0.2 ms at 90 Hz, 1 ms at 15 Hz.
 constexpr double kAxisLag = 1e-3;    // s
 constexpr double kNoRelation = 0.3;  // mean R^2
-constexpr const char* kFeatures[] = {"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
 
 /// Of a push's window, from -1 to 1.
 double raised_cosine(double off) { return 0.5 + 0.5 * std::cos(std::numbers::pi * off); }
@@ -102,9 +101,8 @@ struct Rows {
     step.push_back(of_step);
   }
   static Eigen::MatrixXd matrix(const std::vector<Vector6>& rows) {
-    Eigen::MatrixXd m(static_cast<Eigen::Index>(rows.size()), 6);
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      m.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
+    Eigen::MatrixXd m(rows.size(), 6);
+    for (std::size_t i = 0; i < rows.size(); ++i) m.row(i) = rows[i].transpose();
     return m;
   }
   static Eigen::VectorXd vector(const std::vector<double>& v) {
@@ -122,7 +120,9 @@ class Collector {
 
   WrenchData collect() {
     find_lag();
-    const std::size_t stride = 1 + frames_of_movement() / kMaxFrames;
+    std::size_t moving = 0;  // frames
+    for (const StepRecord& record : records_) moving += is_hold(record) ? 0 : record.frames.size();
+    const std::size_t stride = 1 + moving / kMaxFrames;
     for (const StepRecord& record : records_) {
       const Baseline& baseline = baselines_.at(record.zero);
       if (record.frames.empty() || baseline.empty()) continue;
@@ -146,27 +146,17 @@ class Collector {
     const StepKind kind = step_of(record).kind;
     return kind == StepKind::rest || kind == StepKind::mass;
   }
-  std::size_t frames_of_movement() const {
-    std::size_t n = 0;
-    for (const StepRecord& record : records_) n += is_hold(record) ? 0 : record.frames.size();
-    return n;
-  }
-
-  Observation begin(const StepRecord& record, double time) const {
-    Observation o;
-    o.time = time;
-    o.step = record.step;
-    o.zero = record.zero;
-    return o;
-  }
 
   void add_hold(const StepRecord& record, const Baseline& baseline) {
     const RecordMean mean = mean_of(record);
-    Observation o = begin(record, mean.time);
-    o.displacement = mean.displacement - baseline.drift(mean.time);
-    o.displacement_covariance = mean.covariance;
-    const bool mass = step_of(record).kind == StepKind::mass;
-    if (mass) {
+    Observation o{.time = mean.time,
+                  .displacement = mean.displacement - baseline.drift(mean.time),
+                  .displacement_covariance = mean.covariance,
+                  .common = {},
+                  .products = {},
+                  .step = record.step,
+                  .zero = record.zero};
+    if (step_of(record).kind == StepKind::mass) {
       o.displacement_covariance += baseline.drift_covariance(mean.time);
       set_hanging(plan_, record.step, mean.displacement, o);
     }
@@ -197,7 +187,7 @@ class Collector {
   /// What the reference says, counted from the rests: n x 6, at `times` of frames.
   static Eigen::MatrixXd values_at(const StepRecord& record, const Baseline& baseline,
                                    const Eigen::VectorXd& times, double lag) {
-    const Eigen::VectorXd read = reading_times(record);
+    const Eigen::VectorXd read = times_of(record.readings);
     Eigen::MatrixXd values(read.size(), 6);
     for (Eigen::Index i = 0; i < read.size(); ++i) {
       const ReferenceSample& r = record.readings[static_cast<std::size_t>(i)];
@@ -208,7 +198,7 @@ class Collector {
 
   std::vector<Said> said_during(const StepRecord& record, const Baseline& baseline,
                                 std::size_t stride) const {
-    const Eigen::VectorXd times = frame_times(record);
+    const Eigen::VectorXd times = times_of(record.frames);
     const double lag = data_.lag.value;
     const Eigen::MatrixXd values = values_at(record, baseline, times, lag);
     const Eigen::MatrixXd changes = values_at(record, baseline, times, lag - kAxisLag / 2) -
@@ -288,9 +278,13 @@ class Collector {
     const Eigen::MatrixXd smoothed = smooth(said);
     for (std::size_t i = 0; i < said.size(); ++i) {
       const Said& s = said[i];
-      Observation o = begin(record, s.frame->time);
-      o.displacement = s.displacement - baseline.drift(s.frame->time);
-      o.displacement_covariance = s.covariance;
+      Observation o{.time = s.frame->time,
+                    .displacement = s.displacement - baseline.drift(s.frame->time),
+                    .displacement_covariance = s.covariance,
+                    .common = {},
+                    .products = {},
+                    .step = record.step,
+                    .zero = record.zero};
       set_load(record.step, s.value, s.noise, s.displacement, o);
       Observation change;
       set_load(record.step, s.change, s.noise, s.displacement, change);
@@ -329,11 +323,11 @@ class Collector {
       const Baseline& baseline = baselines_.at(record.zero);
       if (is_hold(record) || record.frames.empty() || baseline.empty()) continue;
       study::Segment s;
-      s.time = frame_times(record);
+      s.time = times_of(record.frames);
       s.features.resize(s.time.size(), 6);
       for (Eigen::Index i = 0; i < s.time.size(); ++i)
         s.features.row(i) = record.frames[static_cast<std::size_t>(i)].displacement.transpose();
-      s.reference_time = reading_times(record);
+      s.reference_time = times_of(record.readings);
       s.reference.resize(s.reference_time.size(), 6);
       for (Eigen::Index i = 0; i < s.reference_time.size(); ++i)
         s.reference.row(i) =
@@ -354,7 +348,7 @@ class Collector {
     trial.time = Rows::vector(readings_.time);
     trial.features = Rows::matrix(readings_.value);
     trial.feature_sigma = Rows::matrix(readings_.sigma);
-    trial.feature_names.assign(std::begin(kFeatures), std::end(kFeatures));
+    trial.feature_names = study::displacement_names();
     trial.step = Eigen::Map<const Eigen::VectorXi>(
         readings_.step.data(), static_cast<Eigen::Index>(readings_.step.size()));
     trial.reference_time = Rows::vector(reference_.time);

@@ -340,10 +340,6 @@ KnownLoad expected_load(const WrenchPlan& plan, int step) {
 WrenchCoverage::WrenchCoverage(const Vector6& range)
     : range_(range), information_(Matrix6::Identity() / (kPrior * kPrior)) {}
 
-Vector6 WrenchCoverage::scaled(const KnownLoad& load) const {
-  return load.wrench.cwiseQuotient(range_);
-}
-
 double WrenchCoverage::relative_variance(const KnownLoad& load) const {
   const Vector6 variances = load.covariance.diagonal().cwiseQuotient(range_.cwiseAbs2());
   return variances.mean() + kMinSigma * kMinSigma;
@@ -361,10 +357,6 @@ void WrenchCoverage::add_movement(const Matrix6& second_moment) {
 }
 
 Matrix6 WrenchCoverage::posterior() const { return inverse(information_); }
-
-Vector6 WrenchCoverage::sigma() const { return posterior().diagonal().cwiseSqrt(); }
-
-Vector6 WrenchCoverage::covered() const { return (1 - sigma().array() / kPrior).max(0).matrix(); }
 
 std::vector<std::string> WrenchCoverage::missing() const {
   const EigenSystem<6> eigen = symmetric_eigen(information_);

@@ -103,8 +103,7 @@ std::string instruction(const WrenchPlan& plan, int step, bool new_mounting);
 WrenchPlan parse_plan(const std::string& text, const std::string& name);
 
 struct ReadyPlan {
-  std::string name;
-  std::string text;
+  std::string name, text;
 };
 const std::vector<ReadyPlan>& ready_plans();
 
@@ -125,9 +124,7 @@ void set_hanging(const WrenchPlan& plan, int step, const Vector6& displacement,
 /// What a load cell tells of a push along the step's line: N, its noise, and the relative standard
 /// deviation of its calibration, common to all pushes.
 struct CellForce {
-  double value = 0;
-  double noise = 0;
-  double gain_sigma = 0;
+  double value = 0, noise = 0, gain_sigma = 0;
 };
 void set_push(const WrenchPlan& plan, int step, const CellForce& force, const Vector6& displacement,
               Observation& observation);
@@ -167,9 +164,9 @@ class WrenchCoverage {
   void add_expected(const WrenchPlan& plan, int step);
 
   /// Standard deviation with which a full load on each axis would be told, share of that load.
-  Vector6 sigma() const;
+  Vector6 sigma() const { return posterior().diagonal().cwiseSqrt(); }
   /// Share of what the springs leave open that is measured: 0..1 per axis.
-  Vector6 covered() const;
+  Vector6 covered() const { return (1 - sigma().array() / kPrior).max(0).matrix(); }
   /// Whether every direction is measured.
   bool complete() const { return missing().empty(); }
   /// One line per direction that is not: "no load twists about z: Mz".
@@ -180,7 +177,7 @@ class WrenchCoverage {
  private:
   Matrix6 posterior() const;
   /// Relative load and its information along itself.
-  Vector6 scaled(const KnownLoad& load) const;
+  Vector6 scaled(const KnownLoad& load) const { return load.wrench.cwiseQuotient(range_); }
   double relative_variance(const KnownLoad& load) const;
 
   Vector6 range_;

@@ -14,13 +14,6 @@ constexpr int kMinFrames = 5;  // a mean and a slope of fewer tell nothing
 // geometry and grey levels stay while the platform stands.
 constexpr double kSlowShare = 0.05;
 
-template <class Item>
-Eigen::VectorXd times(const std::vector<Item>& items) {
-  Eigen::VectorXd t(static_cast<Eigen::Index>(items.size()));
-  for (std::size_t i = 0; i < items.size(); ++i) t[static_cast<Eigen::Index>(i)] = items[i].time;
-  return t;
-}
-
 using Verdict = ReferenceFinding::Verdict;
 
 constexpr double kMinShare = 0.8;    // of the time that readings must cover
@@ -135,9 +128,6 @@ Hold HoldDetector::look() const {
   return hold;
 }
 
-Eigen::VectorXd frame_times(const StepRecord& record) { return times(record.frames); }
-Eigen::VectorXd reading_times(const StepRecord& record) { return times(record.readings); }
-
 RecordMean mean_of(const StepRecord& record) {
   if (record.frames.empty()) return {};
   HoldDetector hold({.seconds = 2 * (record.frames.back().time - record.frames.front().time) + 1});
@@ -178,13 +168,13 @@ ReferenceFinding check_reference(const WrenchPlan& plan, const StepRecord& recor
   const auto n = static_cast<Eigen::Index>(record.frames.size());
   const Vector6 zero = mean_of(rest).displacement;
   study::Segment segment;
-  segment.time = frame_times(record);
+  segment.time = times_of(record.frames);
   segment.features.resize(n, 6);
   for (Eigen::Index i = 0; i < n; ++i) {
     const TrackedFrame& frame = record.frames[static_cast<std::size_t>(i)];
     segment.features.row(i) = (stiffness * (frame.displacement - zero)).transpose();
   }
-  segment.reference_time = reading_times(record);
+  segment.reference_time = times_of(record.readings);
   segment.reference = reference_wrenches(plan, record, rest);
   const study::Lag lag = study::estimate_lag({&segment, 1});
   if (!lag.known || lag.explained < kNoRelation)

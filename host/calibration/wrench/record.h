@@ -85,9 +85,13 @@ struct RecordMean {
 };
 RecordMean mean_of(const StepRecord& record);
 
-/// Of its frames, and of its readings, s.
-Eigen::VectorXd frame_times(const StepRecord& record);
-Eigen::VectorXd reading_times(const StepRecord& record);
+/// Of frames or of readings, s.
+template <class Item>
+Eigen::VectorXd times_of(const std::vector<Item>& items) {
+  Eigen::VectorXd times(items.size());
+  for (std::size_t i = 0; i < items.size(); ++i) times[i] = items[i].time;
+  return times;
+}
 
 /// Mean of what the reference said, axis by axis; zero if it said nothing.
 Vector6 mean_reading(const StepRecord& record);

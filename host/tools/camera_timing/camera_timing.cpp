@@ -39,10 +39,6 @@ std::string unusable(const CameraTimingInput& input) {
   return {};
 }
 
-double quantile(std::vector<double>& sorted, double share) {
-  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5)];
-}
-
 void copy_times(const CameraTimingInput& input, const CameraTimingFit& fit,
                 CameraTimingResult& result) {
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
@@ -239,15 +235,21 @@ void count_frames(const CameraTimingInput& input, CameraTimingResult& result) {
 // A global shutter's picture has one brightness, which fits many times: nothing but all pictures
 // together, and their stamps, tell latency, jitter and exposure.
 
+/// What a picture's brightness and stamp tell of it.
+struct Moments {
+  double likelihood = 0;
+  double time = 0;   ///< middle of the exposure, host clock, s
+  double sigma = 0;  ///< s, of stamp and picture together
+  double miss =
+      0;  ///< least difference of brightness from the light at any time near; 0 dark, 1 lit
+  double chance = 0;  ///< share of the times near that have this brightness and no slope: a picture
+                      ///< before it may have the same by chance
+  double change = 0;  ///< of brightness since the picture before; 0 for the first
+};
+
 struct GlobalShutter {
   Figure latency, jitter, exposure;  ///< s; less the uncertainty of the clocks
-  std::vector<double> times;         ///< per picture, middle of the exposure, host clock, s
-  std::vector<double> sigmas;        ///< s, of stamp and picture together
-  std::vector<double> misses;        ///< least difference of brightness from the light at any time
-                                     ///< near; 0 dark, 1 lit
-  std::vector<double> chances;  ///< that the light stood still for the exposure's ends, at this
-                                ///< brightness: a picture before it may have the same by chance
-  std::vector<double> changes;  ///< of brightness since the picture before; 0 for the first
+  std::vector<Moments> pictures;
 };
 
 constexpr int kParameters = 5;
@@ -259,12 +261,6 @@ constexpr double kReach = 4;        // standard deviations of the delay
 constexpr double kLevel = 1e-6;     // slope of the brightness, per exposure
 constexpr int kMinSteps = 40, kMaxSteps = 400;
 constexpr double kStepsPerExposure = 20;
-
-struct Moments {
-  double likelihood = 0, time = 0, sigma = 0;
-  double miss = 0;    ///< least difference of brightness, at any time near
-  double chance = 0;  ///< share of the times near that have this brightness and no slope
-};
 
 class Likelihood {
  public:
@@ -308,16 +304,13 @@ class Likelihood {
       second += value * off * off;
     }
     const double inlier = (1 - kOutliers) * sum / (weights * kNoise * 2.5066);
-    Moments moments{inlier + kOutliers, middle, jitter, least * kNoise, level / weights};
+    const double change = picture > 0 ? brightness_[picture] - brightness_[picture - 1] : 0;
+    Moments moments{inlier + kOutliers, middle, jitter, least * kNoise, level / weights, change};
     if (inlier > kOutliers) {
       moments.time = middle + first / sum;
       moments.sigma = std::sqrt(std::max(second / sum - std::pow(first / sum, 2), 0.0));
     }
     return moments;
-  }
-
-  double change(std::size_t picture) const {
-    return picture > 0 ? brightness_[picture] - brightness_[picture - 1] : 0;
   }
 
  private:
@@ -395,11 +388,10 @@ bool covariance(const Likelihood& likelihood, const Parameters& at, const Parame
 /// brightness that of the light at that time, but for a few outliers (stale ones). `start` is where
 /// to look: latency to half a bit, jitter and exposure to a factor of two.
 GlobalShutter fit_global_shutter(const CameraTimingInput& input, const LightSignal& light,
-                                 const GlobalShutter& start) {
+                                 const CameraTimes& start) {
   const Likelihood likelihood(input, light);
   const Parameters wide(0.3 * input.bit, 0.5, 0.5, 0.03, 0.05);
-  Parameters best(start.latency.value, std::log(start.jitter.value), std::log(start.exposure.value),
-                  0, 1);
+  Parameters best(start.latency, std::log(start.jitter), std::log(start.exposure), 0, 1);
   best = lowest(likelihood, best, wide);
   best = lowest(likelihood, best, -0.3 * wide);  // from another side, where the first got stuck
   GlobalShutter out;
@@ -417,25 +409,15 @@ GlobalShutter fit_global_shutter(const CameraTimingInput& input, const LightSign
     out.jitter.known = std::sqrt(spread(1, 1)) < kVague;
     out.exposure.known = std::sqrt(spread(2, 2)) < kVague;
   }
-  for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const Moments moments = likelihood.of(i, best);
-    out.times.push_back(moments.time);
-    out.sigmas.push_back(moments.sigma);
-    out.misses.push_back(moments.miss);
-    out.chances.push_back(moments.chance);
-    out.changes.push_back(likelihood.change(i));
-  }
+  for (std::size_t i = 0; i < input.frames.size(); ++i)
+    out.pictures.push_back(likelihood.of(i, best));
   return out;
 }
 
 /// Pictures of a global shutter tell their times only together.
 void measure_global_shutter(const CameraTimingInput& input, CameraTimingFit& fit,
                             CameraTimingResult& result) {
-  GlobalShutter start;
-  start.latency.value = fit.camera().latency;
-  start.jitter.value = fit.camera().jitter;
-  start.exposure.value = fit.camera().exposure;
-  const GlobalShutter found = fit_global_shutter(input, fit.light(), start);
+  const GlobalShutter found = fit_global_shutter(input, fit.light(), fit.camera());
   const double finest = kFinestTime * found.exposure.value;
   fit.set_camera(
       {found.latency.value, std::max(found.jitter.value, finest), 0, found.exposure.value});
@@ -443,20 +425,21 @@ void measure_global_shutter(const CameraTimingInput& input, CameraTimingFit& fit
   bool was_vague = false;
   for (std::size_t i = 0; i < result.times.size(); ++i) {
     TimedFrame& frame = result.times[i];
+    const Moments& picture = found.pictures[i];
     // The same brightness as the picture before may be that of the next time the light stood still.
-    const bool chance = frame.freshness == Freshness::stale && found.chances[i] > kByChance;
+    const bool chance = frame.freshness == Freshness::stale && picture.chance > kByChance;
     if (chance) frame.freshness = Freshness::undecided;
     if (frame.freshness == Freshness::stale) continue;
     // One brightness near the pattern's least or most may fit no time to within the noise, for the
     // exposure's error alone: then the stamp tells, and whether it is stale only the change does.
     const bool vague = frame.freshness == Freshness::strange;
-    if (vague && found.misses[i] < kOffBrightness) frame.freshness = Freshness::fresh;
+    if (vague && picture.miss < kOffBrightness) frame.freshness = Freshness::fresh;
     if (i > 0 && (vague || was_vague) && frame.freshness == Freshness::fresh &&
-        std::abs(found.changes[i]) < kSameBrightness)
+        std::abs(picture.change) < kSameBrightness)
       frame.freshness = Freshness::undecided;
     was_vague = vague;
-    frame.exposed = found.times[i];
-    frame.sigma = found.sigmas[i];
+    frame.exposed = picture.time;
+    frame.sigma = picture.sigma;
     frame.timed = !vague && !chance && frame.sigma < kTellsTime * input.bit;
   }
   fit_rate(input, true, result);
@@ -476,8 +459,10 @@ void measure_global_shutter(const CameraTimingInput& input, CameraTimingFit& fit
 
 }  // namespace
 
-double CameraTimingResult::new_pictures_rate() const noexcept {
-  return elapsed > 0 ? (frames - 1 - stale) / elapsed : 0;
+double quantile(const std::vector<double>& ascending, double share) {
+  if (ascending.empty()) return 0;
+  return ascending[static_cast<std::size_t>(share * static_cast<double>(ascending.size() - 1) +
+                                            0.5)];
 }
 
 double bit_period_for(double frame_period) { return frame_period / kBitsPerFrame; }

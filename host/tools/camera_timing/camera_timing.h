@@ -24,8 +24,7 @@ namespace tagwrench {
 /// The part of a picture's exposure that a band of rows has: rows from the share `first` to the
 /// share `last` of the picture's height (0 to 1, from the top).
 struct RowBand {
-  double first = 0;
-  double last = 1;
+  double first = 0, last = 1;
 };
 
 /// When a camera exposes one picture. Row at the share f of the height: from
@@ -38,10 +37,7 @@ struct ExposureTimes {
 
 /// Mean light that a band sees, 0 to 1, and its derivatives by the three times, 1/s.
 struct SeenLight {
-  double mean = 0;
-  double by_middle = 0;
-  double by_readout = 0;
-  double by_exposure = 0;
+  double mean = 0, by_middle = 0, by_readout = 0, by_exposure = 0;
 };
 
 class LightSignal {
@@ -50,9 +46,6 @@ class LightSignal {
   explicit LightSignal(std::vector<double> edges);
 
   SeenLight seen(const RowBand& band, const ExposureTimes& times) const noexcept;
-
-  double first_edge() const noexcept { return edges_.front(); }
-  double last_edge() const noexcept { return edges_.back(); }
 
  private:
   struct Integrals {
@@ -88,8 +81,9 @@ class RowProfiler {
   const std::vector<RowBand>& bands() const noexcept { return bands_; }
   const RowProfile& lit() const noexcept { return lit_profile_; }
   const RowProfile& dark() const noexcept { return dark_profile_; }
-  double used_fraction() const noexcept;       ///< of the pixels
-  double saturated_fraction() const noexcept;  ///< of the pixels, when lit
+  double used_fraction() const noexcept { return fraction(used_count_); }  ///< of the pixels
+  /// Of the pixels, when lit.
+  double saturated_fraction() const noexcept { return fraction(saturated_count_); }
   /// Light that is not the LED's, over all light, of the pixels in use, 0..1.
   double ambient_fraction() const noexcept { return ambient_part_; }
 
@@ -101,6 +95,9 @@ class RowProfiler {
     std::uint32_t pictures = 0;
     double mean(std::size_t pixel) const { return counts[pixel] / static_cast<double>(pictures); }
   };
+  double fraction(std::size_t count) const noexcept {
+    return static_cast<double>(count) / static_cast<double>(used_.size());
+  }
   void learn(const ImageView& image, Sum& sum) const;
   void make_bands();
 
@@ -175,8 +172,13 @@ struct CameraTimingResult {
   std::vector<TimedFrame> times;
 
   /// Pictures per second that were new.
-  double new_pictures_rate() const noexcept;
+  double new_pictures_rate() const noexcept {
+    return elapsed > 0 ? (frames - 1 - stale) / elapsed : 0;
+  }
 };
+
+/// 0 without any.
+double quantile(const std::vector<double>& ascending, double share);
 
 constexpr int kMinBandwidthFrames = 60;
 constexpr double kMaxLatency = 0.5;  ///< s, that is looked for

@@ -31,8 +31,7 @@ struct LineSums {
 struct CameraTimes {
   double latency = 0;
   double jitter = 0;  ///< standard deviation
-  double readout = 0;
-  double exposure = 0;
+  double readout = 0, exposure = 0;
 };
 
 class CameraTimingFit {

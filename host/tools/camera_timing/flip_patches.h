@@ -36,8 +36,7 @@ class PageClock {
   int exchanges_ = 0;
   Duration offset_{};  ///< host less page
   Duration half_{};    ///< of the way there and back
-  TimePoint measured_{};
-  TimePoint last_{};
+  TimePoint measured_{}, last_{};
 };
 
 /// Serves host/web/pages/flip and tells it when to flip; the page tells when it has, by its own

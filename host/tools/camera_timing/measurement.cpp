@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <numeric>
 #include <random>
-#include <vector>
 
 #include "host/tools/camera_timing/camera_timing_fit.h"
 #include "host/tools/camera_timing/pattern_lamp.h"
@@ -227,7 +226,7 @@ double mean_level(const Frame& frame) {
   for (int row = part.y; row < part.y + part.height; ++row) {
     const std::uint8_t* pixels =
         frame.image.pixels + static_cast<std::ptrdiff_t>(row) * frame.image.stride + part.x;
-    for (int i = 0; i < part.width; ++i) sum += pixels[i];
+    sum = std::accumulate(pixels, pixels + part.width, sum);
   }
   return static_cast<double>(sum) / (static_cast<double>(part.width) * part.height);
 }
@@ -260,7 +259,13 @@ class ScreenRun {
     std::string why = await_frame(
         source_, options_, -1, [this] { return patch_.ended(); }, frame);
     if (!why.empty()) return fail(std::move(why));
-    note(frame);
+    number_ += 1.0 + frame.dropped;
+    if (!first_) {
+      first_ = frame.capture_time;
+      number_ = 0;
+    }
+    last_ = frame.capture_time;
+    stamps_.add(number_, seconds(last_ - *first_));
     return true;
   }
 
@@ -270,16 +275,6 @@ class ScreenRun {
   bool fail(std::string why) {
     out_.refusal = std::move(why);
     return false;
-  }
-
-  void note(const Frame& frame) {
-    number_ += 1.0 + frame.dropped;
-    if (!first_) {
-      first_ = frame.capture_time;
-      number_ = 0;
-    }
-    last_ = frame.capture_time;
-    stamps_.add(number_, seconds(last_ - *first_));
   }
 
   bool reference(bool white, Level& level) {
@@ -328,13 +323,11 @@ class ScreenRun {
         continue;
       }
       const bool dropped = frame.dropped > 0;  // the first to show it may be the one that was lost
-      const TimePoint stamp = last_;
-      const TimePoint arrived = now();
+      const TimePoint stamp = last_, arrived = now();
       if (!await_shown()) return false;
       const TimePoint flipped = *patch_.shown();
       if (dropped) continue;
-      const double delay = seconds(stamp - flipped);
-      delays_.push_back(delay);
+      delays_.push_back(seconds(stamp - flipped));
       arrivals_ += seconds(arrived - flipped);
       ++out_.flips;
       if (!next(frame)) return false;  // the picture that saw only a part of the flip

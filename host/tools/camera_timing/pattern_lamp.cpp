@@ -1,8 +1,6 @@
 #include "host/tools/camera_timing/pattern_lamp.h"
 
 #include <algorithm>
-#include <cmath>
-#include <exception>
 #include <utility>
 
 #include "protocol/pattern.h"
@@ -30,8 +28,6 @@ void BoardPatternLamp::order(const link::Led& led) {
   pump_();
 }
 
-void BoardPatternLamp::off() { order({}); }
-
 void BoardPatternLamp::steady(int level_permille) {
   link::Led led{};
   led.mode = link::LedMode::steady;
@@ -57,14 +53,12 @@ std::optional<PatternTiming> BoardPatternLamp::timing() const {
   const link::HostTime later = clock.to_host(led_.start_us + kSpan_us);
   const Duration since = clock.latest() - first.time;
   const link::HostTime middle = clock.to_host(clock.to_board(first.time + since / 2));
-  PatternTiming timing;
-  timing.start = first.time;
-  timing.period = std::chrono::duration<double>(later.time - first.time).count() / kSpan_us *
-                  static_cast<double>(led_.period_us);
-  timing.start_sigma = std::chrono::duration<double>(middle.sigma).count();
-  timing.rate_sigma = 1e-6 * clock.report().skew_sigma_ppm;
-  timing.seed = led_.pattern_seed;
-  return timing;
+  return PatternTiming{.start = first.time,
+                       .period = std::chrono::duration<double>(later.time - first.time).count() /
+                                 kSpan_us * static_cast<double>(led_.period_us),
+                       .start_sigma = std::chrono::duration<double>(middle.sigma).count(),
+                       .rate_sigma = 1e-6 * clock.report().skew_sigma_ppm,
+                       .seed = led_.pattern_seed};
 }
 
 void BoardPatternLamp::service() noexcept {
@@ -102,14 +96,6 @@ void SimulatedLamp::show(bool white, TimePoint when) {
   begin({.since = since.count(), .kind = Kind::steady, .level = white ? 1.0 : 0.0});
 }
 
-std::optional<TimePoint> SimulatedLamp::shown() {
-  return zero_ + Duration(std::llround(1e9 * orders_.back().since));
-}
-
-void SimulatedLamp::steady(int level_permille) {
-  begin({.kind = Kind::steady, .level = 1e-3 * level_permille});
-}
-
 void SimulatedLamp::pattern(Duration bit, std::uint16_t seed) {
   bits_.clear();
   std::uint16_t state = seed;
@@ -123,11 +109,7 @@ void SimulatedLamp::pattern(Duration bit, std::uint16_t seed) {
 std::optional<PatternTiming> SimulatedLamp::timing() const {
   if (orders_.empty() || orders_.back().kind != Kind::pattern) return std::nullopt;
   const Order& order = orders_.back();
-  PatternTiming timing;
-  timing.start = zero_ + Duration(std::llround(1e9 * order.since));
-  timing.period = order.bit;
-  timing.seed = order.seed;
-  return timing;
+  return PatternTiming{.start = time_of(order), .period = order.bit, .seed = order.seed};
 }
 
 /// Seconds of light from `from` to `to`, both under this order.

@@ -2,6 +2,7 @@
 // simulator's.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -59,7 +60,7 @@ class BoardPatternLamp final : public PatternLamp {
   /// board whenever it is called; `poll_fd` is readable when that is worth it.
   BoardPatternLamp(link::BoardSession& session, std::function<void()> pump, int poll_fd);
 
-  void off() override;
+  void off() override { order({}); }
   void steady(int level_permille) override;
   void pattern(Duration bit, std::uint16_t seed) override;
   std::optional<PatternTiming> timing() const override;
@@ -93,8 +94,10 @@ class SimulatedLamp final : public PatternLamp, public FlipPatch, public sim::Le
   void off() override { begin({.kind = Kind::steady, .level = 0}); }
   /// As a patch on a screen without latency.
   void show(bool white, TimePoint when) override;
-  std::optional<TimePoint> shown() override;
-  void steady(int level_permille) override;
+  std::optional<TimePoint> shown() override { return time_of(orders_.back()); }
+  void steady(int level_permille) override {
+    begin({.kind = Kind::steady, .level = 1e-3 * level_permille});
+  }
   void pattern(Duration bit, std::uint16_t seed) override;
   std::optional<PatternTiming> timing() const override;
 
@@ -111,6 +114,9 @@ class SimulatedLamp final : public PatternLamp, public FlipPatch, public sim::Le
   };
   double now() const noexcept;
   void begin(Order order);
+  TimePoint time_of(const Order& order) const {
+    return zero_ + Duration(std::llround(1e9 * order.since));
+  }
   double on_time(const Order& order, double from, double to) const noexcept;
 
   bool live_;

@@ -12,12 +12,6 @@ namespace {
 
 constexpr double kRolls = 5;  // standard deviations of a read-out that is one
 
-double quantile(const std::vector<double>& ascending, double share) {
-  if (ascending.empty()) return 0;
-  return ascending[static_cast<std::size_t>(share * static_cast<double>(ascending.size() - 1) +
-                                            0.5)];
-}
-
 /// As many digits as the uncertainty has two of, but no more than a microsecond's worth.
 std::string with_sigma(double value, double sigma, const char* unit) {
   const double finest = 1e-4;
@@ -48,42 +42,37 @@ std::string percent(int part, int all) {
   return fmt::format("{} of {} ({:.1f} %)", part, all, all > 0 ? 100.0 * part / all : 0.0);
 }
 
-class Lines {
- public:
-  void add(const std::string& name, const std::string& value, const std::string& remark = {}) {
-    text_ += remark.empty() ? fmt::format("{:<15}{}\n", name, value)
-                            : fmt::format("{:<15}{:<26}{}\n", name, value, remark);
-  }
-  std::string take() { return std::move(text_); }
+std::string line(const std::string& name, const std::string& value,
+                 const std::string& remark = {}) {
+  return remark.empty() ? fmt::format("{:<15}{}\n", name, value)
+                        : fmt::format("{:<15}{:<26}{}\n", name, value, remark);
+}
 
- private:
-  std::string text_;
-};
-
-void add_latency(const CameraTimingMeasurement& m, Lines& lines) {
+void add_latency(const CameraTimingMeasurement& m, std::string& lines) {
   const CameraTimingResult& r = m.result;
-  lines.add("latency", milliseconds(r.latency),
-            "mean, from the middle of the exposure to the kernel's time stamp");
+  lines += line("latency", milliseconds(r.latency),
+                "mean, from the middle of the exposure to the kernel's time stamp");
   if (r.latency.known && r.timed > 0) {
-    lines.add("", fmt::format("{:.1f} to {:.1f} ms", 1e3 * r.latency_least, 1e3 * r.latency_most),
-              fmt::format("median {:.1f}, 95 % within {:.1f}", 1e3 * r.latency_median,
-                          1e3 * r.latency_95));
+    lines +=
+        line("", fmt::format("{:.1f} to {:.1f} ms", 1e3 * r.latency_least, 1e3 * r.latency_most),
+             fmt::format("median {:.1f}, 95 % within {:.1f}", 1e3 * r.latency_median,
+                         1e3 * r.latency_95));
   }
-  lines.add("jitter", milliseconds(r.jitter), "standard deviation of latency");
-  lines.add("read-out", milliseconds(r.readout), shutter(r));
-  lines.add("exposure", milliseconds(r.exposure), "of each row");
+  lines += line("jitter", milliseconds(r.jitter), "standard deviation of latency");
+  lines += line("read-out", milliseconds(r.readout), shutter(r));
+  lines += line("exposure", milliseconds(r.exposure), "of each row");
 }
 
 void add_processing(const CameraTimingMeasurement& m, const CameraTimingSetting& setting,
-                    Lines& lines) {
+                    std::string& lines) {
   if (m.processing.empty()) return;
   const double median = quantile(m.processing, 0.5);
-  lines.add("processing", fmt::format("{:.2f} ms", 1e3 * median),
-            fmt::format("median, from time stamp to {}; 95 % within {:.2f} ms", setting.output,
-                        1e3 * quantile(m.processing, 0.95)));
+  lines += line("processing", fmt::format("{:.2f} ms", 1e3 * median),
+                fmt::format("median, from time stamp to {}; 95 % within {:.2f} ms", setting.output,
+                            1e3 * quantile(m.processing, 0.95)));
   if (m.result.latency.known) {
-    lines.add("in all", fmt::format("{:.1f} ms", 1e3 * (m.result.latency.value + median)),
-              fmt::format("from light to {}", setting.output));
+    lines += line("in all", fmt::format("{:.1f} ms", 1e3 * (m.result.latency.value + median)),
+                  fmt::format("from light to {}", setting.output));
   }
 }
 
@@ -98,42 +87,43 @@ Json figure(const Figure& f) {
 
 std::string report_text(const CameraTimingMeasurement& m, const CameraTimingSetting& setting) {
   const CameraTimingResult& r = m.result;
-  Lines lines;
-  lines.add("camera", setting.camera);
-  lines.add("lamp", setting.lamp);
-  lines.add("frame rate",
-            r.frame_rate.known ? with_sigma(r.frame_rate.value, r.frame_rate.sigma, "Hz")
-                               : std::string("cannot tell"),
-            setting.announced_period > 0
-                ? fmt::format("exposures; announced {:.5g} Hz", 1 / setting.announced_period)
-                : "exposures; none announced");
-  lines.add("new pictures", fmt::format("{:.2f} a second", r.new_pictures_rate()));
+  std::string lines;
+  lines += line("camera", setting.camera);
+  lines += line("lamp", setting.lamp);
+  lines += line("frame rate",
+                r.frame_rate.known ? with_sigma(r.frame_rate.value, r.frame_rate.sigma, "Hz")
+                                   : std::string("cannot tell"),
+                setting.announced_period > 0
+                    ? fmt::format("exposures; announced {:.5g} Hz", 1 / setting.announced_period)
+                    : "exposures; none announced");
+  lines += line("new pictures", fmt::format("{:.2f} a second", r.new_pictures_rate()));
   add_latency(m, lines);
   add_processing(m, setting, lines);
-  lines.add("stale frames", percent(r.stale, r.frames),
-            r.undecided > 0
-                ? fmt::format("that show the picture before them; of {} more it cannot be told",
-                              r.undecided)
-                : "that show the picture before them");
-  lines.add("missing", fmt::format("{} pictures", r.missing),
-            fmt::format("by the light; the driver told of {}, stale frames took the place of {}",
-                        r.dropped_by_driver, r.stale));
+  lines += line("stale frames", percent(r.stale, r.frames),
+                r.undecided > 0
+                    ? fmt::format("that show the picture before them; of {} more it cannot be told",
+                                  r.undecided)
+                    : "that show the picture before them");
+  lines +=
+      line("missing", fmt::format("{} pictures", r.missing),
+           fmt::format("by the light; the driver told of {}, stale frames took the place of {}",
+                       r.dropped_by_driver, r.stale));
   if (r.strange > 0)
-    lines.add("strange", percent(r.strange, r.frames), "that show the light of no time near");
-  lines.add("light", fmt::format("{:.1f} % not the LED's", 100 * m.ambient_fraction),
-            fmt::format("{:.0f} % of the picture used, {:.1f} % white", 100 * m.used_fraction,
-                        100 * m.saturated_fraction));
+    lines += line("strange", percent(r.strange, r.frames), "that show the light of no time near");
+  lines += line("light", fmt::format("{:.1f} % not the LED's", 100 * m.ambient_fraction),
+                fmt::format("{:.0f} % of the picture used, {:.1f} % white", 100 * m.used_fraction,
+                            100 * m.saturated_fraction));
   if (m.exposure_set_us > 0) {
-    lines.add("", fmt::format("exposure {:.1f} ms", 1e-3 * m.exposure_set_us),
-              "set for this measurement, or the LED had made the picture white");
+    lines += line("", fmt::format("exposure {:.1f} ms", 1e-3 * m.exposure_set_us),
+                  "set for this measurement, or the LED had made the picture white");
   }
-  lines.add(
+  lines += line(
       "clock",
       m.edge_sigma > 0 ? fmt::format("+/- {:.3f} ms", 1e3 * m.edge_sigma) : std::string("the same"),
       "of the lamp's edges on this computer's clock");
-  lines.add("pattern", fmt::format("bits of {:.3f} ms", 1e3 * m.bit),
-            fmt::format("{} of {} pictures tell when they were taken", r.timed, r.frames));
-  return lines.take();
+  lines += line("pattern", fmt::format("bits of {:.3f} ms", 1e3 * m.bit),
+                fmt::format("{} of {} pictures tell when they were taken", r.timed, r.frames));
+  return lines;
 }
 
 std::string report_json(const CameraTimingMeasurement& m, const CameraTimingSetting& setting) {
@@ -180,22 +170,22 @@ std::string report_json(const CameraTimingMeasurement& m, const CameraTimingSett
 
 std::string report_text(const ScreenMeasurement& m, const std::string& camera,
                         const std::string& screen, double announced_period) {
-  Lines lines;
-  lines.add("camera", camera);
-  lines.add("screen", screen);
-  lines.add("frame rate",
-            fmt::format("{:.3f} +/- {:.3f} Hz", m.frame_rate.value, m.frame_rate.sigma),
-            announced_period > 0
-                ? fmt::format("by the time stamps; announced {:.5g} Hz", 1 / announced_period)
-                : "by the time stamps; none announced");
-  lines.add("latency",
-            fmt::format("{:.1f} +/- {:.1f} ms", 1e3 * m.latency.value, 1e3 * m.latency.sigma),
-            "screen and camera together, to the kernel's time stamp");
-  lines.add("round trip", fmt::format("{:.1f} ms", 1e3 * m.round_trip),
-            "mean, from a flip to the arrival of the picture that shows it");
-  lines.add("flips", fmt::format("{} seen, {} missed", m.flips, m.missed),
-            fmt::format("{:.0f} grey levels between black and white", m.contrast));
-  return lines.take();
+  std::string lines;
+  lines += line("camera", camera);
+  lines += line("screen", screen);
+  lines += line("frame rate",
+                fmt::format("{:.3f} +/- {:.3f} Hz", m.frame_rate.value, m.frame_rate.sigma),
+                announced_period > 0
+                    ? fmt::format("by the time stamps; announced {:.5g} Hz", 1 / announced_period)
+                    : "by the time stamps; none announced");
+  lines += line("latency",
+                fmt::format("{:.1f} +/- {:.1f} ms", 1e3 * m.latency.value, 1e3 * m.latency.sigma),
+                "screen and camera together, to the kernel's time stamp");
+  lines += line("round trip", fmt::format("{:.1f} ms", 1e3 * m.round_trip),
+                "mean, from a flip to the arrival of the picture that shows it");
+  lines += line("flips", fmt::format("{} seen, {} missed", m.flips, m.missed),
+                fmt::format("{:.0f} grey levels between black and white", m.contrast));
+  return lines;
 }
 
 std::string report_json(const ScreenMeasurement& m, const std::string& camera,

@@ -71,14 +71,6 @@ std::string RowProfiler::choose() {
   return {};
 }
 
-double RowProfiler::used_fraction() const noexcept {
-  return static_cast<double>(used_count_) / static_cast<double>(used_.size());
-}
-
-double RowProfiler::saturated_fraction() const noexcept {
-  return static_cast<double>(saturated_count_) / static_cast<double>(used_.size());
-}
-
 // A band's place and height are those of its light: rows have no height in time, and the brighter
 // ones count for more.
 void RowProfiler::make_bands() {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "host/tools/design/geometry.h"
+#include "host/tracker/squares.h"
 
 namespace tagwrench::hardware {
 namespace {
@@ -33,14 +34,6 @@ constexpr double kGlassAndBack = 2.2e-3;        // of the mirror and what it is 
 constexpr double kCheek = 1.7e-3;               // beside the mirror, with the glass' play
 constexpr double kBesideSight = 0.2e-3;         // from the holder to a line of sight
 constexpr double kHolderFoot = 6.8e-3;          // of the mirror's holder beyond the lens
-
-Eigen::Isometry3d moved(const Geometry& g, const Vector6& d) {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  const double angle = d.tail<3>().norm();
-  if (angle > 0) pose.linear() = Eigen::AngleAxisd(angle, d.tail<3>() / angle).toRotationMatrix();
-  pose.translation() = d.head<3>() + Eigen::Vector3d(0, 0, g.platform);
-  return pose;
-}
 
 /// Distance between the segments a..b and c..d.
 double distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
@@ -84,85 +77,72 @@ class Checker {
 
   void wall(const char* parameter, double thickness) {
     const double least = kMinWalls * p_.printing.nozzle;
-    if (thickness < least) {
+    if (thickness < least)
       say(parameter,
           "{:.2f} mm is thinner than two lines of the {:.2f} mm nozzle; take {:.2f} mm or more",
           kToMm * thickness, kToMm * p_.printing.nozzle, kToMm * least);
-    }
   }
 
   void prints() {
     wall("print.wall_mm", p_.printing.wall);
     wall("cover.wall_mm", p_.cover.wall);
     wall("top.plate_mm", p_.top.plate - p_.springs.socket);
-    if (p_.light.diffuser < p_.printing.layer) {
+    if (p_.light.diffuser < p_.printing.layer)
       say("light.diffuser_mm", "{:.2f} mm is less than a layer of {:.2f} mm",
           kToMm * p_.light.diffuser, kToMm * p_.printing.layer);
-    }
   }
 
   /// In the plane: lens, springs, LED, walls of the cover.
   void fits() {
     const double spring = 0.5 * p_.springs.outer_diameter + p_.printing.clearance;
     const double half_x = 0.5 * p_.springs.spacing_x, half_y = 0.5 * p_.springs.spacing_y;
-    const double edge_x = std::min(p_.cover.x_to, -p_.cover.x_from);
-    if (half_x + spring + p_.cover.wall > edge_x) {
+    const auto reach = [&](char axis, double socket, double edge) {
+      if (socket + p_.cover.wall <= edge) return;
       say("springs.spacing_mm",
-          "the sockets reach to x = {:.1f} mm, the cover with its wall only to {:.1f} mm; bring "
-          "the springs together or widen cover.x_mm",
-          kToMm * (half_x + spring), kToMm * (edge_x - p_.cover.wall));
-    }
-    if (half_y + spring + p_.cover.wall > p_.cover.y_half) {
-      say("springs.spacing_mm",
-          "the sockets reach to y = {:.1f} mm, the cover with its wall only to {:.1f} mm; bring "
-          "the springs together or widen cover.y_mm",
-          kToMm * (half_y + spring), kToMm * (p_.cover.y_half - p_.cover.wall));
-    }
-    if (std::hypot(half_x, half_y) < g_.bore + spring + p_.printing.nozzle) {
+          "the sockets reach to {0} = {1:.1f} mm, the cover with its wall only to {2:.1f} mm; "
+          "bring the springs together or widen cover.{0}_mm",
+          axis, kToMm * socket, kToMm * (edge - p_.cover.wall));
+    };
+    reach('x', half_x + spring, std::min(p_.cover.x_to, -p_.cover.x_from));
+    reach('y', half_y + spring, p_.cover.y_half);
+    if (std::hypot(half_x, half_y) < g_.bore + spring + p_.printing.nozzle)
       say("springs.spacing_mm",
           "springs of {:.2f} mm stand in the way of a lens holder of {:.1f} mm; take them {:.1f} "
           "mm from the middle at least",
           kToMm * p_.springs.outer_diameter, kToMm * p_.camera.lens_diameter,
           kToMm * (g_.bore + spring + p_.printing.nozzle));
-    }
     const double led = std::abs(p_.light.x) - 0.5 * p_.light.width;
-    if (std::abs(p_.light.y) < g_.bore && led < g_.bore + p_.printing.nozzle) {
+    if (std::abs(p_.light.y) < g_.bore && led < g_.bore + p_.printing.nozzle)
       say("light.position_mm",
           "the LED's seat begins {:.1f} mm from the middle, in the hole for the lens, which ends "
           "at {:.1f} mm; move it out",
           kToMm * led, kToMm * g_.bore);
-    }
     const double led_end = led + p_.light.width + p_.cover.wall;
-    if (led_end > (p_.light.x < 0 ? -p_.cover.x_from : p_.cover.x_to)) {
+    const double end = p_.light.x < 0 ? -p_.cover.x_from : p_.cover.x_to;
+    if (led_end > end)
       say("light.position_mm",
           "the LED's seat leaves less than a wall to the cover's end; move it in by {:.1f} mm or "
           "lengthen cover.x_mm",
-          kToMm * (led_end - (p_.light.x < 0 ? -p_.cover.x_from : p_.cover.x_to)));
-    }
-    if (p_.top.knob && p_.top.knob_diameter < knob_least()) {
+          kToMm * (led_end - end));
+    if (p_.top.knob && p_.top.knob_diameter < knob_least())
       say("top.knob_mm",
           "{:.1f} mm do not go around the cover and its travel; take {:.1f} mm or more",
           kToMm * p_.top.knob_diameter, kToMm * knob_least());
-    }
-    const double lip = p_.printing.clearance;
-    if (g_.plate_x + lip > std::min(-g_.inner_x_from, g_.inner_x_to)) {
-      say("cover.x_mm",
-          "the plate on the springs, {:.1f} mm long, does not fit into the shield; make the cover "
-          "longer at its shorter side",
-          kToMm * 2 * g_.plate_x);
-    }
-    if (g_.plate_y + lip > g_.inner_y) {
-      say("cover.y_mm",
-          "the plate on the springs, {:.1f} mm wide, does not fit into the shield; make the cover "
-          "wider",
-          kToMm * 2 * g_.plate_y);
-    }
-    if (p_.stops.gap < std::max(p_.stops.x, p_.stops.y)) {
+    const auto plate = [&](const char* cover, double half, double inner, const char* as,
+                           const char* more) {
+      if (half + p_.printing.clearance <= inner) return;
+      say(cover,
+          "the plate on the springs, {:.1f} mm {}, does not fit into the shield; make the cover {}",
+          kToMm * 2 * half, as, more);
+    };
+    plate("cover.x_mm", g_.plate_x, std::min(-g_.inner_x_from, g_.inner_x_to), "long",
+          "longer at its shorter side");
+    plate("cover.y_mm", g_.plate_y, g_.inner_y, "wide", "wider");
+    if (p_.stops.gap < std::max(p_.stops.x, p_.stops.y))
       say("stops.gap_mm",
           "the walls are {:.1f} mm from the cover and meet it before the stop screws do; take "
           "{:.1f} mm or more",
           kToMm * p_.stops.gap, kToMm * std::max(p_.stops.x, p_.stops.y));
-    }
     stop_slots();
   }
 
@@ -214,20 +194,18 @@ class Checker {
           kToMm * g_.spring_solid, kToMm * p_.springs.free_length);
       return;
     }
-    if (least - kFromSolid < std::max(0.0, solid)) {
+    if (least - kFromSolid < std::max(0.0, solid))
       say("stops.z_mm",
           "the springs' coils close after {:.2f} mm, before the stops at {:.2f} mm; take less "
           "travel or longer springs",
           kToMm * (p_.springs.free_length - g_.spring_solid - kFromSolid), kToMm * deepest());
-    }
     const double sideways =
         buckling_deflection(g_.spring_clear, p_.springs.outer_diameter - p_.springs.wire);
-    if (deepest() > sideways) {
+    if (deepest() > sideways)
       say("springs.free_length_mm",
           "the springs give way sideways when shortened by {:.1f} mm, the stops are at {:.1f} mm; "
           "take shorter or wider springs, or less stops.z_mm",
           kToMm * sideways, kToMm * deepest());
-    }
   }
 
   /// Most that a spring is shortened over the travel.
@@ -247,36 +225,27 @@ class Checker {
     for (const TagPlace& tag : g_.tags)
       if (!tag.in_mirror)
         nearest = std::min(nearest, p_.target.lens_distance + tag.platform_T_tag.translation().z());
-    if (nearest < p_.camera.nearest_focus) {
+    if (nearest < p_.camera.nearest_focus)
       say("target.lens_distance_mm",
           "{:.1f} mm is nearer than {} focuses ({:.0f} mm); take a longer distance or another "
           "camera",
           kToMm * nearest, p_.camera.name, kToMm * p_.camera.nearest_focus);
-    }
     const double tag_px = p_.camera.image.fx_px * p_.target.tag_size / p_.target.lens_distance;
-    if (tag_px < kMinTag_px) {
+    if (tag_px < kMinTag_px)
       say("target.tag_size_mm",
           "tags of {:.2f} mm are {:.0f} px wide at {:.1f} mm, {:.0f} are needed; take larger tags, "
           "a shorter target.lens_distance_mm, or a camera of more pixels",
           kToMm * p_.target.tag_size, tag_px, kToMm * p_.target.lens_distance, kMinTag_px);
-    }
-    const double front = g_.lens_front;
+    Geometry plain = g_;  // the real papers at rest, none mirrored
+    plain.mirror.reset();
     double lowest = g_.platform;
-    for (const Eigen::Vector3d& corner : paper_corners_there())
+    for (const Eigen::Vector3d& corner : paper_corners(p_, plain, Vector6::Zero()))
       lowest = std::min(lowest, corner.z());
-    if (lowest - p_.stops.z < front + 1e-3) {
+    if (lowest - p_.stops.z < g_.lens_front + 1e-3)
       say("target.lens_distance_mm",
           "at the end of the travel the tags are {:.1f} mm from the lens; take a longer distance "
           "or less stops.z_mm",
-          kToMm * (lowest - p_.stops.z - front));
-    }
-  }
-
-  /// Of the real papers at rest, not of mirrored ones.
-  std::vector<Eigen::Vector3d> paper_corners_there() const {
-    Geometry plain = g_;
-    plain.mirror.reset();
-    return paper_corners(p_, plain, Vector6::Zero());
+          kToMm * (lowest - p_.stops.z - g_.lens_front));
   }
 
   void views() {
@@ -295,26 +264,24 @@ class Checker {
       }
       behind_plate = behind_plate || plate_between(d);
     }
-    if (outside) {
+    if (outside)
       say("target.lens_distance_mm",
           "at the end of the travel a tag leaves the picture by {:.0f} px; take a longer distance, "
           "smaller target.tag_size_mm or less travel in stops",
           most_outside);
-    }
     if (behind_spring)
       say("springs.spacing_mm", "at the end of the travel a spring hides a tag; move them apart");
-    if (behind_cover) {
+    if (behind_cover)
       say("camera.lens_diameter_mm",
           "the cover's hole for the lens cuts into the view of the tags; the lens sits too deep: "
           "lengthen target.lens_distance_mm or shorten the springs");
-    }
     if (behind_plate)
       say("top.plate_mm", "the edge of the plate's opening hides a tag at the end of the travel");
   }
 
   bool spring_between(const Vector6& d, const Eigen::Vector3d& corner) const {
     const Eigen::Vector3d eye(0, 0, g_.pupil);
-    const Eigen::Isometry3d pose = moved(g_, d);
+    const Eigen::Isometry3d pose = platform_pose(g_, d);
     return std::any_of(g_.springs.begin(), g_.springs.end(), [&](const Eigen::Vector2d& at) {
       const Eigen::Vector3d foot(at.x(), at.y(), g_.cover_top);
       const Eigen::Vector3d head = pose * Eigen::Vector3d(at.x(), at.y(), 0);
@@ -330,7 +297,7 @@ class Checker {
 
   /// The plate's opening moves with the tags; only what is behind the plate can be hidden by it.
   bool plate_between(const Vector6& d) const {
-    const Eigen::Isometry3d platform_T_drawing = moved(g_, d).inverse();
+    const Eigen::Isometry3d platform_T_drawing = platform_pose(g_, d).inverse();
     const Eigen::Vector3d eye = platform_T_drawing * Eigen::Vector3d(0, 0, g_.pupil);
     for (const Eigen::Vector3d& there : paper_corners(p_, g_, d)) {
       const Eigen::Vector3d corner = platform_T_drawing * there;
@@ -494,17 +461,13 @@ Eigen::Vector2d seen_at(const Parameters& p, const Geometry& g, const Eigen::Vec
 
 std::vector<Eigen::Vector3d> paper_corners(const Parameters& p, const Geometry& g,
                                            const Vector6& displacement) {
-  const Eigen::Isometry3d pose = moved(g, displacement);
+  const Eigen::Isometry3d pose = platform_pose(g, displacement);
   const double half = 0.5 * p.target.tag_size + p.target.border;
   std::vector<Eigen::Vector3d> out;
   for (const TagPlace& tag : g.tags) {
-    for (const double x : {-half, half}) {
-      for (const double y : {-half, half}) {
-        Eigen::Vector3d corner = pose * (tag.platform_T_tag * Eigen::Vector3d(x, y, 0));
-        if (tag.in_mirror && g.mirror)
-          corner -= 2 * (g.mirror->normal.dot(corner) - g.mirror->distance) * g.mirror->normal;
-        out.push_back(corner);
-      }
+    for (const Eigen::Vector3d& on_tag : square_corners(half)) {
+      const Eigen::Vector3d corner = pose * (tag.platform_T_tag * on_tag);
+      out.push_back(tag.in_mirror && g.mirror ? g.mirror->behind(corner) : corner);
     }
   }
   return out;

@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
-#include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
 
 #include "host/core/algebra/decompositions.h"
+#include "host/tracker/rotation.h"
+#include "host/tracker/squares.h"
 
 namespace tagwrench::study {
 namespace {
@@ -19,32 +20,29 @@ constexpr double kFarForce = 1e9;    // N, beyond what any spring's numbers here
 constexpr double kSharedEdges = 4;   // standard deviations of the point spread, in a cell
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
+/// The motion of all points that is this displacement of `origin`.
 Eigen::Isometry3d moved(const Vector6& displacement, const Eigen::Vector3d& origin) {
-  const Eigen::Vector3d r = displacement.tail<3>();
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  if (r.norm() > 0)
-    motion.linear() = Eigen::AngleAxisd(r.norm(), r.normalized()).toRotationMatrix();
-  motion.translation() = displacement.head<3>() + origin - motion.linear() * origin;
-  return motion;
+  const Eigen::Translation3d rest(origin);
+  return tagwrench::moved(Eigen::Isometry3d(rest), displacement) * rest.inverse();
+}
+
+Eigen::Vector2d project(const SeenPicture& picture, const Eigen::Vector3d& p) {
+  return {picture.fx_px * p.x() / p.z() + picture.cx_px,
+          picture.fy_px * p.y() / p.z() + picture.cy_px};
 }
 
 bool corner_in_view(const SeenPicture& picture, const Eigen::Vector3d& p) {
   if (p.z() <= 0) return false;
-  const double u = picture.fx_px * p.x() / p.z() + picture.cx_px;
-  const double v = picture.fy_px * p.y() / p.z() + picture.cy_px;
-  return u >= 0 && v >= 0 && u <= picture.width_px - 1 && v <= picture.height_px - 1;
+  const Eigen::Vector2d at = project(picture, p);
+  return at.minCoeff() >= 0 && at.x() <= picture.width_px - 1 && at.y() <= picture.height_px - 1;
 }
 
 bool in_view(const Instrument& instrument, const Vector6& displacement) {
   const Eigen::Isometry3d motion = moved(displacement, instrument.origin);
   for (const SeenTag& tag : instrument.tags) {
-    const double half = 0.5 * tag.size + tag.border;
-    for (const double x : {-half, half}) {
-      for (const double y : {-half, half}) {
-        const Eigen::Vector3d corner =
-            tag.seen(motion * (tag.camera_T_tag * Eigen::Vector3d(x, y, 0)));
-        if (!corner_in_view(instrument.picture, corner)) return false;
-      }
+    for (const Eigen::Vector3d& corner : square_corners(0.5 * tag.size + tag.border)) {
+      const Eigen::Vector3d seen = tag.seen(motion * (tag.camera_T_tag * corner));
+      if (!corner_in_view(instrument.picture, seen)) return false;
     }
   }
   return true;
@@ -81,22 +79,20 @@ std::optional<double> force_to_solid(const Instrument& instrument, const Vector6
 DesignRow row(const Instrument& instrument, const Design& design, double range, double scale) {
   const Matrix6 stiffness = scale * instrument.stiffness;
   const Matrix6 compliance = inverse(stiffness);
-  DesignRow row;
-  row.range = range;
-  row.scale = scale;
-  row.lateral = stiffness(0, 0);
-  row.axial = stiffness(2, 2);
-  row.travel_lateral = range * std::max(compliance(0, 0), compliance(1, 1));
-  row.travel_axial = range * compliance(2, 2);
   const CountedPixels& counted = instrument.counted;
-  row.counted_x = counted_force(range, counted.travel_x_px(), counted.counts_per_px);
-  row.counted_y = counted_force(range, counted.travel_y_px(), counted.counts_per_px);
   const Matrix6 covariance =
       displacement_bound(instrument.tags, instrument.origin, instrument.picture);
-  row.bound = (stiffness * covariance * stiffness.transpose()).diagonal().cwiseSqrt();
-  row.lowest = std::sqrt(scale) * design.modes.front();
-  row.highest = std::sqrt(scale) * design.modes.back();
-  return row;
+  return {.range = range,
+          .scale = scale,
+          .lateral = stiffness(0, 0),
+          .axial = stiffness(2, 2),
+          .travel_lateral = range * std::max(compliance(0, 0), compliance(1, 1)),
+          .travel_axial = range * compliance(2, 2),
+          .counted_x = counted_force(range, counted.travel_x_px(), counted.counts_per_px),
+          .counted_y = counted_force(range, counted.travel_y_px(), counted.counts_per_px),
+          .bound = (stiffness * covariance * stiffness.transpose()).diagonal().cwiseSqrt(),
+          .lowest = std::sqrt(scale) * design.modes.front(),
+          .highest = std::sqrt(scale) * design.modes.back()};
 }
 
 void warn_of_reach(const Instrument& instrument, Design& design) {
@@ -135,8 +131,7 @@ void warn_of_springs(const Instrument& instrument, Design& design) {
 }
 
 void warn_of_modes(const Instrument& instrument, Design& design) {
-  std::string modes;
-  std::string aliases;
+  std::string modes, aliases;
   for (const double mode : design.modes) {
     const double seen = alias(mode, instrument.frame_rate);
     if (seen > kNearStill * instrument.frame_rate) continue;
@@ -176,11 +171,6 @@ constexpr double kFullScale = 255;
 using Information = Eigen::MatrixXd;
 using Jacobian = Eigen::Matrix<double, 2, 6>;
 
-Eigen::Vector2d project(const SeenPicture& picture, const Eigen::Vector3d& p) {
-  return {picture.fx_px * p.x() / p.z() + picture.cx_px,
-          picture.fy_px * p.y() / p.z() + picture.cy_px};
-}
-
 /// px per m and rad of the displacement about `origin`, of a point of the tag (camera frame, where
 /// it is and not where it is seen).
 Jacobian image_motion(const SeenPicture& picture, const SeenTag& tag, const Eigen::Vector3d& p,
@@ -190,11 +180,8 @@ Jacobian image_motion(const SeenPicture& picture, const SeenTag& tag, const Eige
   by_point << picture.fx_px / at.z(), 0, -picture.fx_px * at.x() / (at.z() * at.z()),  //
       0, picture.fy_px / at.z(), -picture.fy_px * at.y() / (at.z() * at.z());
   if (tag.mirror) by_point *= tag.mirror->reflection();
-  const Eigen::Vector3d arm = p - origin;
-  Eigen::Matrix3d by_rotation;  // d (r x arm) / dr
-  by_rotation << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
   Jacobian motion;
-  motion << by_point, by_point * by_rotation;
+  motion << by_point, by_point * cross_matrix(origin - p);  // of r x arm
   return motion;
 }
 
@@ -209,8 +196,10 @@ class TagEdges {
   explicit TagEdges(const SeenTag& tag) : tag_(tag), cell_(tag.size / tag.cells) {
     for (int line = 0; line <= tag.cells; ++line) {
       for (int along = 0; along < tag.cells; ++along) {
-        upright(line, along);
-        level(line, along);
+        add(white(along, line - 1), white(along, line), corner(along + 1, line),
+            corner(along, line));
+        add(white(line - 1, along), white(line, along), corner(line, along),
+            corner(line, along + 1));
       }
     }
   }
@@ -232,13 +221,6 @@ class TagEdges {
       pieces_.push_back(before ? Piece{a, b} : Piece{b, a});
     }
   }
-  void upright(int line, int row) {
-    add(white(row, line - 1), white(row, line), corner(row + 1, line), corner(row, line));
-  }
-  void level(int line, int column) {
-    add(white(line - 1, column), white(line, column), corner(line, column),
-        corner(line, column + 1));
-  }
 
   const SeenTag& tag_;
   double cell_;
@@ -248,10 +230,8 @@ class TagEdges {
 /// Pixels that a rectangle of the tag's plane covers.
 double area_px(const SeenTag& tag, const SeenPicture& picture, double half) {
   Eigen::Vector2d corners[4];
-  const double x[] = {-half, half, half, -half};
-  const double y[] = {-half, -half, half, half};
   for (int i = 0; i < 4; ++i)
-    corners[i] = project(picture, tag.seen(tag.camera_T_tag * Eigen::Vector3d(x[i], y[i], 0)));
+    corners[i] = project(picture, tag.seen(tag.camera_T_tag * square_corners(half)[i]));
   double twice = 0;
   for (int i = 0; i < 4; ++i) {
     const Eigen::Vector2d& a = corners[i];
@@ -317,9 +297,7 @@ double solid_length(const Spring& spring) {
 }
 
 std::array<double, 6> natural_frequencies(const Matrix6& stiffness, const Platform& platform) {
-  const Eigen::Vector3d& c = platform.centre_of_mass;
-  Eigen::Matrix3d cross;
-  cross << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
+  const Eigen::Matrix3d cross = cross_matrix(platform.centre_of_mass);
   Matrix6 mass;
   mass << platform.mass * Eigen::Matrix3d::Identity(), -platform.mass * cross,
       platform.mass * cross,

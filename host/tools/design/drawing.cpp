@@ -25,19 +25,17 @@ double rounded(double value) { return std::round(1e6 * value) / 1e6 + 0.0; }
 class Sheet {
  public:
   void mm(std::string_view name, double metres) { number(name, kToMm * metres); }
-  void number(std::string_view name, double value) {
-    text_ += fmt::format("{} = {};\n", name, rounded(value));
-  }
-  void flag(std::string_view name, bool value) { text_ += fmt::format("{} = {};\n", name, value); }
+  void number(std::string_view name, double value) { put(name, rounded(value)); }
   void text(std::string_view name, std::string_view value) {
-    text_ += fmt::format("{} = \"{}\";\n", name, value);
-  }
-  void texts(std::string_view name, const std::vector<std::string>& values) {
-    text_ += fmt::format("{} = [\"{}\"];\n", name, fmt::join(values, "\", \""));
+    put(name, fmt::format("\"{}\"", value));
   }
   /// As they stand.
   void raw(std::string_view name, const std::vector<std::string>& values) {
-    text_ += fmt::format("{} = [{}];\n", name, fmt::join(values, ", "));
+    put(name, fmt::format("[{}]", fmt::join(values, ", ")));
+  }
+  template <class Value>
+  void put(std::string_view name, const Value& value) {
+    text_ += fmt::format("{} = {};\n", name, value);
   }
   /// Vectors of lengths, mm.
   void list(std::string_view name, const std::vector<std::vector<double>>& rows) {
@@ -66,7 +64,7 @@ std::string plain(std::string text) {
 
 void chosen(const Parameters& p, Sheet& s) {
   s.text("name", plain(p.name));
-  s.flag("camera_barrel", p.camera.body == CameraBody::barrel);
+  s.put("camera_barrel", p.camera.body == CameraBody::barrel);
   s.mm("camera_width", p.camera.width);
   s.mm("camera_depth", p.camera.depth);
   s.mm("camera_thickness", p.camera.thickness);
@@ -96,7 +94,7 @@ void chosen(const Parameters& p, Sheet& s) {
   s.mm("print_layer", p.printing.layer);
   s.mm("print_wall", p.printing.wall);
   s.mm("print_clearance", p.printing.clearance);
-  s.flag("top_knob", p.top.knob);
+  s.put("top_knob", p.top.knob);
   s.number("top_walls", p.top.walls);
   s.mm("top_plate", p.top.plate);
   s.mm("top_roof", p.top.roof);
@@ -107,7 +105,7 @@ void chosen(const Parameters& p, Sheet& s) {
   s.mm("cover_y_half", p.cover.y_half);
   s.mm("cover_wall", p.cover.wall);
   s.mm("cover_thread_hole", p.cover.thread_hole);
-  s.flag("mount_puck", p.mount.puck);
+  s.put("mount_puck", p.mount.puck);
   s.mm("mount_thickness", p.mount.thickness);
   s.mm("mount_width", p.mount.width);
   s.mm("mount_hole", p.mount.hole);
@@ -204,8 +202,7 @@ void derived(const Geometry& g, Sheet& s) {
 std::array<Eigen::Vector3d, 4> load_points(const Parameters& p, const Geometry& g) {
   const double wall = p.printing.wall;
   double right = g.inner_x_to + (p.top.walls == 4 ? wall : 0);
-  double left = wall - g.inner_x_from;
-  double side = g.inner_y + wall;
+  double left = wall - g.inner_x_from, side = g.inner_y + wall;
   double z = 0.5 * (g.plate_top + g.top) - g.platform;
   if (p.top.knob) {
     right = left = side = 0.5 * p.top.knob_diameter;
@@ -254,7 +251,7 @@ std::string scad_parameters(const Parameters& parameters, const Geometry& geomet
   }
   sheet.list("travel", corners);
   sheet.comment("To print:");
-  sheet.texts("parts", printed_parts(parameters));
+  sheet.put("parts", fmt::format("[\"{}\"]", fmt::join(printed_parts(parameters), "\", \"")));
   return sheet.take();
 }
 

@@ -1,14 +1,12 @@
 #include "host/tools/design/geometry.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "host/core/algebra/decompositions.h"
-#include "host/tools/design/design.h"
-#include "host/wrench/estimate.h"
+#include "host/tracker/rotation.h"
+#include "host/tracker/squares.h"
 
 namespace tagwrench::hardware {
 namespace {
@@ -70,8 +68,7 @@ void place_tags(const Parameters& p, Geometry& g) {
       sideways.translation() << aside + half + p.stops.x + p.stops.z + kLeg, 0, -below;
       g.tags.push_back({.id = t.ids[1], .platform_T_tag = sideways, .in_mirror = true});
       const Eigen::Vector3d normal(std::sin(kMirrorAngle), 0, -std::cos(kMirrorAngle));
-      g.mirror = Mirror{.normal = normal,
-                        .distance = normal.dot(Eigen::Vector3d(aside, 0, g.platform - below))};
+      g.mirror = Mirror{{normal, normal.dot(Eigen::Vector3d(aside, 0, g.platform - below))}};
       return;
     }
   }
@@ -154,21 +151,98 @@ void size_mirror(const Parameters& p, Geometry& g) {
   for (const Vector6& d : travel_corners(p, g)) {
     for (const TagPlace& tag : g.tags) {
       if (!tag.in_mirror) continue;
-      for (const double x : {-half, half}) {
-        for (const double y : {-half, half}) {
-          Eigen::Vector3d corner = tag.platform_T_tag * Eigen::Vector3d(x, y, 0);
-          corner += d.head<3>() + d.tail<3>().cross(corner) + Eigen::Vector3d(0, 0, g.platform);
-          corner -= 2 * (m.normal.dot(corner) - m.distance) * m.normal;
-          const double share = (m.distance - m.normal.dot(eye)) / m.normal.dot(corner - eye);
-          const Eigen::Vector3d at = eye + share * (corner - eye) - origin;
-          seen.extend(Eigen::Vector2d(slope.dot(at), at.y()));
-        }
+      for (const Eigen::Vector3d& on_tag : square_corners(half)) {
+        Eigen::Vector3d corner = tag.platform_T_tag * on_tag;
+        corner += d.head<3>() + d.tail<3>().cross(corner) + Eigen::Vector3d(0, 0, g.platform);
+        corner = m.behind(corner);
+        const double share = (m.distance - m.normal.dot(eye)) / m.normal.dot(corner - eye);
+        const Eigen::Vector3d at = eye + share * (corner - eye) - origin;
+        seen.extend(Eigen::Vector2d(slope.dot(at), at.y()));
       }
     }
   }
   m.centre = origin + slope * seen.center().x();
   m.half_slope = 0.5 * seen.sizes().x() + kMirrorEdge;
   m.half_y = std::max(seen.max().y(), -seen.min().y()) + kMirrorEdge;
+}
+
+// Stops: `motion` is that of all points of what moves.
+
+constexpr int kAround = 16;                      // lines along a screw
+constexpr double kReach = 0.1;                   // m, about which something turns
+constexpr double kFirst = 0.1e-3, kMax = 20e-3;  // m, tried
+constexpr double kGrow = 1.1;
+constexpr int kHalvings = 48;
+
+/// Slot and screw are convex: their ends say it all, the screw's tip and where it enters.
+bool screw_stopped(const Parameters& p, const Geometry::StopScrew& screw,
+                   const Eigen::Isometry3d& motion) {
+  const int along = screw.along, across = 1 - along;
+  const double along_travel = along == 0 ? p.stops.x : p.stops.y;
+  const double across_travel = along == 0 ? p.stops.y : p.stops.x;
+  const double radius = 0.5 * p.stops.screw;
+  const double outwards = std::copysign(1.0, screw.at[along]);
+  const Eigen::Vector3d out = outwards * Eigen::Vector3d::Unit(along);
+  const auto beside = [&](const Eigen::Vector3d& from_middle) {
+    return std::abs(from_middle[across]) > radius + across_travel ||
+           std::abs(from_middle.z()) > radius + p.stops.z;
+  };
+  const Eigen::Vector3d out_there = motion.linear() * out;
+  for (int i = 0; i < kAround; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kAround;
+    const Eigen::Vector3d tip = screw.at - screw.reach * out +
+                                radius * (std::cos(angle) * Eigen::Vector3d::Unit(across) +
+                                          std::sin(angle) * Eigen::Vector3d::UnitZ());
+    const Eigen::Vector3d at = motion * tip - screw.at;
+    const double deep = -outwards * at[along];
+    const bool has_left = deep < 0;
+    if (has_left || deep > screw.reach + along_travel || beside(at)) return true;
+    const double rise = outwards * out_there[along];
+    if (beside(at + deep / rise * out_there)) return true;
+  }
+  return false;
+}
+
+/// The walls' inner faces and the cover's block, either's edges on the other; the walls' lower
+/// edges and the ledge.
+bool hood_stopped(const Parameters& p, const Geometry& g, const Eigen::Isometry3d& motion) {
+  const Eigen::Isometry3d back = motion.inverse();
+  for (const double x : {p.cover.x_from, p.cover.x_to}) {
+    const bool wall = x < 0 || p.top.walls == 4;
+    const double wall_x = x < 0 ? g.inner_x_from : g.inner_x_to;
+    const double way_x = x < 0 ? -1 : 1;
+    for (const double way_y : {-1.0, 1.0}) {
+      const double y = way_y * p.cover.y_half;
+      for (const double z : {g.shield_bottom_y, g.cover_top})
+        if (way_y * (back * Eigen::Vector3d(x, y, z)).y() > g.inner_y) return true;
+      const Eigen::Vector3d edge_y =
+          motion * Eigen::Vector3d(x, way_y * g.inner_y, g.shield_bottom_y);
+      if (way_y * edge_y.y() < p.cover.y_half) return true;
+      if (g.overhang_y > 0 && edge_y.z() < g.ledge) return true;
+      if (!wall) continue;
+      for (const double z : {g.shield_bottom_x, g.cover_top})
+        if (way_x * ((back * Eigen::Vector3d(x, y, z)).x() - wall_x) > 0) return true;
+      const Eigen::Vector3d edge_x = motion * Eigen::Vector3d(wall_x, y, g.shield_bottom_x);
+      if (way_x * (edge_x.x() - x) < 0) return true;
+      if (g.overhang_x > 0 && edge_x.z() < g.ledge) return true;
+    }
+  }
+  return false;
+}
+
+/// How often d goes before something is met.
+double times(const Parameters& p, const Geometry& g, const Vector6& d) {
+  const double size = d.head<3>().norm() + kReach * d.tail<3>().norm();
+  double clear = 0, met = kFirst / size;
+  while (!stopped(p, g, met * d) && met * size < kMax) {
+    clear = met;
+    met *= kGrow;
+  }
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (clear + met);
+    (stopped(p, g, middle * d) ? met : clear) = middle;
+  }
+  return clear;
 }
 
 }  // namespace
@@ -207,27 +281,22 @@ Geometry geometry(const Parameters& p) {
   if (p.top.knob)
     g.shield_bottom_x = g.shield_bottom_y = std::max(g.shield_bottom_x, g.shield_bottom_y);
 
-  study::Spring spring;
-  spring.free_length = p.springs.free_length;
-  spring.outer_diameter = p.springs.outer_diameter;
-  spring.wire = p.springs.wire;
-  spring.rate = p.springs.axial;
-  g.spring_solid = study::solid_length(spring);
+  g.spring_solid = study::solid_length({.free_length = p.springs.free_length,
+                                        .outer_diameter = p.springs.outer_diameter,
+                                        .wire = p.springs.wire,
+                                        .rate = p.springs.axial});
 
   place_tags(p, g);
   const double half = 0.5 * p.target.tag_size + p.target.border;
   for (const TagPlace& tag : g.tags) {
-    for (const double x : {-half, half}) {
-      for (const double y : {-half, half}) {
-        const Eigen::Vector3d corner = tag.platform_T_tag * Eigen::Vector3d(x, y, 0);
-        g.window_x = std::max(g.window_x, std::abs(corner.x()) + kRoofEdge + kWindow);
-        g.window_y = std::max(g.window_y, std::abs(corner.y()) + kRoofEdge + kWindow);
-      }
+    for (const Eigen::Vector3d& on_tag : square_corners(half)) {
+      const Eigen::Vector3d corner = tag.platform_T_tag * on_tag;
+      g.window_x = std::max(g.window_x, std::abs(corner.x()) + kRoofEdge + kWindow);
+      g.window_y = std::max(g.window_y, std::abs(corner.y()) + kRoofEdge + kWindow);
     }
   }
-  const bool open = p.top.walls == 3;
   g.inner_x_from = p.cover.x_from - gap_x(p);
-  g.inner_x_to = open ? p.cover.x_to : p.cover.x_to + gap_x(p);
+  g.inner_x_to = p.cover.x_to + (p.top.walls == 3 ? 0 : gap_x(p));
   g.inner_y = p.cover.y_half + gap_y(p);
   g.bore = 0.5 * p.camera.lens_diameter + kBore;
   g.socket = 0.5 * p.springs.outer_diameter + p.printing.clearance;
@@ -239,6 +308,10 @@ Geometry geometry(const Parameters& p) {
   return g;
 }
 
+Eigen::Isometry3d platform_pose(const Geometry& g, const Vector6& displacement) {
+  return moved(Eigen::Isometry3d(Eigen::Translation3d(0, 0, g.platform)), displacement);
+}
+
 std::vector<std::string> printed_parts(const Parameters& p) {
   std::vector<std::string> out{"mounting_plate", "camera_cover", "top_plate",
                                p.top.knob ? "knob" : "light_shield"};
@@ -247,18 +320,21 @@ std::vector<std::string> printed_parts(const Parameters& p) {
   return out;
 }
 
-Matrix6 stiffness(const Parameters& p, const Geometry& g) {
+Springs springs(const Parameters& p, const Geometry& g) {
   const double mean_diameter = p.springs.outer_diameter - p.springs.wire;
-  Springs springs;
-  springs.axial = p.springs.axial;
-  springs.lateral = p.springs.lateral;
-  // Both are those of the same helix (Wahl, Mechanical Springs, ch. 6 and 15).
-  const double turn = springs.axial * mean_diameter * mean_diameter * (1 + kPoisson);
-  springs.bending = turn / (2 * (2 + kPoisson));
-  springs.torsion = turn / 4;
+  const double turn = p.springs.axial * mean_diameter * mean_diameter * (1 + kPoisson);
+  Springs out{.centres = {},
+              .axial = p.springs.axial,
+              .lateral = p.springs.lateral,
+              .bending = turn / (2 * (2 + kPoisson)),
+              .torsion = turn / 4};
   for (const Eigen::Vector2d& at : g.springs)
-    springs.centres.emplace_back(at.x(), at.y(), g.spring_attachment - 0.5 * p.springs.free_length);
-  return tagwrench::stiffness(springs);
+    out.centres.emplace_back(at.x(), at.y(), g.spring_attachment - 0.5 * p.springs.free_length);
+  return out;
+}
+
+Matrix6 stiffness(const Parameters& p, const Geometry& g) {
+  return tagwrench::stiffness(springs(p, g));
 }
 
 Vector6 range(const Parameters& p, const Geometry& g) {
@@ -294,106 +370,9 @@ std::vector<Vector6> travel_corners(const Parameters& p, const Geometry& g) {
   return out;
 }
 
-namespace {
-
-constexpr int kAround = 16;                      // lines along a screw
-constexpr double kReach = 0.1;                   // m, about which something turns
-constexpr double kFirst = 0.1e-3, kMax = 20e-3;  // m, tried
-constexpr double kGrow = 1.1;
-constexpr int kHalvings = 48;
-
-/// Of the platform, about its origin.
-class Motion {
- public:
-  Motion(const Geometry& g, const Vector6& d) : origin_(0, 0, g.platform), shift_(d.head<3>()) {
-    const double angle = d.tail<3>().norm();
-    if (angle > 0) turn_ = Eigen::AngleAxisd(angle, d.tail<3>() / angle).toRotationMatrix();
-  }
-  Eigen::Vector3d there(const Eigen::Vector3d& point) const {
-    return turned(point - origin_) + origin_ + shift_;
-  }
-  Eigen::Vector3d turned(const Eigen::Vector3d& way) const { return turn_ * way; }
-  Eigen::Vector3d back(const Eigen::Vector3d& point) const {
-    return turn_.transpose() * (point - origin_ - shift_) + origin_;
-  }
-
- private:
-  Eigen::Vector3d origin_, shift_;
-  Eigen::Matrix3d turn_ = Eigen::Matrix3d::Identity();
-};
-
-/// Slot and screw are convex: their ends say it all, the screw's tip and where it enters.
-bool screw_stopped(const Parameters& p, const Geometry::StopScrew& screw, const Motion& motion) {
-  const int along = screw.along, across = 1 - along;
-  const double along_travel = along == 0 ? p.stops.x : p.stops.y;
-  const double across_travel = along == 0 ? p.stops.y : p.stops.x;
-  const double radius = 0.5 * p.stops.screw;
-  const double outwards = std::copysign(1.0, screw.at[along]);
-  const Eigen::Vector3d out = outwards * Eigen::Vector3d::Unit(along);
-  const auto beside = [&](const Eigen::Vector3d& from_middle) {
-    return std::abs(from_middle[across]) > radius + across_travel ||
-           std::abs(from_middle.z()) > radius + p.stops.z;
-  };
-  const Eigen::Vector3d out_there = motion.turned(out);
-  for (int i = 0; i < kAround; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kAround;
-    const Eigen::Vector3d tip = screw.at - screw.reach * out +
-                                radius * (std::cos(angle) * Eigen::Vector3d::Unit(across) +
-                                          std::sin(angle) * Eigen::Vector3d::UnitZ());
-    const Eigen::Vector3d at = motion.there(tip) - screw.at;
-    const double deep = -outwards * at[along];
-    const bool has_left = deep < 0;
-    if (has_left || deep > screw.reach + along_travel || beside(at)) return true;
-    const double rise = outwards * out_there[along];
-    if (beside(at + deep / rise * out_there)) return true;
-  }
-  return false;
-}
-
-/// The walls' inner faces and the cover's block, either's edges on the other; the walls' lower
-/// edges and the ledge.
-bool hood_stopped(const Parameters& p, const Geometry& g, const Motion& motion) {
-  for (const double x : {p.cover.x_from, p.cover.x_to}) {
-    const bool wall = x < 0 || p.top.walls == 4;
-    const double wall_x = x < 0 ? g.inner_x_from : g.inner_x_to;
-    const double way_x = x < 0 ? -1 : 1;
-    for (const double way_y : {-1.0, 1.0}) {
-      const double y = way_y * p.cover.y_half;
-      for (const double z : {g.shield_bottom_y, g.cover_top})
-        if (way_y * motion.back({x, y, z}).y() > g.inner_y) return true;
-      const Eigen::Vector3d edge_y = motion.there({x, way_y * g.inner_y, g.shield_bottom_y});
-      if (way_y * edge_y.y() < p.cover.y_half) return true;
-      if (g.overhang_y > 0 && edge_y.z() < g.ledge) return true;
-      if (!wall) continue;
-      for (const double z : {g.shield_bottom_x, g.cover_top})
-        if (way_x * (motion.back({x, y, z}).x() - wall_x) > 0) return true;
-      const Eigen::Vector3d edge_x = motion.there({wall_x, y, g.shield_bottom_x});
-      if (way_x * (edge_x.x() - x) < 0) return true;
-      if (g.overhang_x > 0 && edge_x.z() < g.ledge) return true;
-    }
-  }
-  return false;
-}
-
-/// How often d goes before something is met.
-double times(const Parameters& p, const Geometry& g, const Vector6& d) {
-  const double size = d.head<3>().norm() + kReach * d.tail<3>().norm();
-  double clear = 0, met = kFirst / size;
-  while (!stopped(p, g, met * d) && met * size < kMax) {
-    clear = met;
-    met *= kGrow;
-  }
-  for (int i = 0; i < kHalvings; ++i) {
-    const double middle = 0.5 * (clear + met);
-    (stopped(p, g, middle * d) ? met : clear) = middle;
-  }
-  return clear;
-}
-
-}  // namespace
-
 bool stopped(const Parameters& p, const Geometry& g, const Vector6& displacement) {
-  const Motion motion(g, displacement);
+  const Eigen::Isometry3d motion =
+      platform_pose(g, displacement) * Eigen::Translation3d(0, 0, -g.platform);
   for (const Geometry::StopScrew& screw : g.stop_screws)
     if (screw_stopped(p, screw, motion)) return true;
   return hood_stopped(p, g, motion);

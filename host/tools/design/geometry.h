@@ -10,15 +10,15 @@
 #include <vector>
 
 #include "host/core/types.h"
+#include "host/tools/design/design.h"
 #include "host/tools/design/parameters.h"
 #include "host/tracker/edges.h"
+#include "host/wrench/estimate.h"
 
 namespace tagwrench::hardware {
 
-/// A plane that reflects: n^T p = d, drawing frame.
-struct Mirror {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  double distance = 0;  ///< m
+/// In the drawing frame.
+struct Mirror : study::MirrorPlane {
   /// The piece that the camera needs of it over the whole travel: its middle, and its half size
   /// along the slope and along y.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -72,6 +72,9 @@ struct Geometry {
 
 Geometry geometry(const Parameters& parameters);
 
+/// Drawing frame <- platform frame, displaced from rest (m, rotation vector in rad).
+Eigen::Isometry3d platform_pose(const Geometry& geometry, const Vector6& displacement);
+
 /// The parts to print, by their names in hardware/scad/sensor.scad.
 std::vector<std::string> printed_parts(const Parameters& parameters);
 
@@ -80,6 +83,9 @@ std::vector<std::string> printed_parts(const Parameters& parameters);
 /// = 0.295 (l/D)^2 + 0.385 with steel's Poisson ratio (Haringx; Wahl, Mechanical Springs, ch. on
 /// lateral loading has 1.44 (0.204 (l/D)^2 + 0.265)).
 double lateral_ratio(double length, double mean_diameter);
+
+/// The four, each a helix that bends and twists as well (Wahl, Mechanical Springs, ch. 6 and 15).
+Springs springs(const Parameters& parameters, const Geometry& geometry);
 
 /// About the platform's origin, camera axes; of the four springs.
 Matrix6 stiffness(const Parameters& parameters, const Geometry& geometry);

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
@@ -10,7 +9,6 @@
 #include "host/core/config_error.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/tools/design/geometry.h"
-#include "host/tools/design/parameters.h"
 #include "host/tracker/target.h"
 
 namespace tagwrench {
@@ -235,14 +233,11 @@ sim::Scenario scenario_of(const Parameters& p) {
   m.spring_half_spacing_y = 0.5 * p.springs.spacing_y;
   m.spring_length = p.springs.free_length;
   m.spring_attachment_z = g.spring_attachment;
-  m.axial_stiffness = p.springs.axial;
-  m.lateral_stiffness = p.springs.lateral;
-  // Of the helix: bending k D^2 (1+v) / (2 (2+v)), torsion k D^2 (1+v) / 4, as in Mechanics.
-  constexpr double kPoisson = 0.3;
-  const double diameter = p.springs.outer_diameter - p.springs.wire;
-  const double turn = p.springs.axial * diameter * diameter * (1 + kPoisson);
-  m.bending_stiffness = turn / (2 * (2 + kPoisson));
-  m.torsion_stiffness = turn / 4;
+  const Springs springs = hardware::springs(p, g);
+  m.axial_stiffness = springs.axial;
+  m.lateral_stiffness = springs.lateral;
+  m.bending_stiffness = springs.bending;
+  m.torsion_stiffness = springs.torsion;
   const Vector6 range = hardware::range(p, g);
   for (std::size_t i = 0; i < 6; ++i) {
     m.range[i] = range[static_cast<int>(i)];

@@ -6,7 +6,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -122,8 +121,7 @@ struct Moving {
 };
 
 struct Parameters {
-  std::string name;
-  std::string about;
+  std::string name, about;
   CameraBoard camera;
   TargetChoice target;
   SpringChoice springs;

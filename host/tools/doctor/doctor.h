@@ -1,8 +1,6 @@
 // Room tools/doctor: what of this machine is ready.
 // In:  device nodes, groups, udev rules, cameras, serial ports, sockets of CAD programs.
 // Out: a line each: ok, not needed, or missing with what to do.
-//
-// `tagwrench doctor`: what of this machine is ready, line by line, and what to do about the rest.
 #pragma once
 
 #include <fmt/format.h>
@@ -21,8 +19,7 @@ namespace tagwrench {
 
 /// Writes one line a finding: "ok" works, "--" is not there and not needed, "!!" is missing, with
 /// the remedy behind it. Returns 0 when everything that a virtual device needs is in place
-/// (/dev/uhid and /dev/uinput can be opened), else
-/// 1. A camera is not needed for that: the simulated sensor stands in.
+/// (/dev/uhid and /dev/uinput can be opened), else 1: the simulated sensor stands in for a camera.
 int run_doctor(std::ostream& out);
 
 /// An input device that clients of spacenavd take for a 6-DOF one.
@@ -35,8 +32,6 @@ struct InputDevice {
 /// Those in the text of /proc/bus/input/devices that are 6-DOF devices (vendor 256f, a SpaceMouse
 /// of vendor 046d, or "3Dconnexion" in the name) and not ours ("tagwrench" in the name).
 std::vector<InputDevice> other_6dof_devices(std::string_view text);
-
-// May this user open the nodes that virtual devices need, and if not, why not.
 
 // One line a finding.
 
@@ -61,6 +56,8 @@ class Report {
  private:
   std::ostream& out_;
 };
+
+// May this user open the nodes that virtual devices need, and if not, why not.
 
 /// What decides whether a node that the udev rule gives to group `input` can be opened.
 struct NodeAccess {
@@ -113,8 +110,7 @@ void say_spnav(Report& report, const SpnavFacts& facts);
 
 /// A CAD program in a sandbox that hides the socket from it.
 struct SandboxedProgram {
-  std::string name;
-  std::string advice;
+  std::string name, advice;
 };
 
 /// Those of flatpak (system's and user's folder of installed applications) and snap.

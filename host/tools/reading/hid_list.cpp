@@ -242,7 +242,7 @@ const PuckModel* puck_model(std::uint16_t vendor, std::uint16_t product) noexcep
   return nullptr;
 }
 
-PuckDecoder::Change PuckDecoder::take(std::span<const std::uint8_t> report) noexcept {
+PuckState::Change PuckState::take(std::span<const std::uint8_t> report) noexcept {
   if (report.empty()) return Change::stranger;
   const std::uint8_t id = report[0];
   if (id == kTranslationId || id == kRotationId) {
@@ -250,14 +250,13 @@ PuckDecoder::Change PuckDecoder::take(std::span<const std::uint8_t> report) noex
     const bool combined = id == kTranslationId && report.size() >= kSixAxes;
     const std::size_t first = id == kRotationId ? 3 : 0;
     for (std::size_t i = 0; i < (combined ? 6 : 3); ++i)
-      state_.counts[first + i] =
-          static_cast<std::int16_t>(little_endian(report.subspan(1 + 2 * i, 2)));
+      counts[first + i] = static_cast<std::int16_t>(little_endian(report.subspan(1 + 2 * i, 2)));
     return Change::motion;
   }
   if (id == kButtonsId) {
     if (report.size() < 2) return Change::stranger;
-    state_.buttons = little_endian(
-        report.subspan(1, std::min<std::size_t>(report.size() - 1, sizeof state_.buttons)));
+    buttons =
+        little_endian(report.subspan(1, std::min<std::size_t>(report.size() - 1, sizeof buttons)));
     return Change::buttons;
   }
   return Change::none;

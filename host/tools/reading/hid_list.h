@@ -19,8 +19,7 @@ namespace tagwrench {
 inline constexpr const char* kHidrawClass = "/sys/class/hidraw";
 
 struct HidUsage {
-  std::uint16_t page = 0;
-  std::uint16_t usage = 0;
+  std::uint16_t page = 0, usage = 0;
   friend bool operator==(const HidUsage&, const HidUsage&) = default;
 };
 
@@ -34,8 +33,7 @@ constexpr const char* name(HidKind kind) { return kind == HidKind::wrench ? "wre
 
 struct HidNode {
   HidKind kind = HidKind::wrench;
-  std::uint16_t vendor = 0;
-  std::uint16_t product = 0;
+  std::uint16_t vendor = 0, product = 0;
   std::string path;    ///< "/dev/hidraw3"
   std::string serial;  ///< may be empty
   std::string name;    ///< without the manufacturer where the device is on USB
@@ -85,8 +83,7 @@ class HidChoice {
 // toward the user, Z down) unless the device says otherwise.
 
 struct PuckModel {
-  std::uint16_t vendor = 0;
-  std::uint16_t product = 0;
+  std::uint16_t vendor = 0, product = 0;
   std::string_view layout;  ///< "combined", "split"; "any": not known
   std::string_view name;
 };
@@ -96,13 +93,6 @@ struct PuckModel {
 const PuckModel* puck_model(std::uint16_t vendor, std::uint16_t product) noexcept;
 
 struct PuckState {
-  std::array<std::int16_t, 6> counts{};  ///< X Y Z RX RY RZ
-  std::uint32_t buttons = 0;             ///< bit 0 is the first button
-};
-
-/// Tells the layout from the reports themselves: a device may speak another one than its model did.
-class PuckDecoder {
- public:
   enum class Change : std::uint8_t {
     none,    ///< another report: the battery, say
     motion,  ///< counts are new; of a split pair, each half is
@@ -110,13 +100,12 @@ class PuckDecoder {
     stranger,  ///< too short for what its id promises
   };
 
-  /// Any bytes may come, report id first.
+  std::array<std::int16_t, 6> counts{};  ///< X Y Z RX RY RZ
+  std::uint32_t buttons = 0;             ///< bit 0 is the first button
+
+  /// Any bytes may come, report id first. The layout is told from the reports themselves: a device
+  /// may speak another one than its model did.
   Change take(std::span<const std::uint8_t> report) noexcept;
-
-  const PuckState& state() const noexcept { return state_; }
-
- private:
-  PuckState state_;
 };
 
 }  // namespace tagwrench

@@ -16,7 +16,6 @@
 #include "host/core/log.h"
 #include "host/core/os/unique_fd.h"
 #include "host/output/line_outputs.h"
-#include "host/tools/reading/hid_list.h"
 #include "host/tools/reading/hid_text.h"
 
 namespace tagwrench {
@@ -222,7 +221,6 @@ class Reader {
     node_ = found;
     reading_ = {};
     reading_.kind = found->kind;
-    puck_ = {};
     refusal_told_ = false;
     sink_.begin(found->kind);
     return true;
@@ -275,10 +273,10 @@ class Reader {
       if (!good) ++all_.strangers;
       return good;
     }
-    const PuckDecoder::Change change = puck_.take(report);
-    reading_.puck = puck_.state();
-    if (change == PuckDecoder::Change::stranger) ++all_.strangers;
-    return change == PuckDecoder::Change::motion || change == PuckDecoder::Change::buttons;
+    using Change = PuckState::Change;
+    const Change change = reading_.puck.take(report);
+    if (change == Change::stranger) ++all_.strangers;
+    return change == Change::motion || change == Change::buttons;
   }
 
   void count_sample() noexcept {
@@ -318,12 +316,10 @@ class Reader {
   ReadingSink sink_;
   OpenHid device_;
   std::optional<HidNode> node_;  ///< the one being read, or that was
-  bool refusal_told_ = false;
-  bool lost_ = false;
+  bool refusal_told_ = false, lost_ = false;
   TimePoint end_{};
   std::array<std::uint8_t, 256> report_{};
   Reading reading_;
-  PuckDecoder puck_;
   ReadingStats all_;
   ReadingStats span_;  ///< of the second that is running
   ReadingStats last_span_;
@@ -379,19 +375,7 @@ void ReadingStats::sampled(std::uint32_t sequence, std::optional<Duration> laten
 }
 
 void ReadingStats::next_span() noexcept {
-  ReadingStats next;
-  next.last = last;
-  next.last_sequence = last_sequence;
-  *this = next;
-}
-
-void ReadingStats::interrupted() noexcept {
-  last.reset();
-  last_sequence.reset();
-}
-
-double ReadingStats::rate_hz() const noexcept {
-  return intervals > 0 && mean_s > 0 ? 1 / mean_s : 0;
+  *this = {.last = last, .last_sequence = last_sequence, .latency = {}};
 }
 
 Duration ReadingStats::interval_mean() const noexcept { return from_seconds(mean_s); }

@@ -64,17 +64,17 @@ struct ReadingStats {
   /// Counts anew, but knows the last report: no interval and no gap between two spans is lost.
   void next_span() noexcept;
   /// The device was away: the time until the next report is no interval, its sequence starts anew.
-  void interrupted() noexcept;
+  void interrupted() noexcept {
+    last.reset();
+    last_sequence.reset();
+  }
 
-  double rate_hz() const noexcept;  ///< 0 with fewer than two reports
+  /// 0 with fewer than two reports.
+  double rate_hz() const noexcept { return intervals > 0 && mean_s > 0 ? 1 / mean_s : 0; }
   Duration interval_mean() const noexcept;
   Duration interval_std() const noexcept;  ///< of a population, not of a sample
 
-  std::uint64_t reports = 0;
-  std::uint64_t intervals = 0;
-  std::uint64_t missing = 0;
-  std::uint64_t gaps = 0;
-  std::uint64_t strangers = 0;
+  std::uint64_t reports = 0, intervals = 0, missing = 0, gaps = 0, strangers = 0;
   std::optional<TimePoint> last;
   std::optional<std::uint32_t> last_sequence;
   double mean_s = 0;

@@ -9,70 +9,68 @@
 namespace tagwrench {
 namespace {
 
-using Change = PuckDecoder::Change;
+using Change = PuckState::Change;
 using Counts = std::array<std::int16_t, 6>;
 
-Change take(PuckDecoder& decoder, const std::vector<std::uint8_t>& report) {
-  return decoder.take(report);
-}
+Change take(PuckState& puck, const std::vector<std::uint8_t>& report) { return puck.take(report); }
 
 TEST(Puck, ACombinedReportHasSixAxes) {
-  PuckDecoder decoder;
-  const Change change = take(decoder, {1, 0x5e, 0x01, 0xa2, 0xfe, 1, 0, 0xff, 0xff, 0, 0, 0, 1});
+  PuckState puck;
+  const Change change = take(puck, {1, 0x5e, 0x01, 0xa2, 0xfe, 1, 0, 0xff, 0xff, 0, 0, 0, 1});
   EXPECT_EQ(change, Change::motion);
-  EXPECT_EQ(decoder.state().counts, (Counts{350, -350, 1, -1, 0, 256}));
+  EXPECT_EQ(puck.counts, (Counts{350, -350, 1, -1, 0, 256}));
 }
 
 TEST(Puck, WhatTheBridgesOwnSpaceMouseSendsIsRead) {
   const Counts sent{1, -2, 3, -4, 5, -350};
-  PuckDecoder decoder;
-  EXPECT_EQ(decoder.take(spacemouse_report(sent)), Change::motion);
-  EXPECT_EQ(decoder.state().counts, sent);
+  PuckState puck;
+  EXPECT_EQ(puck.take(spacemouse_report(sent)), Change::motion);
+  EXPECT_EQ(puck.counts, sent);
 }
 
 TEST(Puck, SplitReportsKeepTheOtherHalf) {
-  PuckDecoder decoder;
-  EXPECT_EQ(take(decoder, {1, 10, 0, 20, 0, 30, 0}), Change::motion);
-  EXPECT_EQ(take(decoder, {2, 0xff, 0xff, 0xfe, 0xff, 0xfd, 0xff}), Change::motion);
-  EXPECT_EQ(decoder.state().counts, (Counts{10, 20, 30, -1, -2, -3}));
-  EXPECT_EQ(take(decoder, {1, 0, 0, 0, 0, 0, 0}), Change::motion);
-  EXPECT_EQ(decoder.state().counts, (Counts{0, 0, 0, -1, -2, -3}));
+  PuckState puck;
+  EXPECT_EQ(take(puck, {1, 10, 0, 20, 0, 30, 0}), Change::motion);
+  EXPECT_EQ(take(puck, {2, 0xff, 0xff, 0xfe, 0xff, 0xfd, 0xff}), Change::motion);
+  EXPECT_EQ(puck.counts, (Counts{10, 20, 30, -1, -2, -3}));
+  EXPECT_EQ(take(puck, {1, 0, 0, 0, 0, 0, 0}), Change::motion);
+  EXPECT_EQ(puck.counts, (Counts{0, 0, 0, -1, -2, -3}));
 }
 
 TEST(Puck, ButtonsOfOneToFourBytesAreBits) {
-  PuckDecoder decoder;
-  EXPECT_EQ(take(decoder, {3, 0x02}), Change::buttons);
-  EXPECT_EQ(decoder.state().buttons, 0x02u);
-  EXPECT_EQ(take(decoder, {3, 0x01, 0x80}), Change::buttons);
-  EXPECT_EQ(decoder.state().buttons, 0x8001u);
-  EXPECT_EQ(take(decoder, {3, 0, 0, 0, 0x80, 0xff, 0xff}), Change::buttons);
-  EXPECT_EQ(decoder.state().buttons, 0x80000000u);
+  PuckState puck;
+  EXPECT_EQ(take(puck, {3, 0x02}), Change::buttons);
+  EXPECT_EQ(puck.buttons, 0x02u);
+  EXPECT_EQ(take(puck, {3, 0x01, 0x80}), Change::buttons);
+  EXPECT_EQ(puck.buttons, 0x8001u);
+  EXPECT_EQ(take(puck, {3, 0, 0, 0, 0x80, 0xff, 0xff}), Change::buttons);
+  EXPECT_EQ(puck.buttons, 0x80000000u);
 }
 
 TEST(Puck, ShortReportsChangeNothing) {
-  PuckDecoder decoder;
-  take(decoder, {1, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0});
+  PuckState puck;
+  take(puck, {1, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0});
   for (const auto& report : {std::vector<std::uint8_t>{}, {1}, {1, 9, 9, 9, 9, 9}, {2, 9}, {3}}) {
-    EXPECT_EQ(take(decoder, report), Change::stranger);
+    EXPECT_EQ(take(puck, report), Change::stranger);
   }
-  EXPECT_EQ(decoder.state().counts, (Counts{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(puck.counts, (Counts{1, 2, 3, 4, 5, 6}));
 }
 
 TEST(Puck, OtherReportsAreNone) {
-  PuckDecoder decoder;
-  EXPECT_EQ(take(decoder, {23, 80, 1}), Change::none);  // the battery
-  EXPECT_EQ(decoder.state().counts, Counts{});
+  PuckState puck;
+  EXPECT_EQ(take(puck, {23, 80, 1}), Change::none);  // the battery
+  EXPECT_EQ(puck.counts, Counts{});
 }
 
 TEST(Puck, AnyBytesMayCome) {
   std::mt19937 random(8);
-  PuckDecoder decoder;
+  PuckState puck;
   int motions = 0;
   for (int trial = 0; trial < 20000; ++trial) {
     std::vector<std::uint8_t> report(random() % 20);
     for (std::uint8_t& byte : report) byte = static_cast<std::uint8_t>(random());
     if (!report.empty()) report[0] %= 5;
-    motions += decoder.take(report) == Change::motion ? 1 : 0;
+    motions += puck.take(report) == Change::motion ? 1 : 0;
   }
   EXPECT_GT(motions, 100);
 }
