@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "host/app/input.h"
-#include "host/calibration/camera/collector.h"
 #include "host/calibration/camera/fit.h"
 #include "host/calibration/print/board_spec.h"
 #include "host/commands/commands.h"

@@ -22,7 +22,6 @@
 #include "host/source/simulator/simulator_source.h"
 #include "host/tools/camera_timing/flip_patches.h"
 #include "host/tools/camera_timing/measurement.h"
-#include "host/tools/camera_timing/pattern_lamp.h"
 #include "host/tracker/tracker.h"
 #include "host/web/server/web_options.h"
 #include "host/wrench/estimate.h"

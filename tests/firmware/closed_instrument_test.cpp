@@ -13,7 +13,6 @@
 #include "host/board/sample_history.h"
 #include "host/source/simulator/trajectory.h"
 #include "host/tools/camera_timing/measurement.h"
-#include "host/tools/camera_timing/pattern_lamp.h"
 #include "tests/firmware/lockstep_camera.h"
 #include "tests/firmware/lockstep_host.h"
 

@@ -15,7 +15,7 @@
 #include "host/sensor/sensor_config.h"
 #include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/mechanics.h"
-#include "host/tools/camera_timing/pattern_lamp.h"
+#include "host/tools/camera_timing/measurement.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"
 #include "tests/firmware/cell_on_emulated_board.h"

@@ -13,7 +13,6 @@
 #include "host/source/simulator/simulator_source.h"
 #include "host/tools/camera_timing/flip_patches.h"
 #include "host/tools/camera_timing/measurement.h"
-#include "host/tools/camera_timing/pattern_lamp.h"
 
 namespace tagwrench::test {
 namespace {

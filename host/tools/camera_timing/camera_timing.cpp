@@ -9,8 +9,6 @@
 #include <limits>
 #include <set>
 
-#include "host/tools/camera_timing/camera_timing_fit.h"
-
 namespace tagwrench {
 namespace {
 

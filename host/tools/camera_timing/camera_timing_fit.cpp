@@ -1,10 +1,10 @@
-#include "host/tools/camera_timing/camera_timing_fit.h"
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "host/tools/camera_timing/camera_timing.h"
 
 namespace tagwrench {
 namespace {

@@ -9,8 +9,7 @@
 #include <numeric>
 #include <random>
 
-#include "host/tools/camera_timing/camera_timing_fit.h"
-#include "host/tools/camera_timing/pattern_lamp.h"
+#include "host/tools/camera_timing/camera_timing.h"
 #include "protocol/pattern.h"
 
 namespace tagwrench {

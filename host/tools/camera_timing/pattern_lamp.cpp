@@ -1,8 +1,7 @@
-#include "host/tools/camera_timing/pattern_lamp.h"
-
 #include <algorithm>
 #include <utility>
 
+#include "host/tools/camera_timing/measurement.h"
 #include "protocol/pattern.h"
 
 namespace tagwrench {

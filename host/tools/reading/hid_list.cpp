@@ -1,5 +1,3 @@
-#include "host/tools/reading/hid_list.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/parse.h"
+#include "host/tools/reading/reader.h"
 #include "host/tools/reading/tagwrench_hid.h"
 
 namespace tagwrench {

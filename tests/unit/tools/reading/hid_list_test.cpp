@@ -1,5 +1,3 @@
-#include "host/tools/reading/hid_list.h"
-
 #include <gtest/gtest.h>
 
 #include "fake_hidapi.h"

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "host/tools/reading/hid_list.h"
+#include "host/tools/reading/reader.h"
 #include "tests/cli/bridge.h"
 
 namespace tagwrench {

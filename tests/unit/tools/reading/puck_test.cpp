@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "host/output/hid_report.h"
-#include "host/tools/reading/hid_list.h"
+#include "host/tools/reading/reader.h"
 
 namespace tagwrench {
 namespace {
