@@ -196,13 +196,6 @@ void add_held_out(const Rows& rows, Analysis& analysis) {
   append(analysis.segment, (rows.segment.array() + segments).matrix());
 }
 
-void add_brought_predictions(const Rows& rows, Analysis& analysis) {
-  std::vector<Eigen::Index> there;
-  for (Eigen::Index i = 0; i < rows.time.size(); ++i)
-    if (rows.predicted.row(i).allFinite() && rows.sigma.row(i).allFinite()) there.push_back(i);
-  add_held_out(only(rows, there), analysis);
-}
-
 /// Throws ConfigError if a fold leaves too little to learn from.
 void cross_validate(const std::vector<CleanTrial>& trials, const std::vector<FoldPlan>& folds,
                     const AnalysisOptions& options, Analysis& analysis) {
@@ -314,10 +307,7 @@ Lag lag_of(const std::vector<CleanTrial>& trials, const std::vector<Range>& rang
     if (to < end) ++to;
     segment.reference_time = trial.reference_time.segment(from - begin, to - from);
     const auto reference = trial.reference.middleRows(from - begin, to - from);
-    if (axis < 0)
-      segment.reference = reference;
-    else
-      segment.reference = reference.col(axis);
+    segment.reference = axis < 0 ? Eigen::MatrixXd(reference) : reference.col(axis);
   }
   Lag lag;
   lag.known = true;
@@ -355,7 +345,10 @@ Analysis analyze(const std::vector<Trial>& trials, const AnalysisOptions& option
   if (brings_predictions(clean)) {
     analysis.own_predictions = true;
     analysis.validation = "each step, by the calibration's own fit without it";
-    add_brought_predictions(rows, analysis);
+    std::vector<Eigen::Index> there;
+    for (Eigen::Index i = 0; i < rows.time.size(); ++i)
+      if (rows.predicted.row(i).allFinite() && rows.sigma.row(i).allFinite()) there.push_back(i);
+    add_held_out(only(rows, there), analysis);
   } else {
     const FoldPlans plans = plan_folds(clean, all, options);
     analysis.validation = plans.description + ", predicted from the rest";

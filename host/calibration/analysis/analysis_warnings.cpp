@@ -26,8 +26,7 @@ void warn(Warnings& warnings, fmt::format_string<Args...> text, Args&&... args) 
 }
 
 void check_shapes(const Trial& trial) {
-  const Eigen::Index n = trial.time.size();
-  const Eigen::Index m = trial.reference_time.size();
+  const Eigen::Index n = trial.time.size(), m = trial.reference_time.size();
   if (!shapes_fit(trial) || trial.features.cols() == 0)
     throw ConfigError("{}: columns of different lengths, or none; write it anew", trial.name);
   if (n < 2 || m < 2) {
@@ -148,8 +147,7 @@ void note_saturation(const CleanTrial& clean, Warnings& warnings) {
   const double period = median_interval(clean.reference_time);
   for (int k = 0; k < 6; ++k) {
     const Eigen::VectorXd values = clean.reference.col(k);
-    const double low = values.minCoeff();
-    const double high = values.maxCoeff();
+    const double low = values.minCoeff(), high = values.maxCoeff();
     const double step = clean.quantum[k];
     if (high == low || (step > 0 && (high - low) / step < kFineSteps)) continue;
     for (const double extreme : {low, high}) {
@@ -389,14 +387,11 @@ Warnings coverage_warnings(const Analysis& analysis) {
     if (axis.calibrated && axis.coverage < kFewInside)
       parts.push_back(fmt::format("{} {:.0f} %", kWrenchAxes[k], 100 * axis.coverage));
   }
-  Warnings lines;
-  if (!parts.empty()) {
-    warn(lines,
-         "few errors lie within the stated 95 % intervals ({}): the true uncertainty is larger "
-         "than stated",
-         fmt::join(parts, ", "));
-  }
-  return lines;
+  if (parts.empty()) return {};
+  return {fmt::format(
+      "few errors lie within the stated 95 % intervals ({}): the true uncertainty is larger than "
+      "stated",
+      fmt::join(parts, ", "))};
 }
 
 void add_warnings(const std::vector<CleanTrial>& trials, const Rows& all,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <span>
 
 #include "host/calibration/analysis/trial_csv.h"
 #include "host/core/axis_names.h"
@@ -31,15 +32,13 @@ constexpr double kMaxWay = 0.1;      // m
 constexpr double kMaxTurn = 2.0;     // rad
 constexpr double kMinWeight = 1e-6;  // of a smoothing that can be undone
 
-template <std::size_t N>
-const Unit* find_unit(const std::array<Unit, N>& units, std::string_view name) {
+const Unit* find_unit(std::span<const Unit> units, std::string_view name) {
   const auto at =
       std::find_if(units.begin(), units.end(), [&](const Unit& unit) { return unit.name == name; });
   return at == units.end() ? nullptr : &*at;
 }
 
-template <std::size_t N>
-std::string names(const std::array<Unit, N>& units) {
+std::string names(std::span<const Unit> units) {
   std::string text;
   for (const Unit& unit : units) text += (text.empty() ? "" : " ") + std::string(unit.name);
   return text;
@@ -149,8 +148,8 @@ void add_features(const CsvMapping& mapping, const FeatureColumns& group, const 
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::string name = text.header().empty() ? fmt::format("column_{}", columns[i] + 1)
                                                    : text.header()[columns[i]];
-    trial.feature_names.push_back(
-        group.euler.empty() ? name : fmt::format("{}_r{}", name, "xyz"[static_cast<int>(i)]));
+    trial.feature_names.push_back(group.euler.empty() ? name
+                                                      : fmt::format("{}_r{}", name, "xyz"[i]));
     const auto column = values.col(i);
     const double way = column.maxCoeff() - column.minCoeff();
     const bool turns = group.quantity == 'r';

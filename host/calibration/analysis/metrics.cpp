@@ -123,26 +123,13 @@ std::vector<Window> quiet_windows(const Rows& course, const Analysis& analysis) 
   return windows;
 }
 
-std::vector<Window> windows_at_rest(const Rows& course, const Analysis& analysis,
-                                    std::vector<Window> windows) {
-  std::erase_if(windows, [&](const Window& w) {
-    const Eigen::VectorXd load = course.felt.middleRows(w.first, w.count).colwise().mean();
-    bool loaded = false;
-    for (int k = 0; k < 6; ++k)
-      loaded |= std::abs(load[k]) > kRestShare * analysis.axis[k].full_scale;
-    return loaded;
-  });
-  return windows;
-}
-
 /// White noise from neighbours' differences, which drift does not reach: density per root Hz is
 /// sqrt(2 period) times the Allan deviation at one period (IEEE Std 952, annex C).
 void measure_noise(const Eigen::VectorXd& time, const Eigen::VectorXd& predicted,
                    const std::vector<Window>& windows, double period, AxisReport& axis) {
   double squares = 0, freedom = 0, differences = 0, pairs = 0;
   for (const Window& w : windows) {
-    const Eigen::VectorXd t = w.of(time);
-    const Eigen::VectorXd p = w.of(predicted);
+    const Eigen::VectorXd t = w.of(time), p = w.of(predicted);
     const Eigen::ArrayXd left = p.array() - p.mean() - slope(t, p) * (t.array() - t.mean());
     squares += left.square().sum();
     freedom += static_cast<double>(w.count - 2);
@@ -356,7 +343,14 @@ void measure_held_out(Analysis& analysis) {
 
 void measure_rest(const Rows& all, bool one_clock, Analysis& analysis) {
   const std::vector<Window> quiet = quiet_windows(all, analysis);
-  const std::vector<Window> rests = windows_at_rest(all, analysis, quiet);
+  std::vector<Window> rests = quiet;
+  std::erase_if(rests, [&](const Window& w) {
+    const Eigen::VectorXd load = all.felt.middleRows(w.first, w.count).colwise().mean();
+    bool loaded = false;
+    for (int k = 0; k < 6; ++k)
+      loaded |= std::abs(load[k]) > kRestShare * analysis.axis[k].full_scale;
+    return loaded;
+  });
   for (int k = 0; k < 6; ++k) {
     AxisReport& axis = analysis.axis[k];
     if (axis.full_scale == 0) continue;

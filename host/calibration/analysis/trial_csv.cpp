@@ -1,6 +1,5 @@
 #include "host/calibration/analysis/trial_csv.h"
 
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -55,11 +54,15 @@ char separator_of(const std::vector<Line>& lines) {
   });
 }
 
+std::string without_controls(std::string text, char instead) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' '; }, instead);
+  return text;
+}
+
 std::string shown(std::string_view field) {
   constexpr std::size_t kMax = 40;
-  std::string text(field.substr(0, kMax));
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < ' ') c = '?';
+  const std::string text = without_controls(std::string(field.substr(0, kMax)), '?');
   return field.size() > kMax ? text + "..." : text;
 }
 
@@ -67,12 +70,6 @@ constexpr std::string_view kFormat = "tagwrench-data-1";
 constexpr std::array<const char*, 6> kLoads{"Fx_N", "Fy_N", "Fz_N", "Mx_Nm", "My_Nm", "Mz_Nm"};
 constexpr std::string_view kSigma = "sigma_";
 constexpr std::string_view kPredicted = "predicted_";
-
-std::string one_line(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < ' ') c = ' ';
-  return text;
-}
 
 using Out = std::back_insert_iterator<std::string>;
 
@@ -340,8 +337,7 @@ std::vector<std::string> displacement_names() {
 }
 
 bool shapes_fit(const Trial& trial) {
-  const Eigen::Index n = trial.time.size();
-  const Eigen::Index m = trial.reference_time.size();
+  const Eigen::Index n = trial.time.size(), m = trial.reference_time.size();
   const auto p = static_cast<Eigen::Index>(trial.feature_names.size());
   const auto fits = [](const Eigen::MatrixXd& matrix, Eigen::Index rows, Eigen::Index columns) {
     return matrix.rows() == rows && matrix.cols() == columns;
@@ -362,8 +358,9 @@ std::string trial_to_csv(const Trial& trial) {
   for (const std::string& name : trial.feature_names)
     if (name.empty() || name.find_first_of(",;\t\r\n#") != std::string::npos)
       throw std::invalid_argument("a feature's name that cannot be a CSV column: " + name);
-  std::string text = fmt::format("# {}\n# name: {}\n", kFormat, one_line(trial.name));
-  if (!trial.sensor.empty()) text += fmt::format("# sensor: {}\n", one_line(trial.sensor));
+  std::string text = fmt::format("# {}\n# name: {}\n", kFormat, without_controls(trial.name, ' '));
+  if (!trial.sensor.empty())
+    text += fmt::format("# sensor: {}\n", without_controls(trial.sensor, ' '));
   if (trial.held) text += "# held: true\n";
   const bool steps = trial.step.size() > 0;
   std::string features = steps ? ",step" : "";

@@ -256,7 +256,7 @@ struct BoardFinder::Detector {
       sides_px.push_back(cv::arcLength(markers[i], true) / 4);
       if (ids[i] < 0 || ids[i] >= static_cast<int>(charuco->objPoints.size())) continue;
       for (std::size_t c = 0; c < 4; ++c) {
-        const cv::Point3f& p = charuco->objPoints[static_cast<std::size_t>(ids[i])][c];
+        const cv::Point3f& p = charuco->objPoints[ids[i]][c];
         on_board.emplace_back(p.x, p.y);
         in_image.push_back(markers[i][c]);
       }
@@ -283,7 +283,7 @@ struct BoardFinder::Detector {
     cv::aruco::interpolateCornersCharuco(markers, ids, image, charuco, found, corner_ids);
     std::vector<BoardCorner> rough;
     for (std::size_t i = 0; i < found.size(); ++i) {
-      const cv::Point3f& p = charuco->chessboardCorners[static_cast<std::size_t>(corner_ids[i])];
+      const cv::Point3f& p = charuco->chessboardCorners[corner_ids[i]];
       rough.push_back({{p.x, p.y}, {found[i].x, found[i].y}});
     }
     return sighting(image, rough);

@@ -52,7 +52,7 @@ std::optional<LocalGrid> local_grid(const std::vector<BoardCorner>& corners, std
     Eigen::MatrixXd design(count, terms);
     Eigen::MatrixX2d pixels(count, 2);
     for (Eigen::Index i = 0; i < count; ++i) {
-      const BoardCorner& neighbour = *neighbours[static_cast<std::size_t>(i)];
+      const BoardCorner& neighbour = *neighbours[i];
       const Eigen::Vector2d d = neighbour.board - corners[at].board;
       design.row(i).head<3>() << 1, d.x(), d.y();
       if (terms == 6) design.row(i).tail<3>() << d.x() * d.x(), d.x() * d.y(), d.y() * d.y();
@@ -88,10 +88,8 @@ Model model(const Parameters& p, const Eigen::Vector2d& pixel, const Print& prin
   const double scale = std::exp(-p[4]) * std::numbers::sqrt2 / 2;  // 1 / (sqrt(2) s)
   const Eigen::Vector2d nu(std::cos(p[2]), std::sin(p[2]));
   const Eigen::Vector2d nv(std::cos(p[3]), std::sin(p[3]));
-  const double u = nu.dot(d) * scale;
-  const double v = nv.dot(d) * scale;
-  const double fu = std::erf(u);
-  const double fv = std::erf(v);
+  const double u = nu.dot(d) * scale, v = nv.dot(d) * scale;
+  const double fu = std::erf(u), fv = std::erf(v);
   const double k = 2 * std::numbers::inv_sqrtpi;
   double f = print.sign * fu * fv;
   double f_u = print.sign * k * std::exp(-u * u) * fv;  // d f / d u
@@ -101,10 +99,8 @@ Model model(const Parameters& p, const Eigen::Vector2d& pixel, const Print& prin
     if (!print.markers) break;
     const double x = side * u - print.gap_u_px * scale;
     const double y = side * print.sign * v - print.gap_v_px * scale;
-    const double px = 0.5 * (1 + std::erf(x));
-    const double py = 0.5 * (1 + std::erf(y));
-    const double px_x = 0.5 * k * std::exp(-x * x);
-    const double py_y = 0.5 * k * std::exp(-y * y);
+    const double px = 0.5 * (1 + std::erf(x)), py = 0.5 * (1 + std::erf(y));
+    const double px_x = 0.5 * k * std::exp(-x * x), py_y = 0.5 * k * std::exp(-y * y);
     f -= 2 * px * py;
     f_u -= 2 * side * px_x * py;
     f_v -= 2 * side * print.sign * px * py_y;

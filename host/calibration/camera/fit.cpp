@@ -237,8 +237,7 @@ bool monotonic(const CameraModel& camera) {
   const double x = std::max(camera.cx_px, camera.width_px - 1 - camera.cx_px) / camera.fx_px;
   const double y = std::max(camera.cy_px, camera.height_px - 1 - camera.cy_px) / camera.fy_px;
   const double farthest = std::hypot(x, y);
-  const double k1 = camera.distortion[0];
-  const double k2 = camera.distortion[1];
+  const double k1 = camera.distortion[0], k2 = camera.distortion[1];
   const double k3 = camera.distortion[4];
   double reached = 0;
   for (double r = 0; reached < farthest; r += 0.01 * farthest) {
@@ -306,13 +305,12 @@ void Coverage::add(const std::vector<BoardCorner>& corners, const BoardPose& pos
   for (const BoardCorner& corner : corners) {
     const int column = std::clamp(static_cast<int>(3 * (corner.pixel.x() + 0.5) / width_), 0, 2);
     const int row = std::clamp(static_cast<int>(3 * (corner.pixel.y() + 0.5) / height_), 0, 2);
-    ++corners_[static_cast<std::size_t>(3 * row + column)];
+    ++corners_[3 * row + column];
     corners_box_.extend(corner.pixel);
   }
   // Where the normal leans to x, the plane comes nearer there.
   const Eigen::Vector3d& n = pose.normal;
-  const double x = std::atan2(n.x(), n.z());
-  const double y = std::atan2(n.y(), n.z());
+  const double x = std::atan2(n.x(), n.z()), y = std::atan2(n.y(), n.z());
   tilted_[0] |= x <= -kTilt;
   tilted_[1] |= x >= kTilt;
   tilted_[2] |= y <= -kTilt;
@@ -320,11 +318,6 @@ void Coverage::add(const std::vector<BoardCorner>& corners, const BoardPose& pos
   largest_tilt_ = std::max(largest_tilt_, std::acos(std::clamp(n.z(), -1.0, 1.0)));
   nearest_ = nearest_ == 0 ? pose.distance : std::min(nearest_, pose.distance);
   farthest_ = std::max(farthest_, pose.distance);
-}
-
-int Coverage::regions() const {
-  return static_cast<int>(
-      std::count_if(corners_.begin(), corners_.end(), [](int n) { return n >= kMinCorners; }));
 }
 
 std::vector<std::string> Coverage::missing_regions() const {
@@ -494,13 +487,6 @@ void ViewCollector::thin_out(int most) {
   views_ = std::move(left);
 }
 
-std::string ViewCollector::what_was_seen() const {
-  std::vector<std::string> parts;
-  for (const auto& [look, count] : looks_)
-    if (look != BoardView::board) parts.push_back(fmt::format("{} {}", count, words(look)));
-  return listed(parts);
-}
-
 void ViewCollector::check() const {
   const std::string asked = describe(board_);
   const auto found = looks_.find(BoardView::board);
@@ -518,10 +504,13 @@ void ViewCollector::check() const {
     }
   }
   if (count == 0) {
+    std::vector<std::string> seen;
+    for (const auto& [look, images] : looks_)
+      if (look != BoardView::board) seen.push_back(fmt::format("{} {}", images, words(look)));
     throw ConfigError(
         "--board {}: no usable view of it ({}); light it evenly, hold it sharp and whole in view, "
         "and check --board",
-        asked, looked_ == 0 ? "no image" : "images: " + what_was_seen());
+        asked, looked_ == 0 ? "no image" : "images: " + listed(seen));
   }
   if (views_.size() < 3 && alike_ > 0) {
     throw ConfigError(

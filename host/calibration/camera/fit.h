@@ -59,7 +59,7 @@ class Coverage {
   void add(const std::vector<BoardCorner>& corners, const BoardPose& pose);
 
   /// Of the 3 x 3 regions of the image those that hold corners.
-  int regions() const;
+  int regions() const { return 9 - static_cast<int>(missing_regions().size()); }
   /// What to show next, for people; empty when nothing is missing.
   std::vector<std::string> missing() const;
   /// The regions alone: "top left", "bottom".
@@ -94,8 +94,7 @@ std::vector<BoardPose> rough_poses(const std::vector<CameraView>& views, int wid
 void check_views(const std::vector<CameraView>& views, const Coverage& coverage);
 void check_fit(const CameraFit& fit, const Coverage& coverage);
 
-// Takes views of the board by itself: when it is held still, sharp, and differs from those before
-// (collector.cpp).
+// Takes views of the board by itself: when it is held still, sharp, and differs from those before.
 
 enum class ViewResult : std::uint8_t {
   yes,
@@ -131,7 +130,6 @@ class ViewCollector {
   void check() const;
 
  private:
-  std::string what_was_seen() const;
   void keep(const ImageView& image);
 
   BoardSpec board_;

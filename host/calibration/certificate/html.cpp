@@ -183,26 +183,13 @@ nlohmann::ordered_json facts_json(const std::vector<Fact>& facts) {
   return out;
 }
 
-/// Widths in percent.
-std::string columns() {
-  std::string text = "<colgroup>";
-  for (const double width : {3.2, 15.0, 6.4, 8.4, 5.8, 5.6, 6.0, 6.0, 5.8, 8.2, 8.4, 8.2, 8.6, 4.4})
-    text += fmt::format("<col style=\"width:{}%\">", width);
-  return text + "</colgroup>";
-}
-
-std::string axes_note(const Analysis& a) {
-  return fmt::format(
-      "<p class=\"note\">R² and RMSE are of single readings{}, their own noise and that of the "
-      "reference included. Percentages are of the full scale loaded: the larger end of the range. "
-      "– not told by these data.</p>\n",
-      a.own_predictions ? ", predicted by the calibration's own fit without their step" : "");
-}
-
 std::string axes(const Analysis& a, const PageRoom& room) {
-  std::string text =
-      "<table class=\"axes\">" + columns() +
-      "<thead><tr><th></th><th></th><th colspan=\"4\" class=\"first\">held out</th><th "
+  std::string text = "<table class=\"axes\"><colgroup>";
+  for (const double percent :
+       {3.2, 15.0, 6.4, 8.4, 5.8, 5.6, 6.0, 6.0, 5.8, 8.2, 8.4, 8.2, 8.6, 4.4})
+    text += fmt::format("<col style=\"width:{}%\">", percent);
+  text +=
+      "</colgroup><thead><tr><th></th><th></th><th colspan=\"4\" class=\"first\">held out</th><th "
       "colspan=\"3\" class=\"first\">shape, of full scale</th><th colspan=\"4\" class=\"first\">at "
       "rest</th><th class=\"first\"></th></tr><tr><th></th><th>range</th><th "
       "class=\"first\">R²</th><th>RMSE</th><th>of full<br>scale</th><th>in 95 "
@@ -212,7 +199,13 @@ std::string axes(const Analysis& a, const PageRoom& room) {
       "√Hz</th><th>resolu-<br>tion</th><th>drift/h</th><th "
       "class=\"first\">excita-<br>tion</th></tr></thead><tbody>\n";
   for (int axis = 0; axis < 6; ++axis) text += axis_row(a.axis[axis], axis, room);
-  return text + "</tbody></table>\n" + axes_note(a);
+  return text +
+         fmt::format(
+             "</tbody></table>\n<p class=\"note\">R² and RMSE are of single readings{}, their own "
+             "noise and that of the reference included. Percentages are of the full scale loaded: "
+             "the larger end of the range. – not told by these data.</p>\n",
+             a.own_predictions ? ", predicted by the calibration's own fit without their step"
+                               : "");
 }
 
 std::string cross_talk(const Analysis& a) {

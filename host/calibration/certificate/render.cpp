@@ -141,11 +141,10 @@ std::string terminal(PlotSize size) {
 }
 
 /// Leaves the x axis and the axis' name as they are.
-std::string empty_panel() {
-  return "unset ytics\nset yrange [0:1]\n"
-         "set label 3 'not calibrated' at graph 0.5,0.5 center textcolor '#888888'\n"
-         "plot NaN notitle\n";
-}
+constexpr const char* kEmptyPanel =
+    "unset ytics\nset yrange [0:1]\n"
+    "set label 3 'not calibrated' at graph 0.5,0.5 center textcolor '#888888'\n"
+    "plot NaN notitle\n";
 
 std::string named(int axis, const char* name_place, const char* unit_place) {
   return fmt::format(
@@ -164,8 +163,7 @@ std::string scatter_panel(const Analysis& a, int axis) {
   std::string script = "$dots << END\n";
   const Eigen::Index stride = std::max<Eigen::Index>(1, a.time.size() / kMaxDots);
   for (Eigen::Index i = 0; i < a.time.size(); i += stride) {
-    const double x = shown(a.felt(i, axis), axis);
-    const double y = shown(a.predicted(i, axis), axis);
+    const double x = shown(a.felt(i, axis), axis), y = shown(a.predicted(i, axis), axis);
     if (std::isfinite(x) && std::isfinite(y))
       script += fmt::format("{:.6g} {:.6g}\n{:.6g} {:.6g}\n\n", x, y, x + short_line, y);
   }
@@ -235,12 +233,6 @@ std::string trace_panel(const Analysis& a, const Eigen::VectorXd& time, int axis
       "lines linecolor '#d62728' linewidth {}\n",
       trace_data(a, time, a.felt, axis), trace_data(a, time, a.predicted, axis), s.low, s.high,
       tick(s, 5), moving ? 2.0 : 5.0, moving ? 0.9 : 1.6);
-}
-
-std::string time_axis(const Eigen::VectorXd& time) {
-  const Span seconds{0, time.size() > 1 ? time[time.size() - 1] : 1};
-  return fmt::format("set xrange [0:{:.7g}]\nset xtics {:.6g} offset 0,0.5\n", seconds.high,
-                     tick(seconds, 10));
 }
 
 /// Without the declarations that may stand only at the start of a file.
@@ -357,16 +349,14 @@ std::string run_program(const Program& program, const std::vector<std::string>& 
 
 std::string scatter_svg(const Analysis& analysis, PlotSize size) {
   std::string script = terminal(size) + "set multiplot\n";
-  const double cell_width = 1.0 / 3;
-  const double cell_height = 1.0 / 2;
-  const double left = 26.0 / size.width;
-  const double below = 16.0 / size.height;
+  const double cell_width = 1.0 / 3, cell_height = 1.0 / 2;
+  const double left = 26.0 / size.width, below = 16.0 / size.height;
   for (int axis = 0; axis < 6; ++axis) {
     script += placed(axis % 3 * cell_width + left, (1 - axis / 3) * cell_height + below,
                      cell_width - left - 4.0 / size.width, cell_height - below - 5.0 / size.height);
     script += drawable(analysis, axis) ? scatter_panel(analysis, axis)
                                        : named(axis, "0.04,0.93", "0.04,0.80") +
-                                             "unset xtics\nset xrange [0:1]\n" + empty_panel();
+                                             "unset xtics\nset xrange [0:1]\n" + kEmptyPanel;
     script += kForgetLabels;
   }
   return draw(script + "unset multiplot\n");
@@ -374,9 +364,12 @@ std::string scatter_svg(const Analysis& analysis, PlotSize size) {
 
 std::string traces_svg(const Analysis& analysis, PlotSize size) {
   const Eigen::VectorXd time = running_time(analysis);
-  std::string script = terminal(size) + time_axis(time) + "set format x ''\nset multiplot\n";
-  const double below = 15.0 / size.height;
-  const double left = 54.0 / size.width;
+  const Span seconds{0, time.size() > 1 ? time[time.size() - 1] : 1};
+  std::string script = terminal(size) +
+                       fmt::format("set xrange [0:{:.7g}]\nset xtics {:.6g} offset 0,0.5\n",
+                                   seconds.high, tick(seconds, 10)) +
+                       "set format x ''\nset multiplot\n";
+  const double below = 15.0 / size.height, left = 54.0 / size.width;
   const double width = 1 - left - 8.0 / size.width;
   const double cell = (1 - below) / 6;
   const std::string beside = fmt::format("{:.4f}", -52.0 / size.width / width);
@@ -385,7 +378,7 @@ std::string traces_svg(const Analysis& analysis, PlotSize size) {
                      cell - 5.0 / size.height);
     script += named(axis, (beside + ",0.74").c_str(), (beside + ",0.26").c_str());
     if (axis == 5) script += "set format x '%g'\n";
-    script += drawable(analysis, axis) ? trace_panel(analysis, time, axis) : empty_panel();
+    script += drawable(analysis, axis) ? trace_panel(analysis, time, axis) : kEmptyPanel;
     script += kForgetLabels;
   }
   return draw(script + "unset multiplot\n");

@@ -94,8 +94,7 @@ Drawing start_page(const Paper& paper, const std::string& title,
                          bool upward = false) {
     drawing.texts.push_back({{x, y}, height, TextAnchor::left, upward, text});
   };
-  const double left = content(paper).left_mm;
-  const double top = content(paper).top_mm;
+  const double left = content(paper).left_mm, top = content(paper).top_mm;
   double y = kPaperMargin_mm + kTitle_mm;
   write(left, y, kTitle_mm, title);
   y += 0.3 * kTitle_mm;
@@ -193,18 +192,15 @@ void fill(const Paper& paper, PagePoint room, int count,
     place(i, {free.left_mm + (i % columns) * room.x_mm, free.top_mm + (i / columns) * room.y_mm});
 }
 
-void check_copies(int copies) {
+// Throws unless so many copies of `each` items of this room fit.
+void check_fit(const Paper& paper, PagePoint room, long each, int copies, const std::string& what) {
   if (copies < 1) throw ConfigError("--copies: {} is too few; use 1 or more", copies);
-}
-
-// Throws unless `count` items of this room fit.
-void check_fit(const Paper& paper, PagePoint room, long count, const std::string& what) {
   const auto [columns, rows] = capacity(paper, room);
   if (columns < 1 || rows < 1) {
     throw ConfigError("{} does not fit on {}: {:.1f} x {:.1f} mm with its marks; make it smaller",
                       what, paper.name, room.x_mm, room.y_mm);
   }
-  const long places = static_cast<long>(columns) * rows;
+  const long count = each * copies, places = static_cast<long>(columns) * rows;
   if (count > places) {
     throw ConfigError("--copies: {} times {} do not fit on {}, {} do; print fewer", count, what,
                       paper.name, places);
@@ -375,7 +371,6 @@ Drawing tag_sheet(const Paper& paper, const TagSheet& sheet) {
   }
   if (!(sheet.border_mm >= 0 && sheet.border_mm <= kMax_mm))
     throw ConfigError("--border-mm: {} is no border; use 0 mm or more", sheet.border_mm);
-  check_copies(sheet.copies);
   const auto item = [&sheet](int id) {
     return Item{sheet.size_mm,
                 sheet.size_mm,
@@ -386,8 +381,7 @@ Drawing tag_sheet(const Paper& paper, const TagSheet& sheet) {
   // All get the room of the longest label.
   const PagePoint room = extent(item(*std::max_element(sheet.ids.begin(), sheet.ids.end())));
   const int each = static_cast<int>(sheet.ids.size());
-  check_fit(paper, room, static_cast<long>(each) * sheet.copies,
-            fmt::format("a tag of {} mm", sheet.size_mm));
+  check_fit(paper, room, each, sheet.copies, fmt::format("a tag of {} mm", sheet.size_mm));
   Drawing drawing = start_page(
       paper,
       fmt::format("{}  {} mm  border {} mm", name(sheet.family), sheet.size_mm, sheet.border_mm),
@@ -403,7 +397,6 @@ Drawing tag_sheet(const Paper& paper, const TagSheet& sheet) {
 
 Drawing board_sheet(const Paper& paper, const BoardSpec& board, int copies) {
   check(board);
-  check_copies(copies);
   const double square_mm = 1e3 * board.square;
   const std::string spec = describe(board);
   // The detectors want white around a board: a square if that is not large.
@@ -418,7 +411,7 @@ Drawing board_sheet(const Paper& paper, const BoardSpec& board, int copies) {
     return columns > 0 && rows > 0;
   };
   const Paper sheet = !fits(paper) && fits(turned(paper)) ? turned(paper) : paper;
-  check_fit(sheet, room, copies, "board " + spec);
+  check_fit(sheet, room, 1, copies, "board " + spec);
   Drawing drawing = start_page(
       sheet, "Board for the camera's calibration",
       {kTrueSize, "Keep it flat: glue it to glass or a metal plate. Cut along the marks.",

@@ -70,7 +70,7 @@ struct CellGrid {
 
   bool is_black(int column, int row) const {
     return column >= 0 && row >= 0 && column < columns && row < rows &&
-           black[static_cast<std::size_t>(row * columns + column)];
+           black[row * columns + column];
   }
 };
 

@@ -158,8 +158,7 @@ struct Problem {
   Eigen::VectorXd lateness(const std::vector<Observation>& seen, double readout) const {
     Eigen::VectorXd late = Eigen::VectorXd::Zero(points);
     for (std::size_t p = 0; p < seen.size(); ++p)
-      if (seen[p].valid)
-        late[static_cast<Eigen::Index>(p)] = seen[p].by.readout * readout / seen[p].by.normal;
+      if (seen[p].valid) late[p] = seen[p].by.readout * readout / seen[p].by.normal;
     return late;
   }
 
@@ -203,8 +202,7 @@ struct Problem {
         Observation& seen = moving[k][p];
         seen.by.readout =
             seen.by.frame.dot(frame.velocity) * (seen.by.row_px - middle) / frame.image_rows;
-        seen.offset +=
-            late[static_cast<Eigen::Index>(p)] * seen.by.normal - seen.by.readout * state.readout;
+        seen.offset += late[p] * seen.by.normal - seen.by.readout * state.readout;
       }
     }
   }
@@ -217,7 +215,7 @@ struct Problem {
     for (Eigen::Index p = 0; p < points; ++p) {
       std::vector<double> offsets;
       for (const auto& frame : moving) {
-        const Observation& seen = frame[static_cast<std::size_t>(p)];
+        const Observation& seen = frame[p];
         if (seen.valid) offsets.push_back(std::abs(seen.offset));
       }
       if (offsets.size() < kFewSeen) continue;
@@ -247,11 +245,10 @@ struct Problem {
         const auto add = [&](const Observation& seen, int frame, double weight) {
           if (seen.valid && weight > 0) normal.add({frame, tag, p, seen.by, seen.offset, weight});
         };
-        add(at_rest[static_cast<std::size_t>(p)], -1,
+        add(at_rest[p], -1,
             1 / (variance / std::max(1, rest.image.frames) + kRestFloor_px * kRestFloor_px));
         for (int k = 0; k < frames; ++k) {
-          const Observation& seen =
-              moving[static_cast<std::size_t>(k)][static_cast<std::size_t>(p)];
+          const Observation& seen = moving[k][p];
           add(seen, k,
               biweight(seen.offset / (kTukey95 * noise_px[p])) /
                   (variance + frames * kModel_px * kModel_px));

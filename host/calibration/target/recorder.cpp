@@ -173,8 +173,7 @@ Keyframe cropped(const ImageView& image, const CameraModel& camera,
   Keyframe frame;
   frame.camera = camera;
   if (!(low <= high).all()) return frame;
-  const int x0 = static_cast<int>(low.x());
-  const int y0 = static_cast<int>(low.y());
+  const int x0 = static_cast<int>(low.x()), y0 = static_cast<int>(low.y());
   const int width = static_cast<int>(high.x()) - x0 + 1;
   const int height = static_cast<int>(high.y()) - y0 + 1;
   frame.camera.width_px = width;

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-
 namespace tagwrench {
 namespace {
 
@@ -36,8 +35,7 @@ struct Likeness {
   double ratio = 0, cosine = 0;
 };
 Likeness likeness(const Vector6& felt, const Vector6& expected) {
-  const double dot = felt.dot(expected);
-  const double norms = felt.norm() * expected.norm();
+  const double dot = felt.dot(expected), norms = felt.norm() * expected.norm();
   return {dot / expected.squaredNorm(), norms > 0 ? dot / norms : 0};
 }
 
@@ -60,13 +58,6 @@ WrenchGuide::WrenchGuide(const WrenchPlan& plan, const GuideOptions& options)
       coverage_(options.range) {
   for (std::size_t i = 0; i < plan.steps.size(); ++i) todo_.push_back(static_cast<int>(i));
   ask();
-}
-
-bool WrenchGuide::next(GuideLine& line) {
-  if (lines_.empty()) return false;
-  line = std::move(lines_.front());
-  lines_.pop_front();
-  return true;
 }
 
 /// Says what is to be done now, to the person and to whoever watches asks().

@@ -64,7 +64,12 @@ class WrenchGuide {
   int asked() const { return todo_.front(); }
   int asks() const { return asks_; }
   /// The next line for people; false if there is none.
-  bool next(GuideLine& line);
+  bool next(GuideLine& line) {
+    if (lines_.empty()) return false;
+    line = std::move(lines_.front());
+    lines_.pop_front();
+    return true;
+  }
   /// One line about this moment: what is waited for, and what is covered so far.
   std::string live() const;
 

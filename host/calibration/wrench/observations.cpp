@@ -105,9 +105,6 @@ struct Rows {
     for (std::size_t i = 0; i < rows.size(); ++i) m.row(i) = rows[i].transpose();
     return m;
   }
-  static Eigen::VectorXd vector(const std::vector<double>& v) {
-    return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
-  }
 };
 
 class Collector {
@@ -190,7 +187,7 @@ class Collector {
     const Eigen::VectorXd read = times_of(record.readings);
     Eigen::MatrixXd values(read.size(), 6);
     for (Eigen::Index i = 0; i < read.size(); ++i) {
-      const ReferenceSample& r = record.readings[static_cast<std::size_t>(i)];
+      const ReferenceSample& r = record.readings[i];
       values.row(i) = (r.value - baseline.reading(r.time)).transpose();
     }
     return study::reference_at(times, lag, read, values, kMaxGap);
@@ -219,9 +216,7 @@ class Collector {
 
   Said said_around(const StepRecord& record, Eigen::Index middle, double reach,
                    const Eigen::MatrixXd& values, const Eigen::MatrixXd& changes) const {
-    const auto frame = [&](Eigen::Index i) -> const TrackedFrame& {
-      return record.frames[static_cast<std::size_t>(i)];
-    };
+    const auto frame = [&](Eigen::Index i) -> const TrackedFrame& { return record.frames[i]; };
     const double time = frame(middle).time;
     Eigen::Index from = middle, to = middle + 1;
     while (from > 0 && time - frame(from - 1).time < reach) --from;
@@ -254,7 +249,7 @@ class Collector {
     const auto n = static_cast<Eigen::Index>(said.size());
     Eigen::MatrixXd X(n, 7), V(n, 6);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const Said& s = said[static_cast<std::size_t>(i)];
+      const Said& s = said[i];
       X.row(i) << s.displacement.transpose(), 1;
       V.row(i) = s.value.transpose();
     }
@@ -290,8 +285,7 @@ class Collector {
       set_load(record.step, s.change, s.noise, s.displacement, change);
       o.wrench_covariance.diagonal() += change.wrench.cwiseAbs2();
       Observation shared;
-      set_load(record.step, smoothed.row(static_cast<Eigen::Index>(i)).transpose(), s.noise,
-               s.displacement, shared);
+      set_load(record.step, smoothed.row(i).transpose(), s.noise, s.displacement, shared);
       o.common = std::move(shared.common);
       o.products = std::move(shared.products);
       data_.observations.push_back(std::move(o));
@@ -326,12 +320,11 @@ class Collector {
       s.time = times_of(record.frames);
       s.features.resize(s.time.size(), 6);
       for (Eigen::Index i = 0; i < s.time.size(); ++i)
-        s.features.row(i) = record.frames[static_cast<std::size_t>(i)].displacement.transpose();
+        s.features.row(i) = record.frames[i].displacement.transpose();
       s.reference_time = times_of(record.readings);
       s.reference.resize(s.reference_time.size(), 6);
       for (Eigen::Index i = 0; i < s.reference_time.size(); ++i)
-        s.reference.row(i) =
-            wrench_of(record, baseline, record.readings[static_cast<std::size_t>(i)]).transpose();
+        s.reference.row(i) = wrench_of(record, baseline, record.readings[i]).transpose();
       segments.push_back(std::move(s));
     }
     if (segments.empty()) return;
@@ -345,13 +338,13 @@ class Collector {
   void finish_trial() {
     study::Trial& trial = data_.trial;
     trial.name = plan_.name;
-    trial.time = Rows::vector(readings_.time);
+    trial.time = Eigen::VectorXd::Map(readings_.time.data(), readings_.time.size());
     trial.features = Rows::matrix(readings_.value);
     trial.feature_sigma = Rows::matrix(readings_.sigma);
     trial.feature_names = study::displacement_names();
     trial.step = Eigen::Map<const Eigen::VectorXi>(
         readings_.step.data(), static_cast<Eigen::Index>(readings_.step.size()));
-    trial.reference_time = Rows::vector(reference_.time);
+    trial.reference_time = Eigen::VectorXd::Map(reference_.time.data(), reference_.time.size());
     trial.reference = Rows::matrix(reference_.value);
     trial.reference_sigma = Rows::matrix(reference_.sigma);
     trial.held = plan_.reference == ReferenceKind::masses;
@@ -371,11 +364,11 @@ class Collector {
 /// apart, which is what they scatter against each other within the window.
 void predict_push(const Matrix6& K, const Eigen::MatrixXd& felt, double time,
                   const std::vector<Eigen::Index>& rows, const HeldOut& held, study::Trial& trial) {
-  Eigen::VectorXd weight(static_cast<Eigen::Index>(rows.size()));
+  Eigen::VectorXd weight(rows.size());
   Eigen::Index middle = rows.front();
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double off = (trial.time[rows[i]] - time) / kPushWindow;
-    weight[static_cast<Eigen::Index>(i)] = raised_cosine(off);
+    weight[i] = raised_cosine(off);
     if (off == 0) middle = rows[i];
   }
   weight /= weight.sum();

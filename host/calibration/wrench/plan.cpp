@@ -203,7 +203,7 @@ std::string complaint(const Vector6& direction) {
   std::vector<std::string> names;
   std::size_t last = 0;
   for (std::size_t i = 0; i < 6; ++i) {
-    if (std::abs(direction[static_cast<int>(i)]) <= 0.4 * direction.cwiseAbs().maxCoeff()) continue;
+    if (std::abs(direction[i]) <= 0.4 * direction.cwiseAbs().maxCoeff()) continue;
     names.emplace_back(kWrenchAxes[i]);
     last = i;
   }
@@ -309,8 +309,7 @@ void set_six_axis(const WrenchPlan& plan, const Vector6& value, const Vector6& s
   observation.wrench = move * value;
   observation.wrench_covariance = move * sigma.cwiseAbs2().asDiagonal() * move.transpose();
   observation.common.clear();
-  const Eigen::Vector3d F = observation.wrench.head<3>();
-  const Eigen::Vector3d M = observation.wrench.tail<3>();
+  const Eigen::Vector3d F = observation.wrench.head<3>(), M = observation.wrench.tail<3>();
   for (int k = 0; k < 3; ++k) {
     const Eigen::Vector3d e = Eigen::Vector3d::Unit(k);
     Vector6 shifted = Vector6::Zero();

@@ -69,13 +69,9 @@ struct WrenchPlan {
   std::vector<Mounting> mountings;
   std::vector<PlanStep> steps;
 
-  const PlanStep& step(int index) const { return steps[static_cast<std::size_t>(index)]; }
-  const PlanPoint& point_of(const PlanStep& step) const {
-    return points[static_cast<std::size_t>(step.point)];
-  }
-  const Mounting& mounting_of(const PlanStep& step) const {
-    return mountings[static_cast<std::size_t>(step.mounting)];
-  }
+  const PlanStep& step(int index) const { return steps[index]; }
+  const PlanPoint& point_of(const PlanStep& step) const { return points[step.point]; }
+  const Mounting& mounting_of(const PlanStep& step) const { return mountings[step.mounting]; }
 };
 
 /// "step 7 (50 g at left, on its right side)", counted from 1.

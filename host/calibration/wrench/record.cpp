@@ -27,8 +27,7 @@ double deviation(const Eigen::VectorXd& v) {
 }
 
 double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-  const Eigen::ArrayXd x = a.array() - a.mean();
-  const Eigen::ArrayXd y = b.array() - b.mean();
+  const Eigen::ArrayXd x = a.array() - a.mean(), y = b.array() - b.mean();
   const double norm = std::sqrt(x.square().sum() * y.square().sum());
   return norm > 0 ? (x * y).sum() / norm : 0;
 }
@@ -42,8 +41,7 @@ double agreement(const Eigen::MatrixXd& said, const Eigen::MatrixXd& expected,
     std::vector<Eigen::Index> rows;
     for (Eigen::Index i = 0; i < said.rows(); ++i)
       if (std::isfinite(said(i, axis))) rows.push_back(i);
-    const Eigen::VectorXd a = said(rows, axis);
-    const Eigen::VectorXd b = expected(rows, axis);
+    const Eigen::VectorXd a = said(rows, axis), b = expected(rows, axis);
     if (rows.size() < 10 || deviation(a) < kStill * range[axis]) continue;
     sum += correlation(a, b);
     ++axes;
@@ -146,15 +144,15 @@ Vector6 mean_reading(const StepRecord& record) {
 Eigen::MatrixXd reference_wrenches(const WrenchPlan& plan, const StepRecord& record,
                                    const StepRecord& rest) {
   const Vector6 zero = mean_reading(rest);
-  Eigen::MatrixXd out(static_cast<Eigen::Index>(record.readings.size()), 6);
+  Eigen::MatrixXd out(record.readings.size(), 6);
   Observation observation;
   for (std::size_t i = 0; i < record.readings.size(); ++i) {
     const Vector6 value = record.readings[i].value - zero;
     if (plan.reference == ReferenceKind::load_cell) {
       set_push(plan, record.step, {value[0], 0, 0}, Vector6::Zero(), observation);
-      out.row(static_cast<Eigen::Index>(i)) = observation.wrench.transpose();
+      out.row(i) = observation.wrench.transpose();
     } else {
-      out.row(static_cast<Eigen::Index>(i)) = six_axis_wrench(plan, value).transpose();
+      out.row(i) = six_axis_wrench(plan, value).transpose();
     }
   }
   return out;
@@ -171,7 +169,7 @@ ReferenceFinding check_reference(const WrenchPlan& plan, const StepRecord& recor
   segment.time = times_of(record.frames);
   segment.features.resize(n, 6);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const TrackedFrame& frame = record.frames[static_cast<std::size_t>(i)];
+    const TrackedFrame& frame = record.frames[i];
     segment.features.row(i) = (stiffness * (frame.displacement - zero)).transpose();
   }
   segment.reference_time = times_of(record.readings);

@@ -9,6 +9,8 @@
 #include <limits>
 #include <set>
 
+#include "host/core/robust_statistics.h"
+
 namespace tagwrench {
 namespace {
 
@@ -26,11 +28,10 @@ constexpr double kByChance = 0.01;        // share of the times near: less is ra
 constexpr double kSameBrightness = 0.02;  // of the LED's light: less may be a stale picture's
 
 std::string unusable(const CameraTimingInput& input) {
-  const auto frames = static_cast<int>(input.frames.size());
-  if (frames < kMinBandwidthFrames) {
+  if (input.frames.size() < kMinBandwidthFrames) {
     return fmt::format(
-        "only {} pictures came while the LED flashed, {} are needed: give it more time", frames,
-        kMinBandwidthFrames);
+        "only {} pictures came while the LED flashed, {} are needed: give it more time",
+        input.frames.size(), kMinBandwidthFrames);
   }
   if (input.bands.size() < 2 || input.edges.size() < 20)
     return "there is no pattern to compare with";
@@ -60,9 +61,7 @@ double usual_interval(const std::vector<TimedFrame>& times, double fallback) {
   for (std::size_t i = 1; i < times.size(); ++i)
     if (times[i].timed && times[i - 1].timed)
       intervals.push_back(times[i].exposed - times[i - 1].exposed);
-  if (intervals.empty()) return fallback;
-  std::sort(intervals.begin(), intervals.end());
-  return quantile(intervals, 0.5);
+  return intervals.empty() ? fallback : median(std::move(intervals));
 }
 
 /// A straight line through points of which some are off by more than their weights say: each counts
@@ -328,14 +327,14 @@ Parameters lowest(const Likelihood& likelihood, const Parameters& start, const P
   for (int i = 0; i <= kParameters; ++i) {
     Parameters at = start;
     if (i > 0) at[i - 1] += step[i - 1];
-    corners[static_cast<std::size_t>(i)] = {at, likelihood.minus_log(at)};
+    corners[i] = {at, likelihood.minus_log(at)};
   }
   const auto by_value = [](const Corner& a, const Corner& b) { return a.value < b.value; };
   for (int i = 0; i < kSteps; ++i) {
     std::sort(corners.begin(), corners.end(), by_value);
     if (corners.back().value - corners.front().value < 1e-5) break;
     Parameters centre = Parameters::Zero();
-    for (int c = 0; c < kParameters; ++c) centre += corners[static_cast<std::size_t>(c)].at;
+    for (int c = 0; c < kParameters; ++c) centre += corners[c].at;
     centre /= kParameters;
     Corner& worst = corners.back();
     const auto along = [&](double way) -> Corner {

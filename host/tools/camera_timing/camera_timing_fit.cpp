@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "host/core/robust_statistics.h"
 #include "host/tools/camera_timing/camera_timing.h"
 
 namespace tagwrench {
@@ -179,9 +180,8 @@ void CameraTimingFit::set_camera(const CameraTimes& camera) {
 void CameraTimingFit::judge() noexcept {
   std::vector<double> costs;
   for (const Picture& p : pictures_) costs.push_back(p.cost);
-  const auto middle = costs.begin() + static_cast<std::ptrdiff_t>(costs.size() / 2);
-  std::nth_element(costs.begin(), middle, costs.end());
-  const double most = kStrange * std::max(*middle, 0.2 * static_cast<double>(bands_));
+  const double most =
+      kStrange * std::max(median(std::move(costs)), 0.2 * static_cast<double>(bands_));
   for (Picture& p : pictures_) p.good = p.cost < most;
 }
 
@@ -393,13 +393,13 @@ void CameraTimingFit::guess_exposure() {
     for (std::size_t i = 0; i < pictures_.size(); i += every) {
       for (int k = 0; k < steps; ++k) {
         const double off = ((k + 0.5) / kStepsPerBit - kReach) * input_.bit;
-        likelihood[static_cast<std::size_t>(k)] = std::exp(-0.5 * cost(i, expected(i) + off));
+        likelihood[k] = std::exp(-0.5 * cost(i, expected(i) + off));
       }
       for (std::size_t j = 0; j < kJitters.size(); ++j) {
         double sum = 0;
         for (int k = 0; k < steps; ++k) {
           const double off = ((k + 0.5) / kStepsPerBit - kReach) / kJitters[j];
-          sum += likelihood[static_cast<std::size_t>(k)] * std::exp(-0.5 * off * off);
+          sum += likelihood[k] * std::exp(-0.5 * off * off);
         }
         sums[j] += std::log(sum / kJitters[j] + kOutlier);
       }
@@ -426,6 +426,7 @@ void CameraTimingFit::search(std::size_t picture) noexcept {
   struct Valley {
     double time = 0, total = std::numeric_limits<double>::infinity();
   };
+  const auto deeper = [](const Valley& a, const Valley& b) { return a.total > b.total; };
   std::array<Valley, 6> deepest;  // shallowest first
   const double first = expected(picture) - kReach * input_.period;
   const auto steps = static_cast<int>(2 * kReach * input_.period / step);
@@ -434,8 +435,7 @@ void CameraTimingFit::search(std::size_t picture) noexcept {
     const double after = total(first + (k + 1) * step);
     if (here <= before && here < after && here < deepest.front().total) {
       deepest.front() = {first + k * step, here};
-      std::sort(deepest.begin(), deepest.end(),
-                [](const Valley& a, const Valley& b) { return a.total > b.total; });
+      std::sort(deepest.begin(), deepest.end(), deeper);
     }
     before = here;
     here = after;
@@ -447,8 +447,7 @@ void CameraTimingFit::search(std::size_t picture) noexcept {
     settle(picture);
     valley = {p.time, total(p.time)};
   }
-  std::sort(deepest.begin(), deepest.end(),
-            [](const Valley& a, const Valley& b) { return a.total > b.total; });
+  std::sort(deepest.begin(), deepest.end(), deeper);
   const Valley& best = deepest.back();
   p.time = best.time;
   settle(picture);

@@ -102,13 +102,9 @@ std::optional<TimePoint> PageClock::host_time(double page_ms) const noexcept {
 Duration PageClock::error() const noexcept { return half_ + drift(last_ - measured_); }
 PagePatch::PagePatch(const WebOptions& options)
     : server_(with_page(options)), news_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-  url_ = server_.url() + "flip/#screen";
-  place_ = fmt::format("a page of {}", server_.url());
   server_.set_hello({{"type", "hello"}, {"protocol", 1}, {"screen", true}});
   server_.start(*this);
 }
-
-PagePatch::~PagePatch() { server_.stop(); }
 
 bool PagePatch::wait_for_page(int stop_fd) {
   while (true) {
@@ -140,23 +136,8 @@ void PagePatch::show(bool white, TimePoint when) {
   });
 }
 
-std::optional<TimePoint> PagePatch::shown() {
-  const std::lock_guard lock(mutex_);
-  return shown_;
-}
-
-Duration PagePatch::clock_error() const {
-  const std::lock_guard lock(mutex_);
-  return clock_.error();
-}
-
-std::string PagePatch::ended() {
-  const std::lock_guard lock(mutex_);
-  return ended_;
-}
-
 std::string PagePatch::description() const {
-  return fmt::format("{}, its clock known to {:.2f} ms", place_,
+  return fmt::format("a page of {}, its clock known to {:.2f} ms", server_.url(),
                      1e-6 * static_cast<double>(clock_error().count()));
 }
 

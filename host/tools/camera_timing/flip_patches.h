@@ -45,20 +45,29 @@ class PagePatch final : public FlipPatch, private PageRequestHandler {
  public:
   /// Throws ConfigError: the address cannot be used or needs a token, or the page is not built.
   explicit PagePatch(const WebOptions& options);
-  ~PagePatch() override;
+  ~PagePatch() override { server_.stop(); }
 
   /// To be opened in the browser, with "&token=" and the token after it where there is one: in the
   /// fragment, which no browser sends.
-  std::string url() const { return url_; }
+  std::string url() const { return server_.url() + "flip/#screen"; }
 
   /// Until a page is ready to flip and its clock is known. False: `stop_fd` was readable, or it
   /// ended().
   bool wait_for_page(int stop_fd);
 
   void show(bool white, TimePoint when) override;
-  std::optional<TimePoint> shown() override;
-  Duration clock_error() const override;
-  std::string ended() override;
+  std::optional<TimePoint> shown() override {
+    const std::lock_guard lock(mutex_);
+    return shown_;
+  }
+  Duration clock_error() const override {
+    const std::lock_guard lock(mutex_);
+    return clock_.error();
+  }
+  std::string ended() override {
+    const std::lock_guard lock(mutex_);
+    return ended_;
+  }
   /// Of the screen, once there is one.
   std::string description() const;
 
@@ -75,8 +84,6 @@ class PagePatch final : public FlipPatch, private PageRequestHandler {
   void tell_loop() const;
 
   WebServer server_;
-  std::string url_;
-  std::string place_;  ///< for people
   UniqueFd news_;
 
   mutable std::mutex mutex_;  // for all below

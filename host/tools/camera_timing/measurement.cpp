@@ -5,11 +5,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <numeric>
 #include <random>
 
-#include "host/tools/camera_timing/camera_timing.h"
 #include "protocol/pattern.h"
 
 namespace tagwrench {

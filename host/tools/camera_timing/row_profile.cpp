@@ -76,15 +76,13 @@ std::string RowProfiler::choose() {
 void RowProfiler::make_bands() {
   const int bands = std::min(kMaxBands, height_);
   for (int band = 0; band < bands; ++band) {
-    const int first = band * height_ / bands;
-    const int last = (band + 1) * height_ / bands;
+    const int first = band * height_ / bands, last = (band + 1) * height_ / bands;
     double bright = 0, dim = 0, rows = 0, squares = 0;
     int count = 0;
     for (int row = first; row < last; ++row) {
       const double offset = row - first;
       for (int column = 0; column < width_; ++column) {
-        const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
-                              static_cast<std::size_t>(column);
+        const std::size_t i = static_cast<std::size_t>(row) * width_ + column;
         if (used_[i] == 0) continue;
         const double rise = lit_.mean(i) - dark_.mean(i);
         bright += lit_.mean(i);
@@ -113,8 +111,7 @@ RowProfile RowProfiler::measure(const ImageView& image) const {
     std::uint64_t sum = 0, count = 0;
     for (int row = first_rows_[band]; row < last_rows_[band]; ++row) {
       const std::uint8_t* pixels = image.pixels + static_cast<std::ptrdiff_t>(row) * image.stride;
-      const std::uint8_t* used =
-          used_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
+      const std::uint8_t* used = used_.data() + static_cast<std::size_t>(row) * width_;
       for (int column = 0; column < width_; ++column) {
         sum += static_cast<std::uint64_t>(used[column]) * pixels[column];
         count += used[column];
@@ -170,8 +167,7 @@ LightSignal::Integrals LightSignal::at(double time) const noexcept {
 // The rows of a band are exposed one after the other: the mean over band and exposure is a second
 // difference of the signal's second integral.
 SeenLight LightSignal::seen(const RowBand& band, const ExposureTimes& times) const noexcept {
-  const double first = band.first - 0.5;
-  const double last = band.last - 0.5;
+  const double first = band.first - 0.5, last = band.last - 0.5;
   const double exposure = std::max(times.exposure, kMin);
   const double half = 0.5 * exposure;
   const double width = times.readout * (last - first);

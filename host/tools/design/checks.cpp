@@ -124,10 +124,12 @@ class Checker {
           "the LED's seat leaves less than a wall to the cover's end; move it in by {:.1f} mm or "
           "lengthen cover.x_mm",
           kToMm * (led_end - end));
-    if (p_.top.knob && p_.top.knob_diameter < knob_least())
+    const double knob =
+        2 * (std::hypot(std::max(g_.inner_x_to, -g_.inner_x_from), g_.inner_y) + p_.printing.wall);
+    if (p_.top.knob && p_.top.knob_diameter < knob)
       say("top.knob_mm",
           "{:.1f} mm do not go around the cover and its travel; take {:.1f} mm or more",
-          kToMm * p_.top.knob_diameter, kToMm * knob_least());
+          kToMm * p_.top.knob_diameter, kToMm * knob);
     const auto plate = [&](const char* cover, double half, double inner, const char* as,
                            const char* more) {
       if (half + p_.printing.clearance <= inner) return;
@@ -176,11 +178,6 @@ class Checker {
         break;
       }
     }
-  }
-
-  double knob_least() const {
-    const double x = std::max(g_.inner_x_to, -g_.inner_x_from);
-    return 2 * (std::hypot(x, g_.inner_y) + p_.printing.wall);
   }
 
   void springs() {

@@ -191,41 +191,32 @@ struct Piece {
   Eigen::Vector2d from, to;
 };
 
-class TagEdges {
- public:
-  explicit TagEdges(const SeenTag& tag) : tag_(tag), cell_(tag.size / tag.cells) {
-    for (int line = 0; line <= tag.cells; ++line) {
-      for (int along = 0; along < tag.cells; ++along) {
-        add(white(along, line - 1), white(along, line), corner(along + 1, line),
-            corner(along, line));
-        add(white(line - 1, along), white(line, along), corner(line, along),
-            corner(line, along + 1));
-      }
-    }
-  }
-  const std::vector<Piece>& pieces() const { return pieces_; }
-
- private:
-  bool white(int row, int column) const {
-    if (row < 0 || column < 0 || row >= tag_.cells || column >= tag_.cells) return true;
-    return tag_.white[static_cast<std::size_t>(row * tag_.cells + column)] != 0;
-  }
-  Eigen::Vector2d corner(int row, int column) const {
-    return {column * cell_ - 0.5 * tag_.size, row * cell_ - 0.5 * tag_.size};
-  }
-  void add(bool before, bool after, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
-    if (before == after) return;
-    for (int i = 0; i < kPieces; ++i) {
+std::vector<Piece> edges_of(const SeenTag& tag) {
+  const double cell = tag.size / tag.cells;
+  const auto white = [&](int row, int column) {
+    const bool outside = row < 0 || column < 0 || row >= tag.cells || column >= tag.cells;
+    return outside || tag.white[row * tag.cells + column] != 0;
+  };
+  const auto corner = [&](int row, int column) -> Eigen::Vector2d {
+    return {column * cell - 0.5 * tag.size, row * cell - 0.5 * tag.size};
+  };
+  std::vector<Piece> pieces;
+  const auto add = [&](bool before, bool after, const Eigen::Vector2d& from,
+                       const Eigen::Vector2d& to) {
+    for (int i = 0; i < kPieces && before != after; ++i) {
       const Eigen::Vector2d a = from + (to - from) * (static_cast<double>(i) / kPieces);
       const Eigen::Vector2d b = from + (to - from) * (static_cast<double>(i + 1) / kPieces);
-      pieces_.push_back(before ? Piece{a, b} : Piece{b, a});
+      pieces.push_back(before ? Piece{a, b} : Piece{b, a});
+    }
+  };
+  for (int line = 0; line <= tag.cells; ++line) {
+    for (int i = 0; i < tag.cells; ++i) {  // an upright one, a level one
+      add(white(i, line - 1), white(i, line), corner(i + 1, line), corner(i, line));
+      add(white(line - 1, i), white(line, i), corner(line, i), corner(line, i + 1));
     }
   }
-
-  const SeenTag& tag_;
-  double cell_;
-  std::vector<Piece> pieces_;
-};
+  return pieces;
+}
 
 /// Pixels that a rectangle of the tag's plane covers.
 double area_px(const SeenTag& tag, const SeenPicture& picture, double half) {
@@ -256,8 +247,7 @@ void add_tag(const SeenTag& tag, const Eigen::Vector3d& origin, const SeenPictur
   const double contrast = picture.contrast_counts;
   const double per_length = contrast * contrast / (2 * std::sqrt(std::numbers::pi) * spread);
   const double middle = 0.5 * contrast / kFullScale;  // level of the middle of an edge; ink is 0
-  const TagEdges edges(tag);
-  for (const Piece& piece : edges.pieces()) {
+  for (const Piece& piece : edges_of(tag)) {
     const auto in_camera = [&](const Eigen::Vector2d& p) -> Eigen::Vector3d {
       return tag.camera_T_tag * Eigen::Vector3d(p.x(), p.y(), 0);
     };
@@ -304,10 +294,8 @@ std::array<double, 6> natural_frequencies(const Matrix6& stiffness, const Platfo
       Eigen::Matrix3d(platform.principal_inertia.asDiagonal()) - platform.mass * cross * cross;
   const Eigen::VectorXd squares = generalized_eigenvalues(stiffness, mass);
   std::array<double, 6> frequencies{};
-  for (int i = 0; i < squares.size(); ++i) {
-    frequencies[static_cast<std::size_t>(i)] =
-        std::sqrt(std::max(0.0, squares[i])) / (2 * std::numbers::pi);
-  }
+  for (int i = 0; i < squares.size(); ++i)
+    frequencies[i] = std::sqrt(std::max(0.0, squares[i])) / (2 * std::numbers::pi);
   return frequencies;
 }
 
@@ -319,9 +307,8 @@ std::array<Reach, 3> reach(const Instrument& instrument, double most) {
   const Matrix6 compliance = inverse(instrument.stiffness);
   std::array<Reach, 3> result;
   for (int axis = 0; axis < 3; ++axis) {
-    result[static_cast<std::size_t>(axis)] = {
-        force_in_view(instrument, compliance.col(axis), most),
-        force_to_solid(instrument, compliance.col(axis), most)};
+    result[axis] = {force_in_view(instrument, compliance.col(axis), most),
+                    force_to_solid(instrument, compliance.col(axis), most)};
   }
   return result;
 }

@@ -240,7 +240,7 @@ sim::Scenario scenario_of(const Parameters& p) {
   m.torsion_stiffness = springs.torsion;
   const Vector6 range = hardware::range(p, g);
   for (std::size_t i = 0; i < 6; ++i) {
-    m.range[i] = range[static_cast<int>(i)];
+    m.range[i] = range[i];
     // Modest, as all six act at once.
     out.trajectory.amplitude[i] = 0.3 * m.range[i];
   }

@@ -222,20 +222,14 @@ std::optional<int> process_named(std::string_view name) {
 }
 
 void say_system_socket(Report& report, const SpnavFacts& facts) {
-  switch (facts.system) {
-    case SpnavServer::tagwrench:
-      report.line(Mark::ok, "CAD programs reach tagwrench itself by {}", kSpnavSystemSocket);
-      return;
-    case SpnavServer::other:
-      report.line(Mark::ok, facts.spacenavd ? fmt::format("spacenavd runs (pid {}), socket {}",
-                                                          *facts.spacenavd, kSpnavSystemSocket)
-                                            : fmt::format("a server of CAD programs answers at {}",
-                                                          kSpnavSystemSocket));
-      return;
-    case SpnavServer::none:
-    case SpnavServer::silent: break;
-  }
-  if (facts.spacenavd) {
+  if (facts.system == SpnavServer::tagwrench) {
+    report.line(Mark::ok, "CAD programs reach tagwrench itself by {}", kSpnavSystemSocket);
+  } else if (facts.system == SpnavServer::other && facts.spacenavd) {
+    report.line(Mark::ok, "spacenavd runs (pid {}), socket {}", *facts.spacenavd,
+                kSpnavSystemSocket);
+  } else if (facts.system == SpnavServer::other) {
+    report.line(Mark::ok, "a server of CAD programs answers at {}", kSpnavSystemSocket);
+  } else if (facts.spacenavd) {
     report.line(
         Mark::missing,
         "spacenavd runs (pid {}) but does not answer at {}: sudo systemctl restart spacenavd",

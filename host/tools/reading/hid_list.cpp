@@ -9,7 +9,6 @@
 #include "host/core/config_error.h"
 #include "host/core/parse.h"
 #include "host/tools/reading/reader.h"
-#include "host/tools/reading/tagwrench_hid.h"
 
 namespace tagwrench {
 namespace {
@@ -47,8 +46,6 @@ std::string shown(std::string_view text) {
   }
   return out;
 }
-
-std::string first_line(std::string_view text) { return shown(text.substr(0, text.find('\n'))); }
 
 /// What follows "KEY=" in a uevent file.
 std::optional<std::string_view> value_of(std::string_view key, std::string_view uevent) {
@@ -92,12 +89,12 @@ std::optional<HidNode> node_of(const fs::path& entry) {
   const auto id = vendor_and_product(value_of("HID_ID", *uevent).value_or(""));
   if (!id) return std::nullopt;
   const std::optional<std::string> product = usb_product(device);
-  HidNode node{
-      .vendor = (*id)[0],
-      .product = (*id)[1],
-      .path = "/dev/" + entry.filename().string(),
-      .serial = shown(value_of("HID_UNIQ", *uevent).value_or("")),
-      .name = product ? first_line(*product) : shown(value_of("HID_NAME", *uevent).value_or(""))};
+  HidNode node{.vendor = (*id)[0],
+               .product = (*id)[1],
+               .path = "/dev/" + entry.filename().string(),
+               .serial = shown(value_of("HID_UNIQ", *uevent).value_or("")),
+               .name = product ? shown(product->substr(0, product->find('\n')))
+                               : shown(value_of("HID_NAME", *uevent).value_or(""))};
   for (const HidUsage& usage : top_level_usages(
            {reinterpret_cast<const std::uint8_t*>(descriptor->data()), descriptor->size()})) {
     if (const std::optional<HidKind> kind = kind_of(node, usage)) {

@@ -167,7 +167,11 @@ class Reader {
   }
 
   int run() {
-    if (!open() && !options_.wait) throw ConfigError(missing());
+    if (!open() && !options_.wait) {
+      throw ConfigError(
+          "no {} is plugged in; `tagwrench read --list` says what is, --wait waits for it",
+          choice_.words());
+    }
     if (!device_) log_info("waiting for a {}", choice_.words());
     const TimePoint begin = clock_now();
     end_ = options_.time ? begin + *options_.time : TimePoint::max();
@@ -186,12 +190,6 @@ class Reader {
   bool stopped() const {
     pollfd stop{stop_fd_, POLLIN, 0};
     return ::poll(&stop, 1, 0) > 0;
-  }
-
-  std::string missing() const {
-    return fmt::format(
-        "no {} is plugged in; `tagwrench read --list` says what is, --wait waits for it",
-        choice_.words());
   }
 
   /// The device that was read before, or the one that was asked for.
@@ -244,8 +242,10 @@ class Reader {
     if (size < 0) return errno == EINTR || stopped();
     const TimePoint now = clock_now();
     if (size > 0) take({report_.data(), static_cast<std::size_t>(size)}, now);
+    // Of the second that has passed, or of the first one so far.
+    const ReadingStats& lately = last_span_.reports > 1 ? last_span_ : span_;
     // What came last is shown even if nothing comes after it: a release, above all.
-    if (unseen_ && sink_.show(reading_, lately(), all_.missing, now)) unseen_ = false;
+    if (unseen_ && sink_.show(reading_, lately, all_.missing, now)) unseen_ = false;
     return true;
   }
 
@@ -260,11 +260,6 @@ class Reader {
     last_span_ = span_;
     span_.next_span();
     span_end_ = now + kLinePeriod;
-  }
-
-  /// Of the second that has passed, or of the first one so far.
-  const ReadingStats& lately() const noexcept {
-    return last_span_.reports > 1 ? last_span_ : span_;
   }
 
   bool decode(std::span<const std::uint8_t> report) noexcept {

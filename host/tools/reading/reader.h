@@ -1,4 +1,10 @@
-// The 6-DOF and wrench HID devices that are plugged in, the choice of one, and what pucks say.
+// Room tools/reading: wrench sensors and 6-DOF pucks on HID, ours and others; for `read`.
+// In:  HID reports; /sys for who is there.
+// Out: N and N m with sigmas, or counts of a puck; rate (Hz), jitter and latency (s).
+// Then: tagwrench_hid.h (the C library for other programs).
+//
+// Which devices are plugged in, the choice of one, and what pucks say (hid_list.cpp); then the loop
+// of `tagwrench read`: one device, found, read, lost and found again.
 #pragma once
 
 #include <array>
@@ -111,12 +117,7 @@ struct PuckState {
   Change take(std::span<const std::uint8_t> report) noexcept;
 };
 
-// Room tools/reading: wrench sensors and 6-DOF pucks on HID, ours and others; for `read`.
-// In:  HID reports; /sys for who is there.
-// Out: N and N m with sigmas, or counts of a puck; rate (Hz), jitter and latency (s).
-// Then: tagwrench_hid.h (the C library for other programs), hid_list.h.
-//
-// The loop of `tagwrench read`: one device, found, read, lost and found again.
+// The loop.
 
 struct ReadOptions {
   enum class Style { people, json, csv };
