@@ -17,7 +17,6 @@
 #include "host/recording/reader.h"
 #include "host/source/images.h"
 #include "host/source/recording.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/source/v4l2_source.h"
 #include "host/tracker/reference.h"

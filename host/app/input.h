@@ -9,7 +9,7 @@
 #include <string>
 
 #include "host/core/os/unique_fd.h"
-#include "host/recording/records.h"
+#include "host/recording/schema.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/frame_source.h"
 #include "host/source/simulator/bench.h"

@@ -13,7 +13,7 @@
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/v4l2_mode.h"
+#include "host/source/v4l2_settings.h"
 
 namespace tagwrench {
 namespace {

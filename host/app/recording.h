@@ -9,7 +9,7 @@
 #include "host/app/input.h"
 #include "host/core/os/unique_fd.h"
 #include "host/output/output.h"
-#include "host/recording/records.h"
+#include "host/recording/schema.h"
 #include "host/recording/writer.h"
 #include "host/sensor/sensor_config.h"
 

@@ -18,7 +18,6 @@
 #include "host/motion/shaping.h"
 #include "host/output/hid_outputs.h"
 #include "host/output/watchdog.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tools/camera_timing/flip_patches.h"
 #include "host/tools/camera_timing/measurement.h"

@@ -14,7 +14,7 @@
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 #include "host/tools/design/geometry.h"
 #include "host/tracker/target.h"
 

@@ -4,7 +4,7 @@
 #include "host/app/scenario_config.h"
 #include "host/commands/commands.h"
 #include "host/core/log.h"
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 
 namespace tagwrench {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include "host/recording/records.h"
+#include "host/recording/schema.h"
 
 struct sqlite3;
 struct sqlite3_stmt;

@@ -1,7 +1,7 @@
 // Room recording: all of a run in one SQLite file.
-// In:  frames as they came, tracks, samples, references, events (records.h); SI, ns.
+// In:  frames as they came, tracks, samples, references, events (schema.h); SI, ns.
 // Out: the same again, for replay and export. Tables, units and order: schema.h.
-// Then: schema.h, writer.h, records.h.
+// Then: schema.h, writer.h.
 //
 // The reading side of a recording. The file may be damaged, or anything else: every number is
 // checked before it is used.
@@ -15,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/recording/records.h"
+#include "host/recording/schema.h"
 
 namespace tagwrench::record {
 

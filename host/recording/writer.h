@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "host/core/frame_log.h"
-#include "host/recording/records.h"
+#include "host/recording/schema.h"
 
 namespace tagwrench::record {
 

@@ -19,7 +19,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
-#include "host/source/v4l2_controls.h"
+#include "host/source/v4l2_settings.h"
 
 namespace tagwrench {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "host/core/os/unique_fd.h"
-#include "host/source/v4l2_mode.h"
+#include "host/source/v4l2_settings.h"
 
 namespace tagwrench {
 

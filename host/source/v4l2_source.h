@@ -10,9 +10,8 @@
 #include "host/core/os/unique_fd.h"
 #include "host/core/types.h"
 #include "host/source/frame_source.h"
-#include "host/source/v4l2_controls.h"
 #include "host/source/v4l2_device.h"
-#include "host/source/v4l2_mode.h"
+#include "host/source/v4l2_settings.h"
 
 namespace tagwrench {
 

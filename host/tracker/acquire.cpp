@@ -1,5 +1,7 @@
 #include "host/tracker/acquire.h"
 
+#include <Eigen/LU>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -9,6 +11,215 @@
 
 namespace tagwrench {
 namespace {
+
+using Rays = Square;  ///< at z = 1
+
+std::optional<Rays> rays_of(const CameraModel& camera, const Square& corners) {
+  Rays rays;
+  for (std::size_t c = 0; c < 4; ++c) {
+    const auto ray = unproject(camera, corners[c]);
+    if (!ray) return std::nullopt;
+    rays[c] = ray->head<2>();
+  }
+  return rays;
+}
+
+/// The least-squares translation that goes with a rotation.
+Eigen::Vector3d translation(const Rays& rays, const Eigen::Matrix3d& rotation, double half) {
+  // Each corner gives two rows, (1 0 -x) and (0 1 -y); these are their normal equations.
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
+  const std::array<Eigen::Vector3d, 4> on_tag = square_corners(half);
+  for (std::size_t c = 0; c < 4; ++c) {
+    const Eigen::Vector3d arm = rotation * on_tag[c];
+    const Eigen::Vector2d& ray = rays[c];
+    Eigen::Matrix<double, 2, 3> rows;
+    rows << 1, 0, -ray.x(), 0, 1, -ray.y();
+    normal += rows.transpose() * rows;
+    rhs += rows.transpose() * (ray * arm.z() - arm.head<2>());
+  }
+  return normal.inverse() * rhs;
+}
+
+double squares_px(const CameraModel& camera, const Eigen::Isometry3d& pose, double half,
+                  const Square& corners) {
+  double sum = 0;
+  const std::array<Eigen::Vector3d, 4> on_tag = square_corners(half);
+  for (std::size_t c = 0; c < 4; ++c)
+    sum += (project(camera, pose * on_tag[c]).pixel - corners[c]).squaredNorm();
+  return sum;
+}
+
+constexpr int kCell_px = 8;        ///< of the picture that is read
+constexpr int kMargin_px = 2;      ///< of a cell, not looked at
+constexpr double kMinCell_px = 4;  ///< of the square in the image
+constexpr std::size_t kMaxSquares = 12;
+/// Of the looked-at pixels of all cells, those that may differ from most of their cell's.
+constexpr double kMaxImpure = 0.06;
+constexpr double kMinContrast = 30;  ///< grey levels, between black and white
+constexpr double kMinWhite = 0.1;    ///< of the cells inside the border; and of black ones
+
+/// Families that hold all others of their size.
+constexpr TagFamily kLargest[] = {
+    TagFamily::aruco_original, TagFamily::aruco_4x4_1000, TagFamily::aruco_5x5_1000,
+    TagFamily::aruco_6x6_1000, TagFamily::aruco_7x7_1000, TagFamily::apriltag_16h5,
+    TagFamily::apriltag_25h9,  TagFamily::apriltag_36h10, TagFamily::apriltag_36h11,
+    TagFamily::grid_10x10,
+};
+/// Those of aruco_NxN with fewer ids come right before it in TagFamily, the smallest first.
+constexpr int kSmaller = 3;
+
+struct Bits {
+  std::vector<std::uint8_t>
+      inside;           ///< row by row, 1 is white; empty: not a tag of this many cells
+  double impurity = 1;  ///< part of the pixels that differ from their cell
+};
+
+/// A picture of the square alone, rows of cells * kCell_px pixels; 0 outside of the image.
+class FlatSquare {
+ public:
+  FlatSquare(const ImageView& image, const Square& square, int cells)
+      : side_(cells * kCell_px), level_(static_cast<std::size_t>(side_ * side_)) {
+    const Eigen::Matrix3d image_from_flat = square_homography(square);
+    for (int row = 0; row < side_; ++row) {
+      for (int column = 0; column < side_; ++column) {
+        const Eigen::Vector3d at =
+            image_from_flat * Eigen::Vector3d(2.0 * column / side_ - 1, 2.0 * row / side_ - 1, 1);
+        level_[index(row, column)] = interpolated(image, at.x() / at.z(), at.y() / at.z());
+      }
+    }
+  }
+
+  /// The level that parts black and white best (Otsu, IEEE Trans. SMC 9, 1979), and their means.
+  void part() {
+    std::array<int, 256> histogram{};
+    double all = 0;
+    for (const std::uint8_t level : level_) {
+      ++histogram[level];
+      all += level;
+    }
+    const auto count = static_cast<double>(level_.size());
+    double below = 0, sum = 0, best = 0;
+    for (int level = 0; level < 255; ++level) {
+      below += histogram[static_cast<std::size_t>(level)];
+      sum += static_cast<double>(level) * histogram[static_cast<std::size_t>(level)];
+      if (below == 0 || below == count) continue;
+      const double black = sum / below, white = (all - sum) / (count - below);
+      const double between = below * (count - below) * (white - black) * (white - black);
+      if (between <= best) continue;
+      best = between;
+      threshold_ = level;
+      contrast_ = white - black;
+    }
+  }
+
+  double contrast() const { return contrast_; }
+  /// White pixels of a cell, its margins left out.
+  int white_in(int cell_row, int cell_column) const {
+    int white = 0;
+    for (int row = kMargin_px; row < kCell_px - kMargin_px; ++row) {
+      for (int column = kMargin_px; column < kCell_px - kMargin_px; ++column)
+        white +=
+            level_[index(cell_row * kCell_px + row, cell_column * kCell_px + column)] > threshold_;
+    }
+    return white;
+  }
+
+ private:
+  std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(row * side_ + column);
+  }
+  static std::uint8_t interpolated(const ImageView& image, double x, double y) {
+    if (!(x >= 0 && y >= 0 && x < image.width - 1 && y < image.height - 1)) return 0;
+    const auto left = static_cast<int>(x), top = static_cast<int>(y);
+    const std::uint8_t* at = image.pixels + static_cast<std::ptrdiff_t>(top) * image.stride + left;
+    const double u = x - left, v = y - top;
+    const double upper = at[0] + u * (at[1] - at[0]);
+    const double lower = at[image.stride] + u * (at[image.stride + 1] - at[image.stride]);
+    return static_cast<std::uint8_t>(std::lround(upper + v * (lower - upper)));
+  }
+
+  int side_;
+  std::vector<std::uint8_t> level_;
+  int threshold_ = 0;
+  double contrast_ = 0;
+};
+
+Bits read_bits(const ImageView& image, const Square& square, int bits) {
+  const int cells = bits + 2;
+  FlatSquare flat(image, square, cells);
+  flat.part();
+  Bits read;
+  if (flat.contrast() < kMinContrast) return read;
+
+  constexpr int kLook_px = kCell_px - 2 * kMargin_px;
+  std::vector<std::uint8_t> inside;
+  int differing = 0, white_cells = 0;
+  for (int row = 0; row < cells; ++row) {
+    for (int column = 0; column < cells; ++column) {
+      const int white = flat.white_in(row, column);
+      const bool is_white = 2 * white > kLook_px * kLook_px;
+      differing += is_white ? kLook_px * kLook_px - white : white;
+      const bool border = row == 0 || column == 0 || row == cells - 1 || column == cells - 1;
+      if (border && is_white) return read;
+      if (border) continue;
+      inside.push_back(is_white ? 1 : 0);
+      white_cells += is_white ? 1 : 0;
+    }
+  }
+  const double white_fraction = static_cast<double>(white_cells) / (bits * bits);
+  if (white_fraction < kMinWhite || white_fraction > 1 - kMinWhite) return read;
+  read.impurity = static_cast<double>(differing) / (cells * cells * kLook_px * kLook_px);
+  if (read.impurity < kMaxImpure) read.inside = std::move(inside);
+  return read;
+}
+
+TagFamily smallest(TagFamily family, int id) {
+  const auto last = static_cast<int>(family);
+  if (last - kSmaller < static_cast<int>(TagFamily::aruco_4x4_50) ||
+      family > TagFamily::aruco_7x7_1000)
+    return family;
+  for (int f = last - kSmaller; f < last; ++f)
+    if (id < id_count(static_cast<TagFamily>(f))) return static_cast<TagFamily>(f);
+  return family;
+}
+
+std::optional<ReadSquare> recognise(const std::vector<std::uint8_t>& white, int bits,
+                                    TagFamily expected, std::span<const std::int16_t> missing) {
+  if (bits_per_side(expected) == bits) {
+    std::vector<std::uint8_t> flipped = white;
+    for (auto row = flipped.begin(); row != flipped.end(); row += bits)
+      std::reverse(row, row + bits);
+    const auto id = identify_tag(expected, flipped);
+    if (id && std::find(missing.begin(), missing.end(), *id) != missing.end())
+      return ReadSquare{expected, *id, true};
+    if (const auto as_it_is = identify_tag(expected, white))
+      return ReadSquare{expected, *as_it_is, false};
+  }
+  for (const TagFamily family : kLargest) {
+    if (bits_per_side(family) != bits) continue;
+    if (const auto id = identify_tag(family, white))
+      return ReadSquare{smallest(family, *id), *id, false};
+  }
+  return std::nullopt;
+}
+
+/// Cells of the wrong size do not fill with one colour: the purest reading that is a tag counts.
+std::optional<ReadSquare> read_square(const ImageView& image, const Square& square,
+                                      TagFamily expected, std::span<const std::int16_t> missing) {
+  std::optional<ReadSquare> best;
+  double least = 1;
+  for (const int bits : {4, 5, 6, 7, bits_per_side(TagFamily::grid_10x10)}) {
+    if (shortest_side(square) < kMinCell_px * (bits + 2)) continue;
+    const Bits read = read_bits(image, square, bits);
+    if (read.inside.empty() || read.impurity >= least) continue;
+    const std::optional<ReadSquare> tag = recognise(read.inside, bits, expected, missing);
+    if (!tag) continue;
+    best = tag;
+    least = read.impurity;
+  }
+  return best;
+}
 
 /// While nothing is found, every so many frames the image is tried the other way round.
 constexpr unsigned kFlipEvery = 4;
@@ -125,6 +336,82 @@ double fit_corners(const CameraModel& camera, const std::vector<CornerPair>& pai
 }
 
 }  // namespace
+
+/// In closed form (Heckbert, "Fundamentals of texture mapping and image warping", 1989, 2.2.3).
+Eigen::Matrix3d square_homography(const Square& corners) {
+  const auto cross = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return a.x() * b.y() - a.y() * b.x();
+  };
+  const Eigen::Vector2d odd = corners[0] - corners[1] + corners[2] - corners[3];
+  const Eigen::Vector2d right = corners[1] - corners[2];
+  const Eigen::Vector2d bottom = corners[3] - corners[2];
+  const double g = cross(odd, bottom) / cross(right, bottom);
+  const double h = cross(right, odd) / cross(right, bottom);
+  const Eigen::Vector2d along = corners[1] - corners[0] + g * corners[1];
+  const Eigen::Vector2d down = corners[3] - corners[0] + h * corners[3];
+  Eigen::Matrix3d from_corner;  // 0 to 1 to the right and down
+  from_corner << along.x(), down.x(), corners[0].x(), along.y(), down.y(), corners[0].y(), g, h, 1;
+  Eigen::Matrix3d corner_from_centre;
+  corner_from_centre << 0.5, 0, 0.5, 0, 0.5, 0.5, 0, 0, 1;
+  const Eigen::Matrix3d out = from_corner * corner_from_centre;
+  return out / out(2, 2);
+}
+
+std::vector<Eigen::Isometry3d> square_poses(const CameraModel& camera, double size,
+                                            const Square& corners) {
+  const std::optional<Rays> rays = rays_of(camera, corners);
+  if (!rays) return {};
+  // The homography's derivative at the centre, and the rotation of the optical axis to there.
+  const Eigen::Matrix3d h = square_homography(*rays);
+  const Eigen::Vector2d centre = h.topRightCorner<2, 1>();
+  const Eigen::Matrix2d derivative = h.topLeftCorner<2, 2>() - centre * h.bottomLeftCorner<1, 2>();
+  if (!h.allFinite()) return {};
+  const Eigen::Matrix3d turn =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), centre.homogeneous())
+          .toRotationMatrix();
+  const Eigen::Matrix2d facing =
+      (turn.topLeftCorner<2, 2>() - centre * turn.bottomLeftCorner<1, 2>()).inverse() * derivative;
+  // Its larger singular value is the scale; what is left is the upper left of a rotation.
+  const Eigen::Matrix2d gram = facing * facing.transpose();
+  const double mean = 0.5 * gram.trace();
+  const double scale = std::sqrt(mean + std::hypot(0.5 * (gram(0, 0) - gram(1, 1)), gram(0, 1)));
+  const Eigen::Matrix2d upper = facing / scale;
+  const double third = std::sqrt(std::max(0.0, 1 - upper.col(0).squaredNorm()));
+  const double fourth = std::copysign(std::sqrt(std::max(0.0, 1 - upper.col(1).squaredNorm())),
+                                      -upper.col(0).dot(upper.col(1)));
+
+  const double half = 0.5 * size;
+  std::vector<Eigen::Isometry3d> poses;
+  for (const double sign : {1.0, -1.0}) {
+    Eigen::Matrix3d rotation;
+    rotation.col(0) << upper.col(0), sign * third;
+    rotation.col(1) << upper.col(1), sign * fourth;
+    rotation.col(2) = rotation.col(0).cross(rotation.col(1));
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.linear() = turn * rotation;
+    pose.translation() = translation(*rays, pose.linear(), half);
+    const bool faces_us = pose.linear().col(2).dot(pose.translation()) > 0;
+    if (pose.matrix().allFinite() && pose.translation().z() > 0 && faces_us) poses.push_back(pose);
+  }
+  std::stable_sort(poses.begin(), poses.end(), [&](const auto& a, const auto& b) {
+    return squares_px(camera, a, half, corners) < squares_px(camera, b, half, corners);
+  });
+  return poses;
+}
+
+std::vector<ReadSquare> read_squares(const ImageView& image, const std::vector<Square>& squares,
+                                     TagFamily expected, std::span<const std::int16_t> missing) {
+  std::vector<Square> largest = squares;
+  const std::size_t most = std::min(largest.size(), kMaxSquares);
+  std::partial_sort(
+      largest.begin(), largest.begin() + static_cast<std::ptrdiff_t>(most), largest.end(),
+      [](const Square& a, const Square& b) { return shortest_side(a) > shortest_side(b); });
+  largest.resize(most);
+  std::vector<ReadSquare> tags;
+  for (const Square& square : largest)
+    if (const auto tag = read_square(image, square, expected, missing)) tags.push_back(*tag);
+  return tags;
+}
 
 Acquirer::Acquirer(const CameraModel& camera, const TargetDescription& target)
     : camera_(camera), target_((check(target), target)), finder_(target.family) {

@@ -8,8 +8,8 @@
 #include <span>
 
 #include "host/core/count_text.h"
+#include "host/tracker/acquire.h"
 #include "host/tracker/picture_quality.h"
-#include "host/tracker/squares.h"
 #include "host/tracker/tracker.h"
 
 namespace tagwrench {

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "host/core/types.h"
-#include "host/tracker/squares.h"
+#include "host/tracker/acquire.h"
 
 namespace tagwrench {
 

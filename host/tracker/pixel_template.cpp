@@ -6,8 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "host/tracker/acquire.h"
 #include "host/tracker/rotation.h"
-#include "host/tracker/squares.h"
 
 namespace tagwrench {
 namespace {

@@ -9,7 +9,6 @@
 #include "host/tracker/camera_model.h"
 #include "host/tracker/edges.h"
 #include "host/tracker/pixel_template.h"
-#include "host/tracker/refine.h"
 #include "host/tracker/target.h"
 
 namespace tagwrench {

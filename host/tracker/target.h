@@ -3,11 +3,13 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
 
+#include "host/core/grid_tags.h"
 #include "host/core/types.h"
 
 namespace tagwrench {
@@ -29,18 +31,40 @@ constexpr int kTagFamilies = 22;
 /// A target may carry at most this many tags.
 constexpr int kMaxTags = 8;
 
-/// The family's name as sensor.yaml writes it: "aruco_original", "aruco_4x4_50", "apriltag_36h11",
-/// "grid_10x10" (host/core/grid_tags.h).
-std::string_view name(TagFamily family);
+struct FamilyRow {
+  std::string_view name;  ///< as sensor.yaml writes it
+  int bits;               ///< data bits along one side; the black square is two cells wider
+  int ids;                ///< they run from 0 to one less
+};
+
+/// In the order of TagFamily; grid_10x10: host/core/grid_tags.h.
+constexpr std::array<FamilyRow, kTagFamilies> kFamilies = {{
+    {"aruco_original", 5, 1024}, {"aruco_4x4_50", 4, 50},
+    {"aruco_4x4_100", 4, 100},   {"aruco_4x4_250", 4, 250},
+    {"aruco_4x4_1000", 4, 1000}, {"aruco_5x5_50", 5, 50},
+    {"aruco_5x5_100", 5, 100},   {"aruco_5x5_250", 5, 250},
+    {"aruco_5x5_1000", 5, 1000}, {"aruco_6x6_50", 6, 50},
+    {"aruco_6x6_100", 6, 100},   {"aruco_6x6_250", 6, 250},
+    {"aruco_6x6_1000", 6, 1000}, {"aruco_7x7_50", 7, 50},
+    {"aruco_7x7_100", 7, 100},   {"aruco_7x7_250", 7, 250},
+    {"aruco_7x7_1000", 7, 1000}, {"apriltag_16h5", 4, 30},
+    {"apriltag_25h9", 5, 35},    {"apriltag_36h10", 6, 2320},
+    {"apriltag_36h11", 6, 587},  {"grid_10x10", kGridCells, kGridIds},
+}};
+
+constexpr const FamilyRow& row(TagFamily family) {
+  return kFamilies[static_cast<std::size_t>(family)];
+}
+constexpr std::string_view name(TagFamily family) { return row(family).name; }
+constexpr int bits_per_side(TagFamily family) { return row(family).bits; }
+constexpr int id_count(TagFamily family) { return row(family).ids; }
 
 /// The inverse of name(); empty for a name that is not in the table.
-std::optional<TagFamily> family_from_name(std::string_view text);
-
-/// Data bits along one side; the black square is two cells (its border) wider.
-int bits_per_side(TagFamily family);
-
-/// Number of ids in the family: ids run from 0 to one less.
-int id_count(TagFamily family);
+inline std::optional<TagFamily> family_from_name(std::string_view text) {
+  for (std::size_t i = 0; i < kFamilies.size(); ++i)
+    if (kFamilies[i].name == text) return static_cast<TagFamily>(i);
+  return std::nullopt;
+}
 
 /// A tag as printed.
 struct TagPattern {

@@ -6,9 +6,9 @@
 
 #include "host/tracker/acquire.h"
 #include "host/tracker/diagnostics.h"
+#include "host/tracker/edges.h"
 #include "host/tracker/photometric.h"
 #include "host/tracker/reference.h"
-#include "host/tracker/refine.h"
 #include "host/tracker/rotation.h"
 
 namespace tagwrench {

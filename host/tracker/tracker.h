@@ -11,7 +11,7 @@
 // align     prediction + pixels -> pose: photometric alignment with the template, six motions with
 //           illumination and blur (photometric.h)
 // refine    where that fails, or while there is no template: model-based edges from the prediction
-//           (refine.h), then tags in the whole image, by OpenCV (acquire.h, squares.h), edges,
+//           (edges.h), then tags in the whole image, by OpenCV (acquire.h), edges,
 //           and alignment once more
 // conclude  covariance: noise and residuals, the tags' placement (photometric.h), and
 //           where the reference pose was given, that of the picture

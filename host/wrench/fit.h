@@ -1,7 +1,7 @@
 // Known loads and the displacements that they made -> a calibrated wrench model, with what is not
 // known of it.
 //
-// Model: wrench = M phi(d) + b, phi the features (features.h; d itself by default), b the offset of
+// Model: wrench = M phi(d) + b, phi the features (estimate.h; d itself by default), b the offset of
 // the observation's `zero`. Errors in both d and the wrench are weighed by the effective variance
 // S = S_w + K S_d K^T + S_model (Orear, Am. J. Phys. 50, 912, 1982), with the adjusted displacement
 // in the design matrix, without which noise in d would flatten K (Britt and Luecke, Technometrics

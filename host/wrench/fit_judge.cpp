@@ -1,5 +1,3 @@
-#include "host/wrench/fit_judge.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,6 +10,7 @@
 #include "host/core/axis_names.h"
 #include "host/core/config_error.h"
 #include "host/core/robust_statistics.h"
+#include "host/wrench/fit_solve.h"
 
 namespace tagwrench::fit {
 namespace {

@@ -18,7 +18,6 @@
 #include "host/output/hid_report.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/decode.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/tracker.h"

@@ -3,8 +3,8 @@
 #include <Eigen/Dense>
 
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
-#include "host/source/simulator/geometry.h"
+#include "host/source/simulator/mechanics.h"
+#include "host/source/simulator/simulator_source.h"
 #include "host/tracker/rotation.h"
 #include "host/tracker/tracker.h"
 #include "tests/bench/tracker_bound.h"

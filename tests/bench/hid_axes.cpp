@@ -11,7 +11,6 @@
 #include "host/motion/profile_config.h"
 #include "host/motion/shaping.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <ctime>
 
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 
 namespace tagwrench::bench {

@@ -9,7 +9,7 @@
 
 #include "host/app/scenario_config.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 #include "tests/bench/hid_device.h"
 #include "tests/bench/hid_figures.h"
 #include "tests/support/desk_readings.h"

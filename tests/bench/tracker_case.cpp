@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 #include "tests/bench/tracker_bound.h"
 #include "tests/bench/tracker_calibrated.h"
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 
 namespace tagwrench::bench {

@@ -20,7 +20,6 @@
 #include "host/core/os/unique_fd.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/decode.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 #include "host/web/server/live_feed.h"

@@ -6,7 +6,7 @@
 
 #include "host/calibration/analysis/trial_csv.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 #include "tests/bench/tracker_run.h"
 
 namespace tagwrench::bench {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "host/app/scenario_config.h"
-#include "host/source/simulator/geometry.h"
+#include "host/source/simulator/mechanics.h"
 #include "host/tools/design/design.h"
 #include "host/tracker/target.h"
 #include "tests/bench/tracker_bound.h"

@@ -12,7 +12,6 @@
 #include "host/motion/gestures.h"
 #include "host/motion/shaping.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"

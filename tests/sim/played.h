@@ -11,7 +11,6 @@
 #include "host/app/pipeline.h"
 #include "host/core/os/unique_fd.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 
 namespace tagwrench::test {

@@ -8,7 +8,6 @@
 #include <cstdlib>
 
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 

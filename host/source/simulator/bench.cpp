@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/source/simulator/geometry.h"
+#include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/random.h"
 
 namespace tagwrench::sim {

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "host/source/simulator/disturbances.h"
-#include "host/source/simulator/geometry.h"
 #include "host/source/simulator/mechanics.h"
 #include "host/source/simulator/prints.h"
 #include "host/source/simulator/random.h"

@@ -1,15 +1,26 @@
 #include "host/source/simulator/simulator_source.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/timerfd.h>
+#include <turbojpeg.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
+#include <string>
+#include <system_error>
 #include <utility>
+#include <vector>
 
 #include "host/core/config_error.h"
+#include "host/core/os/unique_fd.h"
+#include "host/core/png/png.h"
 #include "host/source/simulator/trajectory.h"
 
 namespace tagwrench {
@@ -203,4 +214,234 @@ void SimulatorSource::render(std::uint64_t sequence) noexcept {
   truth_.smear_px = renderer_.smear_px();
 }
 
+namespace sim {
+namespace {
+
+constexpr int kDefaultJpegQuality = 95;
+constexpr std::array<const char*, 3> kEndings{".png", ".pgm", ".jpg"};  // in FileFormat's order
+
+/// Room for the largest grey JPEG of this size.
+std::vector<std::uint8_t> room_for_jpeg(int width, int height) {
+  const unsigned long size = tjBufSize(width, height, TJSAMP_GRAY);
+  if (size == static_cast<unsigned long>(-1))
+    throw std::runtime_error(fmt::format("JPEG: no picture is {}x{}", width, height));
+  return std::vector<std::uint8_t>(size);
+}
+
+/// Bytes of it that are the file; 0: it could not be made.
+unsigned long encode_jpeg(tjhandle encoder, const std::uint8_t* pixels, int width, int height,
+                          int quality, std::vector<std::uint8_t>& room) noexcept {
+  unsigned char* to = room.data();
+  unsigned long size = room.size();
+  const int failed = tjCompress2(encoder, pixels, width, width, height, TJPF_GRAY, &to, &size,
+                                 TJSAMP_GRAY, quality, TJFLAG_ACCURATEDCT | TJFLAG_NOREALLOC);
+  return failed != 0 ? 0 : size;
+}
+
+/// The picture as a file of the scenario's format.
+std::vector<std::uint8_t> encode_image(const ImageView& image, const Compression& compression) {
+  const auto [pixels, width, height, stride] = image;
+  if (compression.file == FileFormat::png) return encode_png(pixels, width, height);
+  if (compression.file == FileFormat::jpeg) {
+    std::vector<std::uint8_t> file = room_for_jpeg(width, height);
+    const std::unique_ptr<void, int (*)(void*)> encoder(tjInitCompress(), tjDestroy);
+    const int quality =
+        compression.jpeg_quality > 0 ? compression.jpeg_quality : kDefaultJpegQuality;
+    file.resize(encode_jpeg(encoder.get(), pixels, width, height, quality, file));
+    if (file.empty())
+      throw std::runtime_error(std::string("JPEG: ") + tjGetErrorStr2(encoder.get()));
+    return file;
+  }
+  const std::string header = fmt::format("P5\n{} {}\n255\n", width, height);
+  std::vector<std::uint8_t> file(header.begin(), header.end());
+  file.insert(file.end(), pixels, pixels + static_cast<std::ptrdiff_t>(width) * height);
+  return file;
+}
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPartial = ".partial";  // where files wait until all are there
+constexpr int kMaxFrames = 1'000'000;         // names have six digits
+
+[[noreturn]] void cannot_write(const fs::path& path, const std::string& reason) {
+  throw std::runtime_error(
+      fmt::format("{}: cannot be written ({}): free some space or choose another --out",
+                  path.string(), reason));
+}
+
+void write_file(const fs::path& path, const void* data, std::size_t size) {
+  const UniqueFd file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (!file) cannot_write(path, std::strerror(errno));
+  const char* next = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t written = ::write(file.get(), next, size);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) cannot_write(path, std::strerror(errno));
+    next += written;
+    size -= static_cast<std::size_t>(written);
+  }
+}
+
+bool is_frame_name(const fs::path& name) {
+  const std::string stem = name.stem().string();
+  const std::string ending = name.extension().string();
+  return stem.size() == 6 &&
+         std::ranges::all_of(stem, [](unsigned char c) { return std::isdigit(c) != 0; }) &&
+         std::ranges::find(kEndings, ending) != kEndings.end();
+}
+
+bool is_ours(const fs::path& name) {
+  return name == "frames.csv" || name == "truth.csv" || name == "sensor.yaml" || name == kPartial ||
+         is_frame_name(name);
+}
+
+// What an earlier export left in the folder. Throws if anything else is there.
+std::vector<fs::path> earlier_export(const fs::path& dir) {
+  std::error_code error;
+  fs::create_directories(dir, error);
+  if (error) {
+    throw ConfigError("{}: cannot be made a folder ({}): choose another --out", dir.string(),
+                      error.message());
+  }
+  std::vector<fs::path> found;
+  bool marked = false;
+  for (auto entry = fs::directory_iterator(dir, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    const fs::path name = entry->path().filename();
+    marked = marked || name == "truth.csv" || name == kPartial;
+    if (!is_ours(name)) {
+      throw ConfigError("{}: the folder already holds {}: give --out an empty or a new folder",
+                        dir.string(), name.string());
+    }
+    found.push_back(entry->path());
+  }
+  if (error) {
+    throw ConfigError("{}: cannot be read ({}): choose another --out", dir.string(),
+                      error.message());
+  }
+  // Numbered pictures alone may be anybody's.
+  if (!found.empty() && !marked) {
+    throw ConfigError(
+        "{}: the folder holds pictures that are not an earlier export: give --out an empty or a "
+        "new folder",
+        dir.string());
+  }
+  return found;
+}
+
+std::string truth_row(const Truth& truth) {
+  std::string row = fmt::format("{},{}", truth.sequence, truth.time.count());
+  for (const double value : truth.displacement) row += fmt::format(",{:.9g}", value);
+  for (const double value : truth.wrench) row += fmt::format(",{:.9g}", value);
+  return row + "\n";
+}
+
+void write_all(const Scenario& scenario, const fs::path& partial, int frames) {
+  SimulatorSource source(scenario, false);
+  std::string times = "file,t_ns\n";
+  std::string truths =
+      "seq,t_ns,dx_m,dy_m,dz_m,rx_rad,ry_rad,rz_rad,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm\n";
+  for (int i = 0; i < frames; ++i) {
+    Frame frame;
+    source.read(frame);
+    const std::string name =
+        fmt::format("{:06}{}", i, kEndings[static_cast<std::size_t>(scenario.compression.file)]);
+    const auto bytes = encode_image(frame.image, scenario.compression);
+    write_file(partial / name, bytes.data(), bytes.size());
+    times += fmt::format("{},{}\n", name, frame.capture_time.time_since_epoch().count());
+    truths += truth_row(source.truth());
+  }
+  const std::string sensor = sensor_yaml(scenario);
+  write_file(partial / "sensor.yaml", sensor.data(), sensor.size());
+  write_file(partial / "truth.csv", truths.data(), truths.size());
+  write_file(partial / "frames.csv", times.data(), times.size());
+}
+
+void move_into_place(const fs::path& partial, const fs::path& dir) {
+  // truth.csv first: it marks the folder as ours should the rest fail.
+  fs::rename(partial / "truth.csv", dir / "truth.csv");
+  for (const auto& entry : fs::directory_iterator(partial))
+    fs::rename(entry.path(), dir / entry.path().filename());
+  fs::remove(partial);
+}
+
+std::string list(const double* values, std::size_t count, double scale) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < count; ++i)
+    text += fmt::format("{}{:.10g}", i == 0 ? "" : ", ", scale * values[i]);
+  return text + "]";
+}
+
+}  // namespace
+
+JpegRoundTrip::JpegRoundTrip(int width, int height, int quality)
+    : width_(width),
+      height_(height),
+      quality_(quality),
+      encoder_(quality > 0 ? tjInitCompress() : nullptr, tjDestroy),
+      decoder_(quality > 0 ? tjInitDecompress() : nullptr, tjDestroy) {
+  if (quality <= 0) return;
+  if (!encoder_ || !decoder_) throw std::runtime_error("JPEG: out of memory");
+  encoded_ = room_for_jpeg(width, height);
+}
+
+void JpegRoundTrip::apply(std::uint8_t* pixels) noexcept {
+  if (quality_ <= 0) return;
+  const unsigned long size =
+      encode_jpeg(encoder_.get(), pixels, width_, height_, quality_, encoded_);
+  // Out of memory: the picture stays as it was.
+  if (size == 0) return;
+  tjDecompress2(decoder_.get(), encoded_.data(), size, pixels, width_, width_, height_, TJPF_GRAY,
+                TJFLAG_ACCURATEDCT);
+}
+
+std::string sensor_yaml(const Scenario& s) {
+  const Camera& c = s.camera;
+  const Mechanics& m = s.mechanics;
+  std::string tags, centres;
+  for (const TagPlacement& tag : s.target.tags) tags += fmt::format("    - {{id: {}}}\n", tag.id);
+  const Eigen::Matrix<double, 4, 3, Eigen::RowMajor> places = spring_centres(m);
+  for (int i = 0; i < 4; ++i)
+    centres += fmt::format("      - {}\n", list(places.data() + 3 * i, 3, 1e3));
+  return fmt::format(
+      "# The simulated sensor as its owner knows it.\n"
+      "camera:\n  width: {}\n  height: {}\n  fx: {:.10g}\n  fy: {:.10g}\n  cx: {:.10g}\n"
+      "  cy: {:.10g}\n  distortion: {}\n  mirrored: {}\n"
+      "target:\n  family: {}\n  tag_size_mm: {:.10g}\n  border_mm: {:.10g}\n  tags:\n{}rest:\n  "
+      "frames: {}\n"
+      "wrench:\n  springs:\n    centres_mm:\n{}    axial_n_per_mm: {:.10g}\n"
+      "    lateral_n_per_mm: {:.10g}\n    bending_nm_per_rad: {:.10g}\n"
+      "    torsion_nm_per_rad: {:.10g}\n  range_n: {}\n  range_nm: {}\n",
+      c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, list(c.distortion.data(), 5, 1),
+      c.mirrored, s.target.family, s.target.tag_size * 1e3, s.target.border * 1e3, tags,
+      std::clamp(static_cast<int>(0.8 * s.trajectory.rest_time * c.frame_rate), 1, 25), centres,
+      m.axial_stiffness * 1e-3, m.lateral_stiffness * 1e-3, m.bending_stiffness,
+      m.torsion_stiffness, list(m.range.data(), 3, 1), list(m.range.data() + 3, 3, 1));
+}
+
+void export_folder(const Scenario& scenario, const fs::path& dir, int frames) {
+  if (frames < 1 || frames > kMaxFrames)
+    throw ConfigError("--frames: must lie between 1 and {}", kMaxFrames);
+  const std::string wrong = problem(scenario);
+  if (!wrong.empty()) throw ConfigError("scenario: " + wrong);
+  const std::vector<fs::path> earlier = earlier_export(dir);
+  const fs::path partial = dir / kPartial;
+  std::error_code ignored;
+  fs::remove_all(partial, ignored);
+  try {
+    fs::create_directory(partial);
+    write_all(scenario, partial, frames);
+    for (const fs::path& path : earlier)
+      fs::remove_all(path == partial ? fs::path() : path, ignored);
+    move_into_place(partial, dir);
+  } catch (const fs::filesystem_error& error) {
+    fs::remove_all(partial, ignored);
+    cannot_write(dir, error.code().message());
+  } catch (...) {
+    fs::remove_all(partial, ignored);
+    throw;
+  }
+}
+
+}  // namespace sim
 }  // namespace tagwrench

@@ -23,7 +23,7 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/output/output.h"
-#include "host/recording/records.h"
+#include "host/recording/schema.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/frame_source.h"
 #include "host/web/bridge/camera_settings.h"

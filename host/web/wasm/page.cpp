@@ -1,5 +1,5 @@
 // What the core asks of the page that runs it, and gets at once: its libraries' work, in the places
-// of sha256.cpp, png.cpp, square_finder.cpp and tag_patterns.cpp. core.ts answers.
+// of sha256.cpp, png.cpp, tag_dictionary.cpp and tag_patterns.cpp. core.ts answers.
 #include <emscripten.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "host/core/grid_tags.h"
 #include "host/core/png/png.h"
 #include "host/core/sha256.h"
-#include "host/tracker/squares.h"
+#include "host/tracker/acquire.h"
 #include "host/tracker/target.h"
 #include "tag_bits.inc"
 

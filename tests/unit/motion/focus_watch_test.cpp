@@ -17,7 +17,7 @@
 #include "host/core/os/unique_fd.h"
 #include "host/motion/profile_manager.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 
 namespace tagwrench {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "host/motion/profile_config.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 
 namespace tagwrench::test {
 

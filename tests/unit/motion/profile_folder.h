@@ -10,7 +10,7 @@
 #include <string>
 
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 #include "tests/support/temporary_folder.h"
 
 namespace tagwrench::test {

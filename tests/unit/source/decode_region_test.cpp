@@ -7,7 +7,6 @@
 #include <random>
 
 #include "host/source/decode.h"
-#include "host/source/jpeg_luma.h"
 #include "tests/unit/source/jpeg_kinds.h"
 
 namespace tagwrench {

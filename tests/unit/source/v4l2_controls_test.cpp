@@ -1,9 +1,9 @@
-#include "host/source/v4l2_controls.h"
-
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
 #include <map>
+
+#include "host/source/v4l2_settings.h"
 
 namespace tagwrench {
 namespace {

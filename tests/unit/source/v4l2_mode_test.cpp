@@ -1,7 +1,6 @@
-#include "host/source/v4l2_mode.h"
-
 #include <gtest/gtest.h>
 
+#include "host/source/v4l2_settings.h"
 #include "tests/unit/source/message.h"
 
 namespace tagwrench {

@@ -2,9 +2,9 @@
 
 #include <opencv2/calib3d.hpp>
 
+#include "host/tracker/acquire.h"
 #include "host/tracker/camera_model.h"
 #include "host/tracker/rotation.h"
-#include "host/tracker/squares.h"
 
 namespace tagwrench {
 namespace {

@@ -26,7 +26,6 @@
 #include "host/app/scenario_config.h"
 #include "host/core/os/atomic_file.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
 #include "host/wrench/estimate.h"

@@ -1,5 +1,5 @@
 // Finds tags in a whole picture: OpenCV.js, 11 MB, fetched when the target is not held for the first time. The
-// same detector with the same parameters as the bridge's (host/tracker/square_finder.cpp). It makes functions
+// same detector with the same parameters as the bridge's (host/tracker/tag_dictionary.cpp). It makes functions
 // from text (embind), so a server that sends a content security policy with the worker's script must allow
 // 'unsafe-eval' there, and there alone; a policy in the page itself does not reach a worker.
 import library from '@techstark/opencv-js';

@@ -3,7 +3,6 @@
 
 #include "host/calibration/target/recorder.h"
 #include "host/sensor/sensor_config.h"
-#include "host/source/simulator/folder_export.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/rotation.h"
 

@@ -1,4 +1,3 @@
-#include "host/source/simulator/folder_export.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
