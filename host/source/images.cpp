@@ -1,12 +1,10 @@
 #include "host/source/images.h"
 
 #include <fmt/format.h>
-#include <sys/timerfd.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -15,6 +13,8 @@
 #include <unordered_map>
 
 #include "host/core/config_error.h"
+#include "host/core/os/timer.h"
+#include "host/core/parse.h"
 #include "host/source/decode.h"
 
 namespace tagwrench {
@@ -29,13 +29,9 @@ std::string shown(std::string_view text) {
 }
 
 std::optional<std::int64_t> nanoseconds(std::string_view text) {
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const auto value = parse_whole<std::int64_t>(text);
   // Half the range: differences and sums with a present time must not overflow.
-  if (error != std::errc{} || end != text.data() + text.size() || value < 0 ||
-      value > INT64_MAX / 2)
-    return std::nullopt;
-  return value;
+  return value && *value >= 0 && *value <= INT64_MAX / 2 ? value : std::nullopt;
 }
 
 struct Entry {
@@ -67,42 +63,6 @@ void take_line(std::string_view line, std::size_t number, const std::string& sou
   }
   entry->second = Entry{*time, number};
 }
-
-}  // namespace
-
-std::vector<Duration> parse_frame_times(std::string_view text, const std::string& source,
-                                        std::span<const std::string> files) {
-  Entries entries;
-  for (const std::string& file : files) entries.emplace(file, std::nullopt);
-  for (std::size_t number = 1; !text.empty(); ++number) {
-    const auto end = text.find('\n');
-    std::string_view line = text.substr(0, end);
-    text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 1);
-    if (line.ends_with('\r')) line.remove_suffix(1);
-    if (line.empty() || (number == 1 && line == "file,t_ns")) continue;
-    take_line(line, number, source, entries);
-  }
-  std::vector<Duration> times;
-  times.reserve(files.size());
-  for (const std::string& file : files) {
-    const auto& entry = entries.at(file);
-    if (!entry) {
-      throw ConfigError("{}: has no time for {}; add a line {},t_ns", source, shown(file),
-                        shown(file));
-    }
-    const Duration time(entry->t_ns);
-    if (!times.empty() && time <= times.back()) {
-      throw ConfigError(
-          "{}:{}: t_ns {} of {} is not after {}, that of the picture before it; times must "
-          "increase in the order of the names",
-          source, entry->line, entry->t_ns, shown(file), times.back().count());
-    }
-    times.push_back(time);
-  }
-  return times;
-}
-
-namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
@@ -177,6 +137,38 @@ std::vector<Duration> frame_times(const std::string& dir, const std::vector<std:
 
 }  // namespace
 
+std::vector<Duration> parse_frame_times(std::string_view text, const std::string& source,
+                                        std::span<const std::string> files) {
+  Entries entries;
+  for (const std::string& file : files) entries.emplace(file, std::nullopt);
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const auto end = text.find('\n');
+    std::string_view line = text.substr(0, end);
+    text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 1);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    if (line.empty() || (number == 1 && line == "file,t_ns")) continue;
+    take_line(line, number, source, entries);
+  }
+  std::vector<Duration> times;
+  times.reserve(files.size());
+  for (const std::string& file : files) {
+    const auto& entry = entries.at(file);
+    if (!entry) {
+      throw ConfigError("{}: has no time for {}; add a line {},t_ns", source, shown(file),
+                        shown(file));
+    }
+    const Duration time(entry->t_ns);
+    if (!times.empty() && time <= times.back()) {
+      throw ConfigError(
+          "{}:{}: t_ns {} of {} is not after {}, that of the picture before it; times must "
+          "increase in the order of the names",
+          source, entry->line, entry->t_ns, shown(file), times.back().count());
+    }
+    times.push_back(time);
+  }
+  return times;
+}
+
 ImagesSource::ImagesSource(const std::string& dir, bool fast) {
   const std::vector<std::string> names = picture_names(dir);
   for (const std::string& name : names) paths_.push_back((fs::path(dir) / name).string());
@@ -192,7 +184,7 @@ ImagesSource::ImagesSource(const std::string& dir, bool fast) {
       "{}: {} pictures, {}x{}, {:.4g} fps{}", dir, paths_.size(), size.width, size.height,
       1e9 / static_cast<double>(format_.period.count()), fast ? ", as fast as they can go" : "");
   if (fast) return;
-  timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  timer_ = monotonic_timer();
   if (!timer_) throw ConfigError("images:{}: no more file descriptors; raise ulimit -n", dir);
   arm();
 }
@@ -205,15 +197,8 @@ std::string ImagesSource::unusable() const {
 }
 
 void ImagesSource::arm() const noexcept {
-  if (!timer_) return;
   // At once for the first frame, which starts the clock, and for the end.
-  const bool wait = next_ > 0 && next_ < paths_.size();
-  const Duration at = wait ? due(next_).time_since_epoch() : Duration(1);
-  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(at);
-  itimerspec times{};
-  times.it_value = {static_cast<time_t>(seconds.count()),
-                    static_cast<long>((at - seconds).count())};
-  ::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &times, nullptr);
+  if (timer_) wake_at(timer_, next_ > 0 && next_ < paths_.size() ? due(next_) : TimePoint{});
 }
 
 ReadStatus ImagesSource::read(Frame& frame) noexcept {

@@ -1,13 +1,13 @@
 #include "host/source/recording.h"
 
 #include <fmt/format.h>
-#include <sys/timerfd.h>
 
 #include <algorithm>
 #include <exception>
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/os/timer.h"
 
 namespace tagwrench {
 
@@ -41,7 +41,7 @@ RecordingSource::RecordingSource(std::unique_ptr<record::RecordingReader> record
     format_.description += fmt::format("; it {}", unclosed);
   picture_.resize(static_cast<std::size_t>(head.width) * static_cast<std::size_t>(head.height));
   if (fast) return;
-  timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  timer_ = monotonic_timer();
   if (!timer_) throw ConfigError("recording:{}: no more file descriptors; raise ulimit -n", file);
   arm();
 }
@@ -58,18 +58,9 @@ bool RecordingSource::advance() noexcept {
   return waiting_;
 }
 
-TimePoint RecordingSource::due() const noexcept { return start_ + (entry_.time - first_); }
-
 void RecordingSource::arm() const noexcept {
-  if (!timer_) return;
   // At once for the first entry, which starts the clock, and for the end.
-  const bool wait = started_ && waiting_;
-  const Duration at = wait ? std::max(due().time_since_epoch(), Duration(1)) : Duration(1);
-  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(at);
-  itimerspec times{};
-  times.it_value = {static_cast<time_t>(seconds.count()),
-                    static_cast<long>((at - seconds).count())};
-  ::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &times, nullptr);
+  if (timer_) wake_at(timer_, started_ && waiting_ ? due() : TimePoint{});
 }
 
 ReadStatus RecordingSource::read(Frame& frame) noexcept {
@@ -126,12 +117,8 @@ void RecordingSource::pass_late(TimePoint now) noexcept {
 
 bool RecordingSource::decode(Frame& frame) noexcept {
   if (entry_.raw.bytes.empty()) return false;
-  if (entry_.crop) return place_crop(frame);
-  return decoder_.decode(entry_.raw, wanted_, frame);
-}
-
-/// Elsewhere the picture holds what earlier frames left there.
-bool RecordingSource::place_crop(Frame& frame) noexcept {
+  if (!entry_.crop) return decoder_.decode(entry_.raw, wanted_, frame);
+  // Elsewhere the picture holds what earlier frames left there.
   const Region& part = entry_.all;
   const auto width = static_cast<std::size_t>(part.width);
   for (int y = 0; y < part.height; ++y) {

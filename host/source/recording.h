@@ -35,11 +35,10 @@ class RecordingSource final : public FrameSource {
 
  private:
   bool advance() noexcept;
-  TimePoint due() const noexcept;
+  TimePoint due() const noexcept { return start_ + (entry_.time - first_); }
   void arm() const noexcept;
   void pass_late(TimePoint now) noexcept;
   bool decode(Frame& frame) noexcept;
-  bool place_crop(Frame& frame) noexcept;
 
   std::unique_ptr<record::RecordingReader> recording_;
   SourceFormat format_;

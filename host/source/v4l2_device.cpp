@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -19,6 +18,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
+#include "host/core/parse.h"
 #include "host/source/v4l2_settings.h"
 
 namespace tagwrench {
@@ -85,11 +85,7 @@ namespace fs = std::filesystem;
 
 std::optional<int> number_after(std::string_view text, std::string_view prefix) {
   if (!text.starts_with(prefix)) return std::nullopt;
-  text.remove_prefix(prefix.size());
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
+  return parse_whole<int>(text.substr(prefix.size()));
 }
 
 template <typename Visit>
@@ -102,11 +98,7 @@ void for_each_entry(const fs::path& folder, Visit visit) {
 CameraNode inspect(const std::string& path) {
   CameraNode node;
   node.path = path;
-  V4l2Capability capability;
-  node.error = query_capability(path, capability);
-  node.card = capability.card;
-  node.driver = capability.driver;
-  node.captures = capability.captures;
+  node.error = query_capability(path, node);
   return node;
 }
 
@@ -190,10 +182,8 @@ std::vector<V4l2Mode> V4l2Device::modes(int wanted_width, int wanted_height) con
     if (device_ioctl(fd_.get(), VIDIOC_ENUM_FMT, &format)) break;
     const auto pixels = pixel_format(format.pixelformat);
     if (!pixels) continue;
-    V4l2Mode mode;
-    mode.pixels = *pixels;
-    mode.fourcc = format.pixelformat;
-    add_sizes(mode, wanted_width, wanted_height, modes);
+    add_sizes({.pixels = *pixels, .fourcc = format.pixelformat}, wanted_width, wanted_height,
+              modes);
   }
   return modes;
 }
@@ -277,16 +267,16 @@ V4l2Stream V4l2Device::set_mode(const V4l2Choice& choice) {
     throw ConfigError("{}: the driver does not give {} although it lists it; choose another mode",
                       path_, describe(mode));
   }
-  V4l2Stream stream;
-  stream.pixels = mode.pixels;
-  stream.width = mode.width;
-  stream.height = mode.height;
   const int row = row_bytes(mode.pixels, mode.width);
   const bool plausible = got.bytesperline >= static_cast<unsigned>(row) &&
                          got.bytesperline <= static_cast<unsigned>(4 * kMaxSide);
-  stream.stride = row == 0 ? 0 : plausible ? static_cast<int>(got.bytesperline) : row;
-  stream.period = set_rate(choice.fps);
-  return stream;
+  return {.pixels = mode.pixels,
+          .width = mode.width,
+          .height = mode.height,
+          .stride = row == 0    ? 0
+                    : plausible ? static_cast<int>(got.bytesperline)
+                                : row,
+          .period = set_rate(choice.fps)};
 }
 
 Duration V4l2Device::set_rate(double fps) const {

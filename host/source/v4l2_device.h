@@ -14,7 +14,7 @@
 namespace tagwrench {
 
 struct V4l2Capability {
-  std::string card;
+  std::string card;  ///< the camera's name
   std::string driver;
   bool captures = false;  ///< single-planar capture with streaming
 };
@@ -98,12 +98,9 @@ class V4l2Device {
 // Which camera nodes there are, what they are called and who holds them. For messages and the
 // doctor.
 
-struct CameraNode {
-  std::string path;  ///< /dev/videoN
-  int error = 0;     ///< errno of opening or asking it, 0 if it answered
-  std::string card;  ///< the camera's name
-  std::string driver;
-  bool captures = false;
+struct CameraNode : V4l2Capability {
+  std::string path;             ///< /dev/videoN
+  int error = 0;                ///< errno of opening or asking it, 0 if it answered
   std::vector<V4l2Mode> modes;  ///< understood ones; empty unless it captures
   std::string controls;         ///< those that a run would lock, for people
 };

@@ -1,6 +1,7 @@
 #include "host/source/v4l2_settings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <linux/videodev2.h>
 #include <sys/ioctl.h>
 
@@ -14,6 +15,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
+#include "host/core/parse.h"
 
 namespace tagwrench {
 namespace {
@@ -27,31 +29,14 @@ constexpr double kRateTolerance = 0.01;  ///< 29.97 and 30 are the same rate
                     part, why);
 }
 
-std::vector<std::string_view> split(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const auto at = text.find(separator);
-    parts.push_back(text.substr(0, at));
-    if (at == std::string_view::npos) return parts;
-    text.remove_prefix(at + 1);
-  }
-}
-
 std::optional<int> side(std::string_view text) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || value < 1 || value > kMaxSide)
-    return std::nullopt;
-  return value;
+  const auto value = parse_whole<int>(text);
+  return value && *value >= 1 && *value <= kMaxSide ? value : std::nullopt;
 }
 
 std::optional<double> rate(std::string_view text) {
-  double value = 0;
-  const auto [end, error] =
-      std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
-  if (error != std::errc{} || end != text.data() + text.size() || !(value > 0) || value > kMaxFps)
-    return std::nullopt;
-  return value;
+  const auto value = parse_whole<double>(text, std::chars_format::fixed);
+  return value && *value > 0 && *value <= kMaxFps ? value : std::nullopt;
 }
 
 bool same_rate(double a, double b) { return std::abs(a - b) <= kRateTolerance * std::max(a, b); }
@@ -310,35 +295,30 @@ void ControlLock::restore(ControlPort& port) {
 }
 
 std::string ControlLock::available(ControlPort& port) {
-  std::string text;
-  for (const Control& control : kControls) {
-    const auto range = port.range(control.id);
-    if (!range || !range->writable) continue;
-    text += text.empty() ? "" : ", ";
-    text += control.what;
-  }
-  return text;
+  std::vector<std::string_view> names;
+  for (const Control& control : kControls)
+    if (const auto range = port.range(control.id); range && range->writable)
+      names.push_back(control.what);
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 std::string ControlLock::description() const {
-  const auto list = [](std::string_view title, const auto& items, auto index_of) {
-    std::string text;
-    for (const auto& item : items) {
-      text += text.empty() ? std::string(title) + " " : std::string(", ");
-      text += kControls[index_of(item)].what;
-    }
-    return text;
-  };
   if (original_.empty()) return "it has no controls to lock";
-  std::vector<std::size_t>
-      missing;  // an automatism goes without saying where its value is not there either
+  std::string text;
+  const auto list = [&text](std::string_view title, const std::vector<std::size_t>& controls) {
+    if (controls.empty()) return;
+    std::vector<std::string_view> names;
+    for (const std::size_t index : controls) names.push_back(kControls[index].what);
+    text += fmt::format("{}{} {}", text.empty() ? "" : "; ", title, fmt::join(names, ", "));
+  };
+  std::vector<std::size_t> locked, missing;
+  for (const Setting& setting : locked_) locked.push_back(setting.index);
+  // An automatism goes without saying where its value is not there either.
   for (const std::size_t index : absent_)
     if (kControls[index].kind != Kind::automatism) missing.push_back(index);
-  const auto itself = [](std::size_t index) { return index; };
-  std::string text = list("locked", locked_, [](const Setting& s) { return s.index; });
-  for (const std::string& part :
-       {list("refused", refused_, itself), list("without", missing, itself)})
-    if (!part.empty()) text += (text.empty() ? "" : "; ") + part;
+  list("locked", locked);
+  list("refused", refused_);
+  list("without", missing);
   return text;
 }
 

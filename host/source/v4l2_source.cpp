@@ -4,7 +4,6 @@
 #include <linux/videodev2.h>
 #include <poll.h>
 #include <sys/epoll.h>
-#include <sys/timerfd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include <limits>
 
 #include "host/core/config_error.h"
+#include "host/core/os/timer.h"
 #include "host/source/v4l2_device.h"
 
 namespace tagwrench {
@@ -34,11 +34,6 @@ int milliseconds_left(TimePoint until) {
   return static_cast<int>(std::max<std::int64_t>(0, left));
 }
 
-timespec to_timespec(Duration time) {
-  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(time);
-  return {static_cast<time_t>(seconds.count()), static_cast<long>((time - seconds).count())};
-}
-
 V4l2Choice choose(const V4l2Device& device, const V4l2Options& options) {
   const bool asked = options.width > 0;
   const auto modes = device.modes(asked ? options.width : options.preferred_width,
@@ -58,8 +53,6 @@ V4l2Choice choose(const V4l2Device& device, const V4l2Options& options) {
                     describe(modes, 8));
 }
 
-using namespace std::chrono_literals;
-
 /// A larger jump is a driver's mistake: the source would have been called stalled long before.
 constexpr std::uint32_t kMaxGap = 4096;
 constexpr Duration kAbsurdAge = 1s;
@@ -71,7 +64,7 @@ V4l2Source::V4l2Source(const V4l2Options& options)
   device_ = std::make_unique<V4l2Device>(path_);
   choice_ = choose(*device_, options);
   epoll_.reset(::epoll_create1(EPOLL_CLOEXEC));
-  timer_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  timer_ = monotonic_timer();
   if (!epoll_ || !timer_) throw ConfigError("{}: no more file descriptors; raise ulimit -n", path_);
   watch(timer_.get());
   const V4l2Stream stream = device_->set_mode(choice_);
@@ -84,7 +77,7 @@ V4l2Source::V4l2Source(const V4l2Options& options)
   watch_camera();
   capture_queue_.number_from_zero();
   last_buffer_ = last_drain_ = Clock::now();
-  arm(stall_after(), Duration{});
+  wake_after(timer_, stall_after());
   const double fps = 1 / std::chrono::duration<double>(stream.period).count();
   format_.description = fmt::format(
       "{} ({}, {}): {}x{} {} at {:.4g} fps, {}; {}", path_, device_->capability().card,
@@ -150,10 +143,9 @@ CameraLight::Range V4l2Source::range_of(std::uint32_t control, double unit,
 }
 
 bool V4l2Source::set_control(std::uint32_t control, double value) noexcept {
-  if (!device_ || !std::isfinite(value)) return false;
-  V4l2ControlPort port(device_->fd());
   constexpr double kWide = 1e9;
-  return controls_.change(port, control, std::llround(std::clamp(value, -kWide, kWide)));
+  return std::isfinite(value) &&
+         change_setting(control, std::llround(std::clamp(value, -kWide, kWide)));
 }
 
 bool V4l2Source::change_setting(std::uint32_t id, std::int64_t value) noexcept {
@@ -190,15 +182,6 @@ void V4l2Source::watch_camera() {
   }
 }
 
-void V4l2Source::arm(Duration after, Duration every) const noexcept {
-  const itimerspec times{to_timespec(every), to_timespec(after)};
-  ::timerfd_settime(timer_.get(), 0, &times, nullptr);
-}
-
-Duration V4l2Source::stall_after() const noexcept {
-  return std::max<Duration>(5 * format_.period, 500ms);
-}
-
 void V4l2Source::settle(int exposure_us) {
   V4l2ControlPort port(device_->fd());
   controls_.remember(port);
@@ -221,15 +204,10 @@ void V4l2Source::settle(int exposure_us) {
   controls_.lock(port, exposure_us);
 }
 
-bool V4l2Source::release_held() noexcept {
-  const bool held = held_ && device_;
-  if (held) device_->requeue(held_->index);
-  held_.reset();
-  return held;
-}
-
 ReadStatus V4l2Source::read(Frame& frame) noexcept {
-  const unsigned kept = release_held() ? 1 : 0;
+  const unsigned kept = held_ && device_ ? 1 : 0;
+  if (kept > 0) device_->requeue(held_->index);
+  held_.reset();
   if (state_ == State::away) return retry();
   return drain(device_->buffer_count() - kept, frame);
 }
@@ -270,7 +248,7 @@ ReadStatus V4l2Source::drain(unsigned queued, Frame& frame) noexcept {
       device_->requeue(buffer.index);
     }
   }
-  if (taken > 0 && state_ == State::streaming) arm(stall_after(), Duration{});
+  if (taken > 0 && state_ == State::streaming) wake_after(timer_, stall_after());
   if (newest) return deliver(*newest, taken >= queued, frame);
   if (taken > 0) return ReadStatus::nothing;
   if (device_->broken()) return lose("the driver reports an error");
@@ -278,9 +256,9 @@ ReadStatus V4l2Source::drain(unsigned queued, Frame& frame) noexcept {
   const Duration silent = Clock::now() - last_buffer_;
   if (silent >= patience) return lose("no frame comes");
   if (state_ == State::streaming)
-    arm(patience - silent, Duration{});
+    wake_after(timer_, patience - silent);
   else
-    arm(kRetryEvery, kRetryEvery);
+    wake_after(timer_, kRetryEvery, kRetryEvery);
   return ReadStatus::nothing;
 }
 
@@ -289,7 +267,7 @@ ReadStatus V4l2Source::deliver(const V4l2Buffer& newest, bool queue_was_full,
   if (state_ == State::waiting) {
     state_ = State::streaming;
     device_->requeue(newest.index);
-    arm(stall_after(), Duration{});
+    wake_after(timer_, stall_after());
     last_drain_ = Clock::now();
     detail_ = fmt::format("{}: the camera is back", stable_path_);
     return ReadStatus::reconnected;
@@ -322,29 +300,25 @@ ReadStatus V4l2Source::lose(const char* why) noexcept {
   // descriptor.
   ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, device_->fd(), nullptr);
   device_.reset();
-  arm(kRetryEvery, kRetryEvery);
+  wake_after(timer_, kRetryEvery, kRetryEvery);
   return first ? ReadStatus::disconnected : ReadStatus::nothing;
-}
-
-void V4l2Source::open_device() {
-  auto device = V4l2Device::reopen(stable_path_);
-  const V4l2Stream stream = device->set_mode(choice_);
-  V4l2ControlPort port(device->fd());
-  controls_.relock(port);
-  device->start();
-  // The driver may pad its rows otherwise this time.
-  decoder_.emplace(stream.pixels, stream.width, stream.height, stream.stride);
-  stride_ = stream.stride;
-  capture_queue_.stream_started();
-  device_ = std::move(device);
-  watch_camera();
 }
 
 ReadStatus V4l2Source::retry() noexcept {
   std::uint64_t ticks = 0;
   if (::read(timer_.get(), &ticks, sizeof ticks) <= 0) return ReadStatus::nothing;
   try {
-    open_device();
+    auto device = V4l2Device::reopen(stable_path_);
+    const V4l2Stream stream = device->set_mode(choice_);
+    V4l2ControlPort port(device->fd());
+    controls_.relock(port);
+    device->start();
+    // The driver may pad its rows otherwise this time.
+    decoder_.emplace(stream.pixels, stream.width, stream.height, stream.stride);
+    stride_ = stream.stride;
+    capture_queue_.stream_started();
+    device_ = std::move(device);
+    watch_camera();
     last_buffer_ = Clock::now();
     state_ = State::waiting;
   } catch (const std::exception&) {
@@ -352,18 +326,6 @@ ReadStatus V4l2Source::retry() noexcept {
     // Not there yet, or not in this mode: the next tick tries again.
   }
   return ReadStatus::nothing;
-}
-
-CaptureQueueTracker::CaptureQueueTracker(Duration period) : period_(period) {}
-
-void CaptureQueueTracker::stream_started() noexcept {
-  stream_is_new_ = true;
-  have_driver_sequence_ = false;
-}
-
-void CaptureQueueTracker::number_from_zero() noexcept {
-  from_zero_ = true;
-  taken_.reset();
 }
 
 bool CaptureQueueTracker::note(const BufferStamp& stamp, bool prompt) noexcept {
@@ -385,10 +347,6 @@ bool CaptureQueueTracker::note(const BufferStamp& stamp, bool prompt) noexcept {
   const TimePoint time = trusts_driver_clock_ ? stamp.driver_time : stamp.dequeued;
   capture_time_ = std::max(time, capture_time_ + 1ns);
   return true;
-}
-
-Duration CaptureQueueTracker::stale_after() const noexcept {
-  return std::max<Duration>(2 * period_, 100ms);
 }
 
 bool CaptureQueueTracker::stale(TimePoint now, TimePoint last_drain,

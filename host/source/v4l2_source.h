@@ -2,6 +2,7 @@
 // away is waited for.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -21,13 +22,19 @@ namespace tagwrench {
 class CaptureQueueTracker {
  public:
   /// `period` between frames decides what is stale.
-  explicit CaptureQueueTracker(Duration period);
+  explicit CaptureQueueTracker(Duration period) : period_(period) {}
 
   /// The stream has started (again): the next buffer may be a left-over, and its number begins a
   /// new count.
-  void stream_started() noexcept;
+  void stream_started() noexcept {
+    stream_is_new_ = true;
+    have_driver_sequence_ = false;
+  }
   /// The next frame noted has number 0 and nothing was lost before it.
-  void number_from_zero() noexcept;
+  void number_from_zero() noexcept {
+    from_zero_ = true;
+    taken_.reset();
+  }
 
   /// Every buffer that was dequeued, in order. False: the first of a stream, discard it (drivers
   /// hand out an old picture there). `prompt`: it was waited for, so a driver clock that is far
@@ -52,7 +59,9 @@ class CaptureQueueTracker {
   /// again.
   bool trusts_driver_clock() const noexcept { return trusts_driver_clock_; }
   /// max(2 periods, 100 ms): a frame older than this is never handed on.
-  Duration stale_after() const noexcept;
+  Duration stale_after() const noexcept {
+    return std::max<Duration>(2 * period_, std::chrono::milliseconds(100));
+  }
 
  private:
   Duration period_;
@@ -105,17 +114,16 @@ class V4l2Source final : public FrameSource, private CameraLight {
     waiting,  ///< open again, no frame yet
   };
 
-  void open_device();
   void settle(int exposure_us);
   void watch(int fd) const;
   void watch_camera();
-  void arm(Duration after, Duration every) const noexcept;
-  bool release_held() noexcept;
   ReadStatus drain(unsigned queued, Frame& frame) noexcept;
   ReadStatus deliver(const V4l2Buffer& newest, bool queue_was_full, Frame& frame) noexcept;
   ReadStatus lose(const char* why) noexcept;
   ReadStatus retry() noexcept;
-  Duration stall_after() const noexcept;
+  Duration stall_after() const noexcept {
+    return std::max<Duration>(5 * format_.period, std::chrono::milliseconds(500));
+  }
 
   V4l2Choice choice_;
   std::string path_;         ///< as the user named it

@@ -31,16 +31,11 @@ Eigen::Vector3d errors(Random& random, double sigma) {
   return {x, y, error(random, sigma)};
 }
 
-// Two unit vectors across a unit vector.
-struct Across {
-  explicit Across(const Eigen::Vector3d& along)
-      : first(along.unitOrthogonal()), second(along.cross(first)) {}
-  Eigen::Vector3d first, second;
-};
-
+// A unit vector turned about each of two axes across it.
 Eigen::Vector3d tilted(const Eigen::Vector3d& line, double first, double second) {
-  const Across across(line);
-  return (line + std::tan(first) * across.first + std::tan(second) * across.second).normalized();
+  const Eigen::Vector3d across = line.unitOrthogonal();
+  const Eigen::Vector3d other = line.cross(across);
+  return (line + std::tan(first) * across + std::tan(second) * other).normalized();
 }
 
 std::uint64_t whole(double value, double unit) {
@@ -55,16 +50,11 @@ BenchSettings effective(BenchSettings settings) {
   return settings;
 }
 
-constexpr double kFilterStep = 1e-3;             // s
-constexpr double kStepVariance = 1.0 / 12;       // of whole counts, counts^2 (uniform)
-constexpr double kMaxCounts = 32767;             // of a 16-bit reading
-constexpr std::uint64_t kFirstTick = 1'000'000;  // numbers of the seeds' streams
-constexpr std::uint64_t kScale = 1'000'001;
+constexpr double kFilterStep = 1e-3;         // s
+constexpr double kStepVariance = 1.0 / 12;   // of whole counts, counts^2 (uniform)
+constexpr double kMaxCounts = 32767;         // of a 16-bit reading
+constexpr std::uint64_t kScale = 1'000'001;  // numbers of the seeds' streams, as kFirstTick
 constexpr std::uint64_t kPlace = 1'000'002;
-
-double first_tick(std::uint64_t seed, Stream stream, double rate) {
-  return Random::numbered(seed, stream, kFirstTick).uniform() / rate;
-}
 
 double sign(const ReferenceFaults& faults) { return faults.wrong_sign ? -1 : 1; }
 
@@ -162,8 +152,6 @@ void Bench::move_about(const Vector6& amplitude, double seconds, double bandwidt
   done_ = action.end + action.ease_out;
 }
 
-void Bench::let_go() noexcept { begin_order(); }
-
 // Errors.
 
 double Bench::true_mass(double mass) const noexcept {
@@ -203,8 +191,6 @@ Eigen::Vector3d Bench::gravity(double time) const noexcept {
   const double angle = share * std::acos(cosine);
   return std::cos(angle) * turn.from + std::sin(angle) * across;
 }
-
-Eigen::Vector3d Bench::true_gravity() const noexcept { return gravity(newest_); }
 
 /// 0: not touched, 1: all of the load is there.
 double Bench::hands(const Action& action, double time) const noexcept {
@@ -311,10 +297,6 @@ double Bench::cell_force(double time) const noexcept {
   return sum;
 }
 
-const Bench::Felt& Bench::felt_at(std::uint64_t number) const noexcept {
-  return felt_[number % felt_.size()];
-}
-
 void Bench::remember(double time, const Vector6& wrench) noexcept {
   if (felt_count_ > 0 && time < felt_at(felt_count_ - 1).time + kFeltStep) return;
   felt_[felt_count_ % felt_.size()] = {time, wrench};
@@ -323,10 +305,6 @@ void Bench::remember(double time, const Vector6& wrench) noexcept {
 
 double Bench::oldest_felt() const noexcept {
   return felt_count_ <= felt_.size() ? -kNever : felt_at(felt_count_ - felt_.size()).time;
-}
-
-double Bench::newest_felt() const noexcept {
-  return felt_count_ == 0 ? 0 : felt_at(felt_count_ - 1).time;
 }
 
 Vector6 Bench::felt(double time) const noexcept {
@@ -344,21 +322,10 @@ Vector6 Bench::felt(double time) const noexcept {
   return a.wrench + (time - a.time) / (b.time - a.time) * (b.wrench - a.wrench);
 }
 
-ReferenceTicks::ReferenceTicks(double rate, double first, const ReferenceFaults& faults) noexcept
-    : period_(1 / rate), first_(first), time_(first), faults_(faults) {}
-
-double ReferenceTicks::stamp() const noexcept {
-  return time_ * (1 + 1e-6 * faults_.clock_ppm) + faults_.clock_offset;
-}
-
-bool ReferenceTicks::silent() const noexcept {
-  return time_ >= faults_.silent_from && time_ < faults_.silent_to;
-}
-
 SimulatedLoadCell::SimulatedLoadCell(const Bench& bench)
     : bench_(bench),
       settings_(bench.settings().load_cell),
-      ticks_(settings_.rate, first_tick(bench.seed(), kLoadCell, settings_.rate), settings_.faults),
+      ticks_(settings_.rate, bench.seed(), kLoadCell, settings_.faults),
       random_(bench.seed(), kLoadCell) {
   if (!settings_.ideal) {
     Random once = Random::numbered(bench.seed(), kLoadCell, kScale);
@@ -390,7 +357,7 @@ bool SimulatedLoadCell::next(SimulatedReading& reading) noexcept {
 SimulatedSixAxis::SimulatedSixAxis(const Bench& bench)
     : bench_(bench),
       settings_(bench.settings().six_axis),
-      ticks_(settings_.rate, first_tick(bench.seed(), kSixAxis, settings_.rate), settings_.faults),
+      ticks_(settings_.rate, bench.seed(), kSixAxis, settings_.faults),
       random_(bench.seed(), kSixAxis),
       delay_(std::max(0.0, settings_.lag - 0.5 / (std::numbers::pi * settings_.filter_hz))),
       origin_(settings_.origin) {

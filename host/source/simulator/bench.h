@@ -42,7 +42,7 @@ class Bench final : public AppliedLoad {
   /// origin at rest), up to `bandwidth` Hz.
   void move_about(const Vector6& amplitude, double seconds, double bandwidth = 1.0) noexcept;
   /// Takes off whatever hangs there, ends a push or a movement.
-  void let_go() noexcept;
+  void let_go() noexcept { begin_order(); }
 
   /// The person still has hands on it: the order is not begun, or the sensor is being turned, the
   /// mass hung, the push going on. A mass may swing afterwards.
@@ -53,7 +53,7 @@ class Bench final : public AppliedLoad {
   // The truth, for tests and benchmarks.
 
   /// Unit vector along which masses truly pull now, camera axes.
-  Eigen::Vector3d true_gravity() const noexcept;
+  Eigen::Vector3d true_gravity() const noexcept { return gravity(newest_); }
   /// What `mass` on the plan's list truly is, kg; and where a point truly is, but for the contact.
   double true_mass(double mass) const noexcept;
   Eigen::Vector3d true_point(const Eigen::Vector3d& point) const noexcept;
@@ -77,7 +77,9 @@ class Bench final : public AppliedLoad {
   /// at the nearer end.
   Vector6 felt(double time) const noexcept;
   double oldest_felt() const noexcept;  ///< minus infinity as long as nothing was forgotten
-  double newest_felt() const noexcept;
+  double newest_felt() const noexcept {
+    return felt_count_ == 0 ? 0 : felt_at(felt_count_ - 1).time;
+  }
 
   const BenchSettings& settings() const noexcept { return settings_; }
   std::uint64_t seed() const noexcept { return seed_; }
@@ -129,7 +131,7 @@ class Bench final : public AppliedLoad {
   Eigen::Vector3d string_pull(const Action& action, double time) const noexcept;
   Vector6 wrench_of(const Action& action, double time, const Vector6& displacement) const noexcept;
   void remember(double time, const Vector6& wrench) noexcept;
-  const Felt& felt_at(std::uint64_t number) const noexcept;
+  const Felt& felt_at(std::uint64_t number) const noexcept { return felt_[number % felt_.size()]; }
 
   BenchSettings settings_;
   std::uint64_t seed_;
@@ -161,13 +163,22 @@ struct SimulatedReading {
 /// Ticks of an instrument's own clock, and what is wrong with it.
 class ReferenceTicks {
  public:
-  ReferenceTicks(double rate, double first, const ReferenceFaults& faults) noexcept;
+  /// The first comes within a period of time 0, drawn from the instrument's `stream`.
+  ReferenceTicks(double rate, std::uint64_t seed, Stream stream,
+                 const ReferenceFaults& faults) noexcept
+      : period_(1 / rate),
+        first_(Random::numbered(seed, stream, kFirstTick).uniform() / rate),
+        time_(first_),
+        faults_(faults) {}
   double time() const noexcept { return time_; }  ///< of the next reading, s, true
-  double stamp() const noexcept;                  ///< what it says
-  bool silent() const noexcept;
+  double stamp() const noexcept {                 ///< what it says
+    return time_ * (1 + 1e-6 * faults_.clock_ppm) + faults_.clock_offset;
+  }
+  bool silent() const noexcept { return time_ >= faults_.silent_from && time_ < faults_.silent_to; }
   void advance() noexcept { time_ = first_ + static_cast<double>(++count_) * period_; }
 
  private:
+  static constexpr std::uint64_t kFirstTick = 1'000'000;  ///< number in the seed's stream
   double period_, first_, time_;
   std::uint64_t count_ = 0;
   ReferenceFaults faults_;

@@ -68,13 +68,12 @@ DisturbancePlayer::DisturbancePlayer(const Disturbances& disturbances, std::uint
   if (!std::isfinite(all_.random.start)) return;
   Random random(seed_, kDirt);
   for (int i = 0; i < tags * kRandomDirtPerTag; ++i) {
-    Dirt dirt;
-    dirt.tag = i / kRandomDirtPerTag;
-    dirt.specks = 1 + static_cast<int>(random.uniform(0, 6));
-    dirt.scratches = static_cast<int>(random.uniform(0, 3));
-    dirt.size = random.uniform(0.08e-3, 0.5e-3);
-    dirt.reflectance = random.uniform(0.1, 0.8);
-    dirt_.push_back(dirt);
+    dirt_.push_back({.when = {},
+                     .tag = i / kRandomDirtPerTag,
+                     .specks = 1 + static_cast<int>(random.uniform(0, 6)),
+                     .scratches = static_cast<int>(random.uniform(0, 3)),
+                     .size = random.uniform(0.08e-3, 0.5e-3),
+                     .reflectance = random.uniform(0.1, 0.8)});
   }
 }
 
@@ -92,23 +91,17 @@ Happening DisturbancePlayer::between(double from, double to) const noexcept {
     h.dirt.push({static_cast<std::size_t>(all_.dirt[i].tag), i});
     h.kinds |= bit(DisturbanceKind::dirt);
   }
-  if (to >= all_.random.start) {
-    // Nothing reaches over the end of a period, so the one at `to` is all that can be there.
-    const auto period = static_cast<std::uint64_t>((to - all_.random.start) / all_.random.every);
-    add_random(period, from, to, h);
-  }
-  return h;
-}
-
-void DisturbancePlayer::add_random(std::uint64_t period, double from, double to,
-                                   Happening& h) const noexcept {
+  if (to < all_.random.start) return h;
+  // Nothing reaches over the end of a period, so the one at `to` is all that can be there.
+  const auto period = static_cast<std::uint64_t>((to - all_.random.start) / all_.random.every);
   Random random = Random::numbered(seed_, kDisturbances, period);
   const double start = all_.random.start + static_cast<double>(period) * all_.random.every;
   const int next = Random::shuffled(seed_, kDisturbanceOrder, period, kEvents.size());
   add_one(kEvents[static_cast<std::size_t>(next)], random, start, from, to, h);
-  if (random.uniform() >= kSecondEvent) return;
+  if (random.uniform() >= kSecondEvent) return h;
   const double any = random.uniform(0, kEvents.size());
   add_one(kEvents[static_cast<std::size_t>(any)], random, start, from, to, h);
+  return h;
 }
 
 void DisturbancePlayer::add_one(Event event, Random& random, double period_start, double from,
@@ -129,7 +122,16 @@ void DisturbancePlayer::add_one(Event event, Random& random, double period_start
     case Event::cable:
     case Event::fingertip:
     case Event::hand: add(random_occluder(event, own, when.length), h.occluders); break;
-    case Event::glare: add(random_glare(own), h.glare); break;
+    case Event::glare:
+      add(Glare{.when = when,
+                .peak_counts = own.uniform(60, 800),
+                .sigma_px = image_scale_ * own.uniform(6, 70),
+                .aim_px = random_aim(own),
+                .wander_px = image_scale_ * own.uniform(0, 80),
+                .wander_hz = own.uniform(0.2, 3),
+                .fade = own.uniform() < 0.3 ? 0.0 : own.uniform(0.02, 0.2)},
+          h.glare);
+      break;
     case Event::light_step:  // down, or up to clipping
       add(LightChange{when, coin ? own.uniform(0.25, 0.85) : own.uniform(1.15, 2.0),
                       own.uniform() < 0.5 ? 0.0 : 0.2},
@@ -161,28 +163,24 @@ void DisturbancePlayer::add_one(Event event, Random& random, double period_start
 
 Occluder DisturbancePlayer::random_occluder(Event event, Random& random,
                                             double length) const noexcept {
+  // Width and softness, each from and to, px of an image 640 px wide.
+  constexpr double kSizes[4][4] = {{2, 8, 1, 4},         // hair
+                                   {15, 70, 2, 12},      // cable
+                                   {60, 300, 3, 25},     // fingertip
+                                   {500, 1500, 5, 40}};  // a hand over everything
+  const auto& [thin, wide, sharp, soft] = kSizes[static_cast<std::size_t>(event)];
   Occluder o;
+  o.shape = event == Event::fingertip ? OccluderShape::disc : OccluderShape::band;
   o.direction = random.uniform(0, kTau);
-  o.aim_px = image_scale_ * Eigen::Vector2d(random.uniform(-90, 90), random.uniform(-120, 120));
+  o.aim_px = random_aim(random);
   o.reflectance = random.uniform(0.02, 0.9);
   o.texture = random.uniform(0.0, 0.15);
   o.texture_wavelength_px = image_scale_ * random.uniform(8, 60);
+  o.width_px = image_scale_ * random.uniform(thin, wide);
+  o.softness_px = image_scale_ * random.uniform(sharp, soft);
   if (event == Event::hair) {  // falls onto the lens and lies, or creeps across
-    o.width_px = image_scale_ * random.uniform(2, 8);
-    o.softness_px = image_scale_ * random.uniform(1, 4);
     o.speed_px_per_s = random.uniform() < 0.5 ? 0.0 : image_scale_ * random.uniform(20, 150);
     return o;
-  }
-  if (event == Event::cable) {
-    o.width_px = image_scale_ * random.uniform(15, 70);
-    o.softness_px = image_scale_ * random.uniform(2, 12);
-  } else if (event == Event::fingertip) {
-    o.shape = OccluderShape::disc;
-    o.width_px = image_scale_ * random.uniform(60, 300);
-    o.softness_px = image_scale_ * random.uniform(3, 25);
-  } else {  // a hand over everything
-    o.width_px = image_scale_ * random.uniform(500, 1500);
-    o.softness_px = image_scale_ * random.uniform(5, 40);
   }
   // It comes from outside of the view and leaves it.
   const double across = image_scale_ * kReachAcross_px + o.width_px;
@@ -190,15 +188,8 @@ Occluder DisturbancePlayer::random_occluder(Event event, Random& random,
   return o;
 }
 
-Glare DisturbancePlayer::random_glare(Random& random) const noexcept {
-  Glare g;
-  g.peak_counts = random.uniform(60, 800);
-  g.sigma_px = image_scale_ * random.uniform(6, 70);
-  g.aim_px = image_scale_ * Eigen::Vector2d(random.uniform(-90, 90), random.uniform(-120, 120));
-  g.wander_px = image_scale_ * random.uniform(0, 80);
-  g.wander_hz = random.uniform(0.2, 3);
-  g.fade = random.uniform() < 0.3 ? 0.0 : random.uniform(0.02, 0.2);
-  return g;
+Eigen::Vector2d DisturbancePlayer::random_aim(Random& random) const noexcept {
+  return image_scale_ * Eigen::Vector2d(random.uniform(-90, 90), random.uniform(-120, 120));
 }
 
 bool DisturbancePlayer::frame_lost(std::uint64_t sequence) const noexcept {

@@ -93,29 +93,21 @@ class DisturbancePlayer {
   const std::vector<Dirt>& dirt() const noexcept { return dirt_; }
 
  private:
+  // clang-format off
   enum class Event : std::uint8_t {
-    hair,
-    cable,
-    fingertip,
-    hand,
-    glare,
-    light_step,
-    darkness,
-    flicker,
-    turning_light,
-    dirt,
-    focus,
+    hair, cable, fingertip, hand,
+    glare, light_step, darkness, flicker, turning_light, dirt, focus,
   };
+  // clang-format on
   static constexpr std::array<Event, 12> kEvents = {
       Event::hair,  Event::cable,      Event::fingertip, Event::hand,    Event::glare,
       Event::glare, Event::light_step, Event::darkness,  Event::flicker, Event::turning_light,
       Event::dirt,  Event::focus};  ///< of one round of random ones
 
-  void add_random(std::uint64_t period, double from, double to, Happening& h) const noexcept;
   void add_one(Event event, Random& random, double period_start, double from, double to,
                Happening& h) const noexcept;
   Occluder random_occluder(Event event, Random& random, double length) const noexcept;
-  Glare random_glare(Random& random) const noexcept;
+  Eigen::Vector2d random_aim(Random& random) const noexcept;
 
   Disturbances all_;
   std::uint64_t seed_;

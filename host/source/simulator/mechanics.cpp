@@ -36,12 +36,6 @@ Eigen::Vector2d distort(const std::array<double, 5>& k, const Eigen::Vector2d& r
 
 constexpr double kMaxGap = 2.0;  // s
 
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 Matrix6 symmetric_function(const Matrix6& m, double (*f)(double)) {
   const EigenSystem<6> eigen = symmetric_eigen(m);
   const Vector6 values = eigen.values.unaryExpr(f);
@@ -209,7 +203,7 @@ Vector6 PlatformMotion::acceleration(const State& state, const Vector6& load) co
 
 /// Creep goes on and sliders are dragged along, by one step.
 void PlatformMotion::relax() noexcept {
-  const Vector6& now = ring_[static_cast<std::size_t>(newest_) % ring_.size()].displacement;
+  const Vector6& now = state_at(newest_).displacement;
   if (mechanics_.creep_share > 0)
     crept_ += kStep / mechanics_.creep_time * (mechanics_.creep_share * (now - crept_) - crept_);
   if (mechanics_.friction > 0)
@@ -218,8 +212,8 @@ void PlatformMotion::relax() noexcept {
 
 void PlatformMotion::step() noexcept {
   // Classical Runge-Kutta of fourth order.
-  const double time = start_time_ + static_cast<double>(newest_) * kStep;
-  const State& s = ring_[static_cast<std::size_t>(newest_) % ring_.size()];
+  const double time = newest_time();
+  const State& s = state_at(newest_);
   const Vector6 early = load_;
   const auto moved = [&s](const Vector6& rate, const Vector6& accel, double dt) {
     return State{s.displacement + dt * rate, s.rate + dt * accel};
@@ -237,8 +231,7 @@ void PlatformMotion::step() noexcept {
   const State next =
       moved((v1 + 2 * s2.rate + 2 * s3.rate + s4.rate) / 6, (a1 + 2 * a2 + 2 * a3 + a4) / 6, kStep);
   load_ = late;
-  ++newest_;
-  ring_[static_cast<std::size_t>(newest_) % ring_.size()] = next;
+  state_at(++newest_) = next;
   oldest_ = std::max(oldest_, newest_ - static_cast<long long>(ring_.size()) + 1);
   relax();
 }
@@ -246,7 +239,7 @@ void PlatformMotion::step() noexcept {
 void PlatformMotion::restart(double time) noexcept {
   newest_ = static_cast<long long>((time - start_time_) / kStep);
   oldest_ = newest_;
-  const double instant = start_time_ + static_cast<double>(newest_) * kStep;
+  const double instant = newest_time();
   const Ldlt<6> springs(stiffness_);
   Vector6 displacement = springs.solve(load_at(instant, Vector6::Zero()));
   if (applied_) displacement = springs.solve(load_at(instant, displacement));
@@ -254,13 +247,12 @@ void PlatformMotion::restart(double time) noexcept {
   crept_ = mechanics_.creep_share * displacement;
   displacement += crept_;
   slider_ = displacement;
-  ring_[static_cast<std::size_t>(newest_) % ring_.size()] = {displacement, Vector6::Zero()};
+  state_at(newest_) = {displacement, Vector6::Zero()};
 }
 
 void PlatformMotion::advance_to(double time) noexcept {
-  const double last = start_time_ + static_cast<double>(newest_) * kStep;
-  if (time - last > kMaxGap) restart(time - kMaxGap);
-  while (start_time_ + static_cast<double>(newest_) * kStep < time) step();
+  if (time - newest_time() > kMaxGap) restart(time - kMaxGap);
+  while (newest_time() < time) step();
 }
 
 State PlatformMotion::at(double time) const noexcept {
@@ -274,11 +266,9 @@ State PlatformMotion::at(double time) const noexcept {
   const double u = position - static_cast<double>(low);
   const double u2 = u * u;
   const double u3 = u2 * u;
-  State state;
-  state.displacement = (2 * u3 - 3 * u2 + 1) * a.displacement + (3 * u2 - 2 * u3) * b.displacement +
-                       kStep * ((u3 - 2 * u2 + u) * a.rate + (u3 - u2) * b.rate);
-  state.rate = (1 - u) * a.rate + u * b.rate;
-  return state;
+  return {(2 * u3 - 3 * u2 + 1) * a.displacement + (3 * u2 - 2 * u3) * b.displacement +
+              kStep * ((u3 - 2 * u2 + u) * a.rate + (u3 - u2) * b.rate),
+          (1 - u) * a.rate + u * b.rate};
 }
 
 Vector6 PlatformMotion::seen(double time) const noexcept {
@@ -288,11 +278,6 @@ Vector6 PlatformMotion::seen(double time) const noexcept {
 
 Vector6 PlatformMotion::applied_wrench(double time) const noexcept {
   return applied_ ? applied_->wrench(time, at(time).displacement) : player_.applied_wrench(time);
-}
-
-void PlatformMotion::set_state(const State& state) noexcept {
-  oldest_ = newest_;
-  ring_[static_cast<std::size_t>(newest_) % ring_.size()] = state;
 }
 
 }  // namespace tagwrench::sim

@@ -22,11 +22,16 @@ namespace tagwrench::sim {
 // Rotations and poses of the simulator, its own so that no error here can cancel one in the
 // tracker.
 
+inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
 /// Rodrigues' formula: the rotation by |r| about r.
 inline Eigen::Matrix3d rotation_matrix(const Eigen::Vector3d& r) {
   const double angle = r.norm();
-  Eigen::Matrix3d cross;
-  cross << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
+  const Eigen::Matrix3d cross = cross_matrix(r);
   const double a = angle < 1e-6 ? 1.0 : std::sin(angle) / angle;
   const double half_sine = angle < 1e-6 ? 0.5 * angle : std::sin(0.5 * angle);
   const double b = angle < 1e-6 ? 0.5 : 2.0 * half_sine * half_sine / (angle * angle);
@@ -138,7 +143,10 @@ class PlatformMotion {
   /// What the user applies there.
   Vector6 applied_wrench(double time) const noexcept;
 
-  void set_state(const State& state) noexcept;
+  void set_state(const State& state) noexcept {
+    oldest_ = newest_;
+    state_at(newest_) = state;
+  }
   const Matrix6& stiffness_matrix() const noexcept { return stiffness_; }
 
  private:
@@ -147,6 +155,10 @@ class PlatformMotion {
   void relax() noexcept;
   void step() noexcept;
   void restart(double time) noexcept;
+  double newest_time() const noexcept { return start_time_ + static_cast<double>(newest_) * kStep; }
+  State& state_at(long long step) noexcept {
+    return ring_[static_cast<std::size_t>(step) % ring_.size()];
+  }
 
   Mechanics mechanics_;
   TrajectoryPlayer player_;

@@ -157,63 +157,6 @@ std::vector<float> blurred_columns(const std::vector<float>& from, int width,
   return out;
 }
 
-}  // namespace
-
-bool family_exists(const std::string& family) {
-  return family == kGrid || find_family(family) != nullptr;
-}
-
-int family_size(const std::string& family) {
-  if (family == kGrid) return kGridIds;
-  const Family* found = find_family(family);
-  return found == nullptr ? 0 : cv::aruco::getPredefinedDictionary(found->second)->bytesList.rows;
-}
-
-TagCells tag_cells(const std::string& family, int id) {
-  if (family == kGrid)
-    return framed(kGridCells, [id](int row, int column) { return grid_is_white(id, row, column); });
-  const auto dictionary = cv::aruco::getPredefinedDictionary(find_family(family)->second);
-  const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
-      dictionary->bytesList.rowRange(id, id + 1), dictionary->markerSize);
-  return framed(bits.cols,
-                [&bits](int row, int column) { return bits.at<std::uint8_t>(row, column) != 0; });
-}
-
-Texture print_tag(const Target& target, const TagCells& cells, double texels_per_m,
-                  std::uint64_t seed) {
-  const double half_paper = 0.5 * target.tag_size + target.border;
-  const double half = half_paper + kMaxRaggedness * target.paper_raggedness;
-  Texture t = Texture::of_size(half, half, texels_per_m);
-  Random random(seed, kPrint);
-  const SmoothNoise ink_x(random, kInkEdgeSize), ink_y(random, kInkEdgeSize);
-  const SmoothNoise cut_x(random, kCutSize), cut_y(random, kCutSize);
-  const SmoothNoise grain(random, kInkGrainSize);
-  const InkCoverage ink(cells, target.tag_size, target.ink_spread);
-  const double h = 0.5 / texels_per_m;
-  const double limit = kMaxRaggedness * target.paper_raggedness;
-  for (int v = 0; v < t.height; ++v) {
-    for (int u = 0; u < t.width; ++u) {
-      const double x = t.x(u);
-      const double y = t.y(v);
-      const double cx = x + std::clamp(target.paper_raggedness * cut_x(x, y), -limit, limit);
-      const double cy = y + std::clamp(target.paper_raggedness * cut_y(x, y), -limit, limit);
-      const double paper = overlap(cx - h, cx + h, -half_paper, half_paper) *
-                           overlap(cy - h, cy + h, -half_paper, half_paper) / (4 * h * h);
-      const double ix = x + target.ink_edge_roughness * ink_x(x, y);
-      const double iy = y + target.ink_edge_roughness * ink_y(x, y);
-      const double black = ink(ix - h, ix + h, iy - h, iy + h);
-      const double clean =
-          target.paper_reflectance + black * (target.ink_reflectance - target.paper_reflectance);
-      const double reflectance = std::clamp(clean + target.ink_grain * grain(x, y), 0.0, 1.0);
-      t.texels[t.index(u, v)] = {.reflectance = static_cast<float>(paper * reflectance),
-                                 .coverage = static_cast<float>(paper)};
-    }
-  }
-  return t;
-}
-
-namespace {
-
 constexpr double kDirtEdge = 0.03e-3;      // m, softness of the outline
 constexpr double kScratchWidth = 1 / 6.0;  // of Dirt::size
 
@@ -232,46 +175,15 @@ struct Mark {
 };
 
 void draw(Texture& t, const Mark& mark, double reflectance) {
-  for (int v = 0; v < t.height; ++v) {
-    for (int u = 0; u < t.width; ++u) {
-      const double share = std::clamp(0.5 - mark.distance(t.x(u), t.y(v)) / kDirtEdge, 0.0, 1.0);
-      if (share <= 0) continue;
-      // Texels hold reflectance times coverage; dirt lies on paper alone.
-      Texel& texel = t.texels[t.index(u, v)];
-      const double paper = texel.coverage;
-      texel.reflectance =
-          static_cast<float>(texel.reflectance + share * (reflectance * paper - texel.reflectance));
-    }
-  }
+  t.each([&](double x, double y, Texel& texel) {
+    const double share = std::clamp(0.5 - mark.distance(x, y) / kDirtEdge, 0.0, 1.0);
+    if (share <= 0) return;
+    // Texels hold reflectance times coverage; dirt lies on paper alone.
+    const double paper = texel.coverage;
+    texel.reflectance =
+        static_cast<float>(texel.reflectance + share * (reflectance * paper - texel.reflectance));
+  });
 }
-
-}  // namespace
-
-Texture with_dirt(const Texture& clean, const Dirt& dirt, double tag_size, std::uint64_t seed,
-                  std::uint64_t number) {
-  Texture t = clean;
-  Random random = Random::numbered(seed, kDirt, number);
-  const double half = 0.5 * tag_size;
-  const auto anywhere = [&] { return random.uniform(-half, half); };
-  for (int i = 0; i < dirt.specks; ++i) {
-    const double x = anywhere();
-    const double y = anywhere();
-    draw(t, {x, y, x, y, 0.5 * dirt.size * random.uniform(0.4, 1.0)}, dirt.reflectance);
-  }
-  for (int i = 0; i < dirt.scratches; ++i) {
-    const double x = anywhere();
-    const double y = anywhere();
-    const double angle = random.uniform(0, 2 * std::numbers::pi);
-    const double length = random.uniform(0.2, 1.0) * half;
-    draw(t,
-         {x, y, x + length * std::cos(angle), y + length * std::sin(angle),
-          0.5 * kScratchWidth * dirt.size},
-         dirt.reflectance);
-  }
-  return t;
-}
-
-namespace {
 
 constexpr double kTau = 2 * std::numbers::pi;
 constexpr double kPlateReflectance = 0.43;
@@ -317,6 +229,78 @@ double draw_screw(double below, double x, double y, double screw_x) {
 
 }  // namespace
 
+bool family_exists(const std::string& family) {
+  return family == kGrid || find_family(family) != nullptr;
+}
+
+int family_size(const std::string& family) {
+  if (family == kGrid) return kGridIds;
+  const Family* found = find_family(family);
+  return found == nullptr ? 0 : cv::aruco::getPredefinedDictionary(found->second)->bytesList.rows;
+}
+
+TagCells tag_cells(const std::string& family, int id) {
+  if (family == kGrid)
+    return framed(kGridCells, [id](int row, int column) { return grid_is_white(id, row, column); });
+  const auto dictionary = cv::aruco::getPredefinedDictionary(find_family(family)->second);
+  const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
+      dictionary->bytesList.rowRange(id, id + 1), dictionary->markerSize);
+  return framed(bits.cols,
+                [&bits](int row, int column) { return bits.at<std::uint8_t>(row, column) != 0; });
+}
+
+Texture print_tag(const Target& target, const TagCells& cells, double texels_per_m,
+                  std::uint64_t seed) {
+  const double half_paper = 0.5 * target.tag_size + target.border;
+  const double half = half_paper + kMaxRaggedness * target.paper_raggedness;
+  Texture t = Texture::of_size(half, half, texels_per_m);
+  Random random(seed, kPrint);
+  const SmoothNoise ink_x(random, kInkEdgeSize), ink_y(random, kInkEdgeSize);
+  const SmoothNoise cut_x(random, kCutSize), cut_y(random, kCutSize);
+  const SmoothNoise grain(random, kInkGrainSize);
+  const InkCoverage ink(cells, target.tag_size, target.ink_spread);
+  const double h = 0.5 / texels_per_m;
+  const double limit = kMaxRaggedness * target.paper_raggedness;
+  t.each([&](double x, double y, Texel& texel) {
+    const double cx = x + std::clamp(target.paper_raggedness * cut_x(x, y), -limit, limit);
+    const double cy = y + std::clamp(target.paper_raggedness * cut_y(x, y), -limit, limit);
+    const double paper = overlap(cx - h, cx + h, -half_paper, half_paper) *
+                         overlap(cy - h, cy + h, -half_paper, half_paper) / (4 * h * h);
+    const double ix = x + target.ink_edge_roughness * ink_x(x, y);
+    const double iy = y + target.ink_edge_roughness * ink_y(x, y);
+    const double black = ink(ix - h, ix + h, iy - h, iy + h);
+    const double clean =
+        target.paper_reflectance + black * (target.ink_reflectance - target.paper_reflectance);
+    const double reflectance = std::clamp(clean + target.ink_grain * grain(x, y), 0.0, 1.0);
+    texel = {static_cast<float>(paper * reflectance), static_cast<float>(paper)};
+  });
+  return t;
+}
+
+Texture with_dirt(const Texture& clean, const Dirt& dirt, double tag_size, std::uint64_t seed,
+                  std::uint64_t number) {
+  Texture t = clean;
+  Random random = Random::numbered(seed, kDirt, number);
+  const double half = 0.5 * tag_size;
+  const auto anywhere = [&] { return random.uniform(-half, half); };
+  for (int i = 0; i < dirt.specks; ++i) {
+    const double x = anywhere();
+    const double y = anywhere();
+    draw(t, {x, y, x, y, 0.5 * dirt.size * random.uniform(0.4, 1.0)}, dirt.reflectance);
+  }
+  for (int i = 0; i < dirt.scratches; ++i) {
+    const double x = anywhere();
+    const double y = anywhere();
+    const double angle = random.uniform(0, 2 * std::numbers::pi);
+    const double length = random.uniform(0.2, 1.0) * half;
+    draw(t,
+         {x, y, x + length * std::cos(angle), y + length * std::sin(angle),
+          0.5 * kScratchWidth * dirt.size},
+         dirt.reflectance);
+  }
+  return t;
+}
+
 Texture print_plate(const Mechanics& mechanics, double half_x, double half_y, double texels_per_m,
                     std::uint64_t seed) {
   Texture t = Texture::of_size(half_x, half_y, texels_per_m);
@@ -324,22 +308,17 @@ Texture print_plate(const Mechanics& mechanics, double half_x, double half_y, do
   const SmoothNoise stains(random, 1.3e-3), scratches(random, 0.12e-3), grain(random, 0.04e-3);
   const double sx = mechanics.spring_half_spacing_x;
   const double sy = mechanics.spring_half_spacing_y;
-  for (int v = 0; v < t.height; ++v) {
-    for (int u = 0; u < t.width; ++u) {
-      const double x = t.x(u);
-      const double y = t.y(v);
-      const double diagonal = (x - y) / std::numbers::sqrt2 + 0.05e-3 * stains(x, y);
-      const double lines = 0.035 * std::sin(kTau * diagonal / kFilamentWidth);
-      const double gouge = 0.05 * std::max(scratches(0.4 * (x - y), 1.6 * (x + y)) - 1.2, 0.0);
-      double shade = kPlateReflectance + lines + gouge + 0.025 * stains(y, x) + 0.012 * grain(x, y);
-      shade = draw_screw(shade, x, y, -kScrewX);
-      shade = draw_screw(shade, x, y, kScrewX);
-      for (const double side_x : {-sx, sx})
-        for (const double side_y : {-sy, sy}) shade = draw_spring(shade, x, y, side_x, side_y);
-      t.texels[t.index(u, v)] = {.reflectance = static_cast<float>(std::clamp(shade, 0.02, 1.0)),
-                                 .coverage = 1};
-    }
-  }
+  t.each([&](double x, double y, Texel& texel) {
+    const double diagonal = (x - y) / std::numbers::sqrt2 + 0.05e-3 * stains(x, y);
+    const double lines = 0.035 * std::sin(kTau * diagonal / kFilamentWidth);
+    const double gouge = 0.05 * std::max(scratches(0.4 * (x - y), 1.6 * (x + y)) - 1.2, 0.0);
+    double shade = kPlateReflectance + lines + gouge + 0.025 * stains(y, x) + 0.012 * grain(x, y);
+    shade = draw_screw(shade, x, y, -kScrewX);
+    shade = draw_screw(shade, x, y, kScrewX);
+    for (const double side_x : {-sx, sx})
+      for (const double side_y : {-sy, sy}) shade = draw_spring(shade, x, y, side_x, side_y);
+    texel = {static_cast<float>(std::clamp(shade, 0.02, 1.0)), 1};
+  });
   return t;
 }
 
@@ -349,18 +328,12 @@ Texture print_pad(double half_paper, double margin, double texels_per_m, std::ui
   Texture t = Texture::of_size(half_x, half_y, texels_per_m);
   Random random(seed, kPlate + 1);
   const SmoothNoise glue(random, 0.5e-3), grain(random, 0.06e-3);
-  for (int v = 0; v < t.height; ++v) {
-    for (int u = 0; u < t.width; ++u) {
-      const double x = t.x(u);
-      const double y = t.y(v);
-      const double cover = inside(std::abs(x) - half_x) * inside(std::abs(y) - half_y);
-      const double lines = 0.03 * std::sin(kTau * x / 0.21e-3);
-      const double shade = kPadReflectance + lines + 0.04 * glue(x, y) + 0.01 * grain(x, y);
-      t.texels[t.index(u, v)] = {
-          .reflectance = static_cast<float>(cover * std::clamp(shade, 0.0, 1.0)),
-          .coverage = static_cast<float>(cover)};
-    }
-  }
+  t.each([&](double x, double y, Texel& texel) {
+    const double cover = inside(std::abs(x) - half_x) * inside(std::abs(y) - half_y);
+    const double lines = 0.03 * std::sin(kTau * x / 0.21e-3);
+    const double shade = kPadReflectance + lines + 0.04 * glue(x, y) + 0.01 * grain(x, y);
+    texel = {static_cast<float>(cover * std::clamp(shade, 0.0, 1.0)), static_cast<float>(cover)};
+  });
   return t;
 }
 

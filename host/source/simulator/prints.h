@@ -37,8 +37,12 @@ struct Texture {
     return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(u);
   }
-  double x(int u) const { return (u - centre_u) / texels_per_m; }
-  double y(int v) const { return (v - centre_v) / texels_per_m; }
+  /// Visits every texel with the place that it shows: visit(x, y, texel), m.
+  void each(const auto& visit) {
+    for (int v = 0; v < height; ++v)
+      for (int u = 0; u < width; ++u)
+        visit((u - centre_u) / texels_per_m, (v - centre_v) / texels_per_m, texels[index(u, v)]);
+  }
 };
 
 /// The texture after a Gaussian of this width (in texels), enlarged so that nothing is cut off.

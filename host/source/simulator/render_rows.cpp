@@ -114,7 +114,6 @@ void Renderer::add_samples(const Texture& t, const TexelFromRay& h, int count, i
 
 void Renderer::draw_coarse(const View& view, int row) noexcept {
   const int count = view.right - view.left;
-  if (count <= 0) return;
   std::copy_n(rays_.x(row) + view.left, count, scratch_.x.begin());
   std::copy_n(rays_.y(row) + view.left, count, scratch_.y.begin());
   std::fill_n(scratch_.sum.begin(), count, Texel{});
@@ -124,7 +123,6 @@ void Renderer::draw_coarse(const View& view, int row) noexcept {
 
 void Renderer::draw_fine(const View& view, int row) noexcept {
   const int count = view.right - view.left;
-  if (count <= 0) return;
   std::fill_n(scratch_.sum.begin(), count, Texel{});
   const float* x = rays_.x(row) + view.left;
   const float* y = rays_.y(row) + view.left;
@@ -162,7 +160,6 @@ void Renderer::draw_fine(const View& view, int row) noexcept {
 
 void Renderer::draw_even(const View& view, int row) noexcept {
   const int count = view.right - view.left;
-  if (count <= 0) return;
   std::fill_n(scratch_.sum.begin(), count, Texel{});
   const float* x = rays_.x(row) + view.left;
   const float* y = rays_.y(row) + view.left;
@@ -249,17 +246,6 @@ void Renderer::expose_row(int row, double time, Random& random, std::uint8_t* pi
       out[width - 1 - i] = static_cast<std::uint8_t>(light[i]);
   else
     for (std::size_t i = 0; i < width; ++i) out[i] = static_cast<std::uint8_t>(light[i]);
-}
-
-// px from the image centre.
-Eigen::Vector2d Renderer::from_centre(double column, double row) const noexcept {
-  return {column - 0.5 * (camera_.width_px - 1), row - 0.5 * (camera_.height_px - 1)};
-}
-
-void Renderer::draw_occluders(double middle_time) noexcept {
-  for (const Going<Occluder>& occluder : happening_.occluders)
-    for (int row = 0; row < camera_.height_px; ++row)
-      draw_occluder_row(occluder, row, row_time(row, middle_time));
 }
 
 // The same shape as covered().

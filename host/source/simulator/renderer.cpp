@@ -1,6 +1,6 @@
 #include "host/source/simulator/renderer.h"
 
-#include <Eigen/LU>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -21,11 +21,12 @@ constexpr int kMaxEvenInstants = 32;
 constexpr double kLightSlant = 0.35;   // of the LED's direction against the optical axis
 constexpr double kNearest = 1e-3;      // m, nothing is drawn nearer to the lens
 constexpr double kTexelsPerPixel = 2;  // of the tags, at rest
-// A lens blurs before the sensor samples. So much of the blur is given to the tags' textures; what
-// is left, which changes with focus, to the picture. Were it all in the picture, the sampled edges
-// would depend on their place in the pixel: 0.1 grey level, but alike along the whole of an edge,
-// which in alignment is worth 0.17 um in z.
-constexpr double kMaxBeforeSampling_px = 0.6;
+
+/// A lens blurs before the sensor samples. So much of the blur (standard deviation, px) is given to
+/// the tags' textures; what is left, which changes with focus, to the picture. Were it all in the
+/// picture, the sampled edges would depend on their place in the pixel: 0.1 grey level, but alike
+/// along the whole of an edge, which in alignment is worth 0.17 um in z.
+double before_sampling_px(const Optics& optics) { return std::min(optics.psf_sigma_px, 0.6); }
 
 std::size_t pixel_count(const Camera& camera) {
   return static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
@@ -95,7 +96,7 @@ void Renderer::build_layers(const Scenario& scenario) {
     const Texture print =
         print_tag(target_, tag_cells(target_.family, tags_[i].id), kTexelsPerPixel * texels_per_m,
                   seed_ + static_cast<std::uint64_t>(tags_[i].id));
-    paper.texture = softened(print, kTexelsPerPixel * before_sampling_px());
+    paper.texture = softened(print, kTexelsPerPixel * before_sampling_px(optics_));
     paper.fine = true;
     paper.tag = i;
     layers_.push_back(std::move(paper));
@@ -141,10 +142,6 @@ void Renderer::build_light() {
   }
 }
 
-double Renderer::half_window() const noexcept {
-  return 0.5 * (exposure_.time + exposure_.rolling_readout);
-}
-
 void Renderer::render(const PlatformMotion& motion, double middle_time, std::uint64_t sequence,
                       std::uint8_t* pixels) noexcept {
   happening_ = disturbances_.between(middle_time - half_window(), middle_time + half_window());
@@ -155,17 +152,20 @@ void Renderer::render(const PlatformMotion& motion, double middle_time, std::uin
     for (int row = first; row < last; ++row) {
       draw_opaque(views_.front(), row);
       for (std::size_t i = 1; i < layers_.size(); ++i) {
-        if (row < views_[i].top || row >= views_[i].bottom) continue;
+        const View& view = views_[i];
+        if (row < view.top || row >= view.bottom || view.left >= view.right) continue;
         if (!layers_[i].fine)
-          draw_coarse(views_[i], row);
+          draw_coarse(view, row);
         else if (exposure_.even)
-          draw_even(views_[i], row);
+          draw_even(view, row);
         else
-          draw_fine(views_[i], row);
+          draw_fine(view, row);
       }
     }
   }
-  draw_occluders(middle_time);
+  for (const Going<Occluder>& occluder : happening_.occluders)
+    for (int row = 0; row < camera_.height_px; ++row)
+      draw_occluder_row(occluder, row, row_time(row, middle_time));
   const auto pose_at = [&](double time) { return platform_pose(target_, motion.seen(time)); };
   middle_pose_ = pose_at(middle_time);
   smear_px_ = farthest_px(pose_at(middle_time - 0.5 * exposure_.time),
@@ -185,11 +185,6 @@ double Renderer::row_time(double row, double middle_time) const noexcept {
   return middle_time + (row - middle_row) / camera_.height_px * exposure_.rolling_readout;
 }
 
-void Renderer::set_exposure(double exposure, double gain) noexcept {
-  exposure_.time = exposure;
-  sensor_gain_ = gain;
-}
-
 /// What LED, exposure and gain make of each row's brightness.
 void Renderer::expose_rows(double middle_time) noexcept {
   const double longer = nominal_exposure_ > 0 ? exposure_.time / nominal_exposure_ : 1.0;
@@ -207,13 +202,6 @@ void Renderer::expose_rows(double middle_time) noexcept {
       brightness = scale * (light_.room + lit / light_.led_level);
     }
   }
-}
-
-const Texture& Renderer::seen(const Layer& layer) const noexcept {
-  if (!layer.fine) return layer.texture;
-  for (const DirtShown& shown : happening_.dirt)
-    if (shown.tag == layer.tag) return dirty_[shown.dirt];
-  return layer.texture;
 }
 
 void Renderer::view_band(const PlatformMotion& motion, double middle_time, int first_row,
@@ -258,10 +246,13 @@ double Renderer::farthest_px(const RigidPose& first, const RigidPose& last) cons
 }
 
 void Renderer::view_layer(const Layer& layer, View& view) noexcept {
-  view.texture = &seen(layer);
+  const auto* dirt = std::find_if(happening_.dirt.begin(), happening_.dirt.end(),
+                                  [&](const DirtShown& d) { return d.tag == layer.tag; });
+  const bool clean = !layer.fine || dirt == happening_.dirt.end();
+  view.texture = clean ? &layer.texture : &dirty_[dirt->dirt];
   view.instant_count = layer.fine ? instant_count_ : 1;
   view.shade = shade(layer, middle_pose_);
-  double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
+  Eigen::AlignedBox2d seen;
   for (int i = 0; i < view.instant_count; ++i) {
     const RigidPose& pose = layer.fine ? poses_[static_cast<std::size_t>(i)] : middle_pose_;
     view.instants[static_cast<std::size_t>(i)] = texel_from_ray(layer, pose);
@@ -271,11 +262,7 @@ void Renderer::view_layer(const Layer& layer, View& view) noexcept {
             pose *
             (layer.platform_T_plane * Eigen::Vector3d(sx * layer.half_x, sy * layer.half_y, 0));
         if (point.z() < kNearest) continue;
-        const Eigen::Vector2d pixel = project(camera_, point.head<2>() / point.z());
-        left = std::min(left, pixel.x());
-        right = std::max(right, pixel.x());
-        top = std::min(top, pixel.y());
-        bottom = std::max(bottom, pixel.y());
+        seen.extend(project(camera_, point.head<2>() / point.z()));
       }
     }
   }
@@ -283,10 +270,10 @@ void Renderer::view_layer(const Layer& layer, View& view) noexcept {
     return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(high)));
   };
   // Straight edges bend by a pixel or two between the corners.
-  view.left = limit(std::floor(left) - 3, camera_.width_px);
-  view.right = limit(std::ceil(right) + 4, camera_.width_px);
-  view.top = limit(std::floor(top) - 3, camera_.height_px);
-  view.bottom = limit(std::ceil(bottom) + 4, camera_.height_px);
+  view.left = limit(std::floor(seen.min().x()) - 3, camera_.width_px);
+  view.right = limit(std::ceil(seen.max().x()) + 4, camera_.width_px);
+  view.top = limit(std::floor(seen.min().y()) - 3, camera_.height_px);
+  view.bottom = limit(std::ceil(seen.max().y()) + 4, camera_.height_px);
 }
 
 // Diffuse light plus a lamp from the side: a surface that turns towards the lamp gets brighter.
@@ -338,13 +325,8 @@ double Renderer::depth_at_row(int row) const noexcept {
                     2.0 * target_.rest_position.z());
 }
 
-// Standard deviation of the part of the point spread that the tags' textures have.
-double Renderer::before_sampling_px() const noexcept {
-  return std::min(optics_.psf_sigma_px, kMaxBeforeSampling_px);
-}
-
 void Renderer::choose_point_spread(double focus_distance) noexcept {
-  const double before = before_sampling_px();
+  const double before = before_sampling_px(optics_);
   const double in_focus = std::sqrt(optics_.psf_sigma_px * optics_.psf_sigma_px - before * before);
   for (int row = 0; row < camera_.height_px; ++row) {
     const double defocus = optics_.defocus_px_per_m * (depth_at_row(row) - focus_distance);

@@ -24,13 +24,16 @@ class Renderer {
   explicit Renderer(const Scenario& scenario);
 
   /// Seconds before and after the middle of a frame in which its picture is exposed.
-  double half_window() const noexcept;
+  double half_window() const noexcept { return 0.5 * (exposure_.time + exposure_.rolling_readout); }
 
   /// Lights the scene by an LED from outside, borrowed; nullptr: by the scenario's even light.
   void set_led(LedLight* led) noexcept { led_ = led; }
 
   /// Of the next frames; the picture's brightness goes with both, its noise as a sensor's does.
-  void set_exposure(double exposure, double gain) noexcept;
+  void set_exposure(double exposure, double gain) noexcept {
+    exposure_.time = exposure;
+    sensor_gain_ = gain;
+  }
   double exposure() const noexcept { return exposure_.time; }
   double sensor_gain() const noexcept { return sensor_gain_; }
 
@@ -88,7 +91,6 @@ class Renderer {
   void view_band(const PlatformMotion& motion, double middle_time, int first_row,
                  int last_row) noexcept;
   void view_layer(const Layer& layer, View& view) noexcept;
-  const Texture& seen(const Layer& layer) const noexcept;
   double row_time(double row, double middle_time) const noexcept;
   void expose_rows(double middle_time) noexcept;
   double farthest_px(const RigidPose& first, const RigidPose& last) const noexcept;
@@ -106,13 +108,14 @@ class Renderer {
                    int stride) noexcept;
   void composite(const View& view, int row, float weight) noexcept;
 
-  void draw_occluders(double middle_time) noexcept;
   void draw_occluder_row(const Going<Occluder>& occluder, int row, double time) noexcept;
   void judge_visibility(double middle_time) noexcept;
   double contrast_at(const Eigen::Vector2d& pixel, double middle_time) const noexcept;
-  Eigen::Vector2d from_centre(double column, double row) const noexcept;
+  /// px from the image centre.
+  Eigen::Vector2d from_centre(double column, double row) const noexcept {
+    return {column - 0.5 * (camera_.width_px - 1), row - 0.5 * (camera_.height_px - 1)};
+  }
 
-  double before_sampling_px() const noexcept;
   void choose_point_spread(double focus_distance) noexcept;
   double depth_at_row(int row) const noexcept;
   void blur_rows() noexcept;

@@ -36,7 +36,7 @@ struct Field {
   };
 
   Field(const char* name, double& value, double lowest, double highest, double its_unit = 1)
-      : key(name), setting(&value), low(lowest), high(highest), unit(its_unit) {}
+      : key(name), setting(std::span(&value, 1)), low(lowest), high(highest), unit(its_unit) {}
   template <typename Vector>
   requires requires(Vector& list) { list.data(); }
   Field(const char* name, Vector& list, double lowest, double highest, double its_unit = 1)
@@ -55,17 +55,16 @@ struct Field {
                                   }}) {}
 
   const char* key;
-  std::variant<double*, std::span<double>, int*, bool*, Choice> setting;
+  std::variant<std::span<double>, int*, bool*, Choice> setting;
   double low = -kMost, high = kMost, unit = 1;
 };
 using Fields = std::vector<Field>;
 
 void read(YamlReader& reader, const Field& field) {
   if (!reader.has(field.key)) return;
-  if (auto* number = std::get_if<double*>(&field.setting)) {
-    **number = field.unit * reader.number(field.key);
-  } else if (auto* list = std::get_if<std::span<double>>(&field.setting)) {
-    const std::vector<double> numbers = reader.numbers(field.key, list->size());
+  if (auto* list = std::get_if<std::span<double>>(&field.setting)) {
+    const std::vector<double> numbers = list->size() == 1 ? std::vector{reader.number(field.key)}
+                                                          : reader.numbers(field.key, list->size());
     std::ranges::transform(numbers, list->begin(), [&](double v) { return field.unit * v; });
   } else if (auto* whole = std::get_if<int*>(&field.setting)) {
     **whole = reader.integer(field.key, static_cast<int>(field.low), static_cast<int>(field.high));
@@ -77,12 +76,12 @@ void read(YamlReader& reader, const Field& field) {
 }
 
 /// The mapping at `key`, if it is there: its fields, and what `rest` reads beside them.
-template <typename Rest>
-void read_section(YamlReader& reader, const char* key, const Fields& fields, Rest rest) {
+void read_section(YamlReader& reader, const char* key, const Fields& fields,
+                  const std::function<void(YamlReader&)>& rest = {}) {
   if (!reader.has(key)) return;
   YamlReader section = reader.child(key);
   for (const Field& field : fields) read(section, field);
-  rest(section);
+  if (rest) rest(section);
   section.finish();
 }
 
@@ -91,9 +90,7 @@ std::string outside(const std::string& prefix, const Fields& fields) {
   for (const Field& field : fields) {
     double one = 0;
     std::span<const double> values(&one, 1);
-    if (auto* number = std::get_if<double*>(&field.setting))
-      one = **number;
-    else if (auto* whole = std::get_if<int*>(&field.setting))
+    if (auto* whole = std::get_if<int*>(&field.setting))
       one = **whole;
     else if (auto* list = std::get_if<std::span<double>>(&field.setting))
       values = *list;
@@ -111,114 +108,6 @@ std::string outside(const std::string& prefix, const Fields& fields) {
     }
   }
   return {};
-}
-
-Fields fields(Mechanics& m) {
-  return {{"mass_g", m.mass, 0.01, 1e4, kMilli},
-          {"centre_of_mass_mm", m.centre_of_mass, -1e3, 1e3, kMilli},
-          {"inertia_g_mm2", m.principal_inertia, 1, 1e7, 1e-9},
-          {"damping_ratio", m.damping_ratio, 0, 1},
-          {"spring_half_spacing_x_mm", m.spring_half_spacing_x, 0.1, 1e3, kMilli},
-          {"spring_half_spacing_y_mm", m.spring_half_spacing_y, 0.1, 1e3, kMilli},
-          {"spring_length_mm", m.spring_length, 0.1, 1e3, kMilli},
-          {"spring_attachment_z_mm", m.spring_attachment_z, -1e3, 1e3, kMilli},
-          {"axial_n_per_mm", m.axial_stiffness, 1e-4, 1e3, 1 / kMilli},
-          {"lateral_n_per_mm", m.lateral_stiffness, 1e-4, 1e3, 1 / kMilli},
-          {"bending_nm_per_rad", m.bending_stiffness, 1e-6, 1e2},
-          {"torsion_nm_per_rad", m.torsion_stiffness, 1e-6, 1e2},
-          {"range", m.range, kLeast, 1e6},
-          {"creep_share", m.creep_share, 0, 1},
-          {"creep_s", m.creep_time, 0.1, 1e6},
-          {"friction", m.friction, 0, 1},
-          {"friction_travel", m.friction_travel, 1e-3, 1}};
-}
-
-Fields fields(Camera& c) {
-  return {{"width", c.width_px, 64, 4096},
-          {"height", c.height_px, 64, 4096},
-          {"fx", c.fx_px, 1, 1e5},
-          {"fy", c.fy_px, 1, 1e5},
-          {"cx", c.cx_px, -kMost, kMost},
-          {"cy", c.cy_px, -kMost, kMost},
-          {"distortion", c.distortion, -kMost, kMost},
-          {"fps", c.frame_rate, 0.1, 2000},
-          {"mirrored", c.mirrored}};
-}
-
-Fields fields(Optics& o) {
-  return {{"psf_sigma_px", o.psf_sigma_px, 0, 4},
-          {"focus_mm", o.focus_distance, kLeast, kMost, kMilli},
-          {"defocus_px_per_mm", o.defocus_px_per_m, 0, 100, 1 / kMilli},
-          {"vignetting", o.vignetting, 0, 1}};
-}
-
-Fields fields(Target& t) {
-  return {{"tag_size_mm", t.tag_size, 0.1, 1e3, kMilli},
-          {"border_mm", t.border, -kMost, kMost, kMilli},
-          {"position_error_mm", t.position_error, 0, 1, kMilli},
-          {"rotation_error_rad", t.rotation_error, 0, 0.5},
-          {"rest_position_mm", t.rest_position, -kMost, kMost, kMilli},
-          {"paper_reflectance", t.paper_reflectance, 0, 1},
-          {"ink_reflectance", t.ink_reflectance, 0, 1},
-          {"ink_spread_um", t.ink_spread, -kMost, kMost, kMicro},
-          {"ink_edge_roughness_um", t.ink_edge_roughness, 0, 1e3, kMicro},
-          {"ink_grain", t.ink_grain, 0, 0.5},
-          {"paper_raggedness_um", t.paper_raggedness, 0, 1e3, kMicro}};
-}
-
-Fields fields(Light& l) {
-  return {{"level_counts", l.level_counts, 0, 1e4},
-          {"unevenness", l.unevenness, 0, 1},
-          {"direction_rad", l.direction, -kMost, kMost},
-          {"ambient", l.ambient, 0, 1},
-          {"glare_counts", l.glare_counts, 0, 1e4},
-          {"led_level", l.led_level, 0.001, 1},
-          {"room", l.room, 0, 100}};
-}
-
-Fields fields(Trajectory& t) {
-  return {{"motion",
-           t.motion,
-           {"rest", "hold", "push", "steps", "sweep", "tap", "drop", "compound", "hard", "desk"}},
-          {"rest_s", t.rest_time, 0, 1e6},
-          {"amplitude", t.amplitude, -kMost, kMost},
-          {"axis", t.axis, std::vector<std::string_view>{"fx", "fy", "fz", "mx", "my", "mz"}},
-          {"share", t.share, -kMost, kMost},
-          {"hold_s", t.hold_time, 0, 1e6},
-          {"bandwidth_hz", t.bandwidth, kLeast, kMost},
-          {"sweep_from_hz", t.sweep_from, kLeast, kMost},
-          {"sweep_to_hz", t.sweep_to, kLeast, kMost},
-          {"sweep_s", t.sweep_time, kLeast, kMost},
-          {"event_s", t.event_time, kLeast, kMost}};
-}
-
-Fields fields(DeskSettings& d) {
-  return {{"length_s", d.length, 1, 1e5},
-          {"gesture_share", d.gesture_share, 0, 1},
-          {"wander", d.wander, 0, 1},
-          {"knock_m_per_s2", d.knock, 0, 1e3}};
-}
-
-Fields fields(Exposure& e) {
-  return {{"time_ms", e.time, 0, 1e9, kMilli},
-          {"rolling_readout_ms", e.rolling_readout, 0, 1e9, kMilli},
-          {"even", e.even}};
-}
-
-Fields fields(Delivery& d) {
-  return {{"latency_ms", d.latency, 0, 1e4, kMilli},
-          {"jitter_ms", d.jitter, -kMost, kMost, kMilli},
-          {"stale_share", d.stale_share, 0, 0.5},
-          {"true_fps", d.true_frame_rate, -kMost, kMost}};
-}
-
-Fields fields(Noise& n) {
-  return {{"read_counts", n.read_counts, 0, 1e4},
-          {"shot_counts_per_count", n.shot_counts_per_count, 0, 1e4}};
-}
-
-Fields fields(Compression& c) {
-  return {{"jpeg_quality", c.jpeg_quality, 0, 100}, {"file", c.file, {"png", "pgm", "jpeg"}}};
 }
 
 Fields fields(Occurrence& w) {
@@ -272,34 +161,6 @@ Fields fields(LostFrames& l) {
 
 Fields fields(RandomDisturbances& r) { return {{"every_s", r.every, 0.05, 1e6}}; }
 
-Fields fields(BenchErrors& e) {
-  return {{"mass_percent", e.mass, 0, 30, kPercent}, {"point_mm", e.point, 0, 10, kMilli},
-          {"contact_mm", e.contact, 0, 10, kMilli},  {"gravity_rad", e.gravity_rad, 0, 0.3},
-          {"lean_rad", e.lean_rad, 0, 0.3},          {"direction_rad", e.direction_rad, 0, 0.3},
-          {"sway_rad", e.sway_rad, 0, 0.3},          {"tremor", e.tremor, 0, 0.3},
-          {"string_mn", e.string, 0, 100, kMilli}};
-}
-
-Fields fields(BenchTimes& t) {
-  return {{"swing_rad", t.swing_rad, 0, 0.3},
-          {"reaction_s", t.reaction, 0.01, 60},
-          {"turn_s", t.turn, 0.01, 60},
-          {"load_s", t.load, 0.01, 60},
-          {"swing_decay_s", t.swing_decay, 0.01, 60},
-          {"string_mm", t.string_length, 1, 1e4, kMilli}};
-}
-
-Fields fields(BenchFaults& f) {
-  return {{"wrong_mass", f.wrong_mass, 0, kMaxOrders},
-          {"bump", f.bump, 0, kMaxOrders},
-          {"slip", f.slip, 0, kMaxOrders},
-          {"slip_tag", f.slip_tag, 0, kMaxOrders},
-          {"wrong_mass_factor", f.wrong_mass_factor, 0, 10},
-          {"bump_change", f.bump_change, -0.5, 0.5},
-          {"slip_change", f.slip_change, -0.5, 0.5},
-          {"drift_per_hour", f.drift_per_hour, -0.5, 0.5}};
-}
-
 /// An instrument's own, and what all of them have.
 Fields with_faults(Fields own, ReferenceFaults& f) {
   const Fields common{{"silent_from_s", f.silent_from, -kNever, kNever},
@@ -309,31 +170,6 @@ Fields with_faults(Fields own, ReferenceFaults& f) {
                       {"clock_ppm", f.clock_ppm, -1e5, 1e5}};
   own.insert(own.end(), common.begin(), common.end());
   return own;
-}
-
-Fields fields(LoadCellSettings& c) {
-  return with_faults({{"ideal", c.ideal},
-                      {"rate_hz", c.rate, 1, 1000},
-                      {"noise_mn", c.noise, 0, 1e5, kMilli},
-                      {"counts_per_newton", c.counts_per_newton, 1, 1e9},
-                      {"lag_ms", c.lag, 0, 1000, kMilli},
-                      {"scale_error_percent", c.scale_error, 0, 30, kPercent},
-                      {"range_n", c.range, 1e-3, 1e6}},
-                     c.faults);
-}
-
-Fields fields(SixAxisSettings& x) {
-  return with_faults({{"ideal", x.ideal},
-                      {"counts_per_unit", x.counts_per_unit, 1e-3, 1e9},
-                      {"range", x.range, 1e-6, 1e6},
-                      {"rate_hz", x.rate, 0.1, 1000},
-                      {"filter_hz", x.filter_hz, 0.1, 1000},
-                      {"noise_counts", x.noise_counts, 0, 1e5},
-                      {"lag_ms", x.lag, 0, 1000, kMilli},
-                      {"origin_mm", x.origin, -1e3, 1e3, kMilli},
-                      {"place_error_mm", x.place_error, 0, 10, kMilli},
-                      {"turn_error_rad", x.turn_error, 0, 0.3}},
-                     x.faults);
 }
 
 Fields fields(BenchSettings& b) {
@@ -346,25 +182,143 @@ struct Section {
 };
 
 std::vector<Section> sections(Scenario& s) {
-  return {{"mechanics", fields(s.mechanics)},
-          {"camera", fields(s.camera)},
-          {"optics", fields(s.optics)},
-          {"target", fields(s.target)},
-          {"light", fields(s.light)},
-          {"trajectory", fields(s.trajectory)},
-          {"desk", fields(s.desk)},
-          {"exposure", fields(s.exposure)},
-          {"delivery", fields(s.delivery)},
-          {"noise", fields(s.noise)},
-          {"compression", fields(s.compression)}};
+  return {{"mechanics",
+           {{"mass_g", s.mechanics.mass, 0.01, 1e4, kMilli},
+            {"centre_of_mass_mm", s.mechanics.centre_of_mass, -1e3, 1e3, kMilli},
+            {"inertia_g_mm2", s.mechanics.principal_inertia, 1, 1e7, 1e-9},
+            {"damping_ratio", s.mechanics.damping_ratio, 0, 1},
+            {"spring_half_spacing_x_mm", s.mechanics.spring_half_spacing_x, 0.1, 1e3, kMilli},
+            {"spring_half_spacing_y_mm", s.mechanics.spring_half_spacing_y, 0.1, 1e3, kMilli},
+            {"spring_length_mm", s.mechanics.spring_length, 0.1, 1e3, kMilli},
+            {"spring_attachment_z_mm", s.mechanics.spring_attachment_z, -1e3, 1e3, kMilli},
+            {"axial_n_per_mm", s.mechanics.axial_stiffness, 1e-4, 1e3, 1 / kMilli},
+            {"lateral_n_per_mm", s.mechanics.lateral_stiffness, 1e-4, 1e3, 1 / kMilli},
+            {"bending_nm_per_rad", s.mechanics.bending_stiffness, 1e-6, 1e2},
+            {"torsion_nm_per_rad", s.mechanics.torsion_stiffness, 1e-6, 1e2},
+            {"range", s.mechanics.range, kLeast, 1e6},
+            {"creep_share", s.mechanics.creep_share, 0, 1},
+            {"creep_s", s.mechanics.creep_time, 0.1, 1e6},
+            {"friction", s.mechanics.friction, 0, 1},
+            {"friction_travel", s.mechanics.friction_travel, 1e-3, 1}}},
+          {"camera",
+           {{"width", s.camera.width_px, 64, 4096},
+            {"height", s.camera.height_px, 64, 4096},
+            {"fx", s.camera.fx_px, 1, 1e5},
+            {"fy", s.camera.fy_px, 1, 1e5},
+            {"cx", s.camera.cx_px, -kMost, kMost},
+            {"cy", s.camera.cy_px, -kMost, kMost},
+            {"distortion", s.camera.distortion, -kMost, kMost},
+            {"fps", s.camera.frame_rate, 0.1, 2000},
+            {"mirrored", s.camera.mirrored}}},
+          {"optics",
+           {{"psf_sigma_px", s.optics.psf_sigma_px, 0, 4},
+            {"focus_mm", s.optics.focus_distance, kLeast, kMost, kMilli},
+            {"defocus_px_per_mm", s.optics.defocus_px_per_m, 0, 100, 1 / kMilli},
+            {"vignetting", s.optics.vignetting, 0, 1}}},
+          {"target",
+           {{"tag_size_mm", s.target.tag_size, 0.1, 1e3, kMilli},
+            {"border_mm", s.target.border, -kMost, kMost, kMilli},
+            {"position_error_mm", s.target.position_error, 0, 1, kMilli},
+            {"rotation_error_rad", s.target.rotation_error, 0, 0.5},
+            {"rest_position_mm", s.target.rest_position, -kMost, kMost, kMilli},
+            {"paper_reflectance", s.target.paper_reflectance, 0, 1},
+            {"ink_reflectance", s.target.ink_reflectance, 0, 1},
+            {"ink_spread_um", s.target.ink_spread, -kMost, kMost, kMicro},
+            {"ink_edge_roughness_um", s.target.ink_edge_roughness, 0, 1e3, kMicro},
+            {"ink_grain", s.target.ink_grain, 0, 0.5},
+            {"paper_raggedness_um", s.target.paper_raggedness, 0, 1e3, kMicro}}},
+          {"light",
+           {{"level_counts", s.light.level_counts, 0, 1e4},
+            {"unevenness", s.light.unevenness, 0, 1},
+            {"direction_rad", s.light.direction, -kMost, kMost},
+            {"ambient", s.light.ambient, 0, 1},
+            {"glare_counts", s.light.glare_counts, 0, 1e4},
+            {"led_level", s.light.led_level, 0.001, 1},
+            {"room", s.light.room, 0, 100}}},
+          {"trajectory",
+           {{"motion",
+             s.trajectory.motion,
+             {"rest", "hold", "push", "steps", "sweep", "tap", "drop", "compound", "hard", "desk"}},
+            {"rest_s", s.trajectory.rest_time, 0, 1e6},
+            {"amplitude", s.trajectory.amplitude, -kMost, kMost},
+            {"axis", s.trajectory.axis,
+             std::vector<std::string_view>{"fx", "fy", "fz", "mx", "my", "mz"}},
+            {"share", s.trajectory.share, -kMost, kMost},
+            {"hold_s", s.trajectory.hold_time, 0, 1e6},
+            {"bandwidth_hz", s.trajectory.bandwidth, kLeast, kMost},
+            {"sweep_from_hz", s.trajectory.sweep_from, kLeast, kMost},
+            {"sweep_to_hz", s.trajectory.sweep_to, kLeast, kMost},
+            {"sweep_s", s.trajectory.sweep_time, kLeast, kMost},
+            {"event_s", s.trajectory.event_time, kLeast, kMost}}},
+          {"desk",
+           {{"length_s", s.desk.length, 1, 1e5},
+            {"gesture_share", s.desk.gesture_share, 0, 1},
+            {"wander", s.desk.wander, 0, 1},
+            {"knock_m_per_s2", s.desk.knock, 0, 1e3}}},
+          {"exposure",
+           {{"time_ms", s.exposure.time, 0, 1e9, kMilli},
+            {"rolling_readout_ms", s.exposure.rolling_readout, 0, 1e9, kMilli},
+            {"even", s.exposure.even}}},
+          {"delivery",
+           {{"latency_ms", s.delivery.latency, 0, 1e4, kMilli},
+            {"jitter_ms", s.delivery.jitter, -kMost, kMost, kMilli},
+            {"stale_share", s.delivery.stale_share, 0, 0.5},
+            {"true_fps", s.delivery.true_frame_rate, -kMost, kMost}}},
+          {"noise",
+           {{"read_counts", s.noise.read_counts, 0, 1e4},
+            {"shot_counts_per_count", s.noise.shot_counts_per_count, 0, 1e4}}},
+          {"compression",
+           {{"jpeg_quality", s.compression.jpeg_quality, 0, 100},
+            {"file", s.compression.file, {"png", "pgm", "jpeg"}}}}};
 }
 
 std::vector<Section> sections(BenchSettings& b) {
-  return {{"errors", fields(b.errors)},
-          {"times", fields(b.times)},
-          {"faults", fields(b.faults)},
-          {"load_cell", fields(b.load_cell)},
-          {"six_axis", fields(b.six_axis)}};
+  return {
+      {"errors",
+       {{"mass_percent", b.errors.mass, 0, 30, kPercent},
+        {"point_mm", b.errors.point, 0, 10, kMilli},
+        {"contact_mm", b.errors.contact, 0, 10, kMilli},
+        {"gravity_rad", b.errors.gravity_rad, 0, 0.3},
+        {"lean_rad", b.errors.lean_rad, 0, 0.3},
+        {"direction_rad", b.errors.direction_rad, 0, 0.3},
+        {"sway_rad", b.errors.sway_rad, 0, 0.3},
+        {"tremor", b.errors.tremor, 0, 0.3},
+        {"string_mn", b.errors.string, 0, 100, kMilli}}},
+      {"times",
+       {{"swing_rad", b.times.swing_rad, 0, 0.3},
+        {"reaction_s", b.times.reaction, 0.01, 60},
+        {"turn_s", b.times.turn, 0.01, 60},
+        {"load_s", b.times.load, 0.01, 60},
+        {"swing_decay_s", b.times.swing_decay, 0.01, 60},
+        {"string_mm", b.times.string_length, 1, 1e4, kMilli}}},
+      {"faults",
+       {{"wrong_mass", b.faults.wrong_mass, 0, kMaxOrders},
+        {"bump", b.faults.bump, 0, kMaxOrders},
+        {"slip", b.faults.slip, 0, kMaxOrders},
+        {"slip_tag", b.faults.slip_tag, 0, kMaxOrders},
+        {"wrong_mass_factor", b.faults.wrong_mass_factor, 0, 10},
+        {"bump_change", b.faults.bump_change, -0.5, 0.5},
+        {"slip_change", b.faults.slip_change, -0.5, 0.5},
+        {"drift_per_hour", b.faults.drift_per_hour, -0.5, 0.5}}},
+      {"load_cell", with_faults({{"ideal", b.load_cell.ideal},
+                                 {"rate_hz", b.load_cell.rate, 1, 1000},
+                                 {"noise_mn", b.load_cell.noise, 0, 1e5, kMilli},
+                                 {"counts_per_newton", b.load_cell.counts_per_newton, 1, 1e9},
+                                 {"lag_ms", b.load_cell.lag, 0, 1000, kMilli},
+                                 {"scale_error_percent", b.load_cell.scale_error, 0, 30, kPercent},
+                                 {"range_n", b.load_cell.range, 1e-3, 1e6}},
+                                b.load_cell.faults)},
+      {"six_axis", with_faults({{"ideal", b.six_axis.ideal},
+                                {"counts_per_unit", b.six_axis.counts_per_unit, 1e-3, 1e9},
+                                {"range", b.six_axis.range, 1e-6, 1e6},
+                                {"rate_hz", b.six_axis.rate, 0.1, 1000},
+                                {"filter_hz", b.six_axis.filter_hz, 0.1, 1000},
+                                {"noise_counts", b.six_axis.noise_counts, 0, 1e5},
+                                {"lag_ms", b.six_axis.lag, 0, 1000, kMilli},
+                                {"origin_mm", b.six_axis.origin, -1e3, 1e3, kMilli},
+                                {"place_error_mm", b.six_axis.place_error, 0, 10, kMilli},
+                                {"turn_error_rad", b.six_axis.turn_error, 0, 0.3}},
+                               b.six_axis.faults)}};
 }
 
 /// Each list of disturbances with its key.
@@ -421,7 +375,7 @@ void read_disturbances(YamlReader& reader, Disturbances& d) {
       entry.finish();
     }
   });
-  read_section(reader, "lost_frames", fields(d.lost_frames), [](YamlReader&) {});
+  read_section(reader, "lost_frames", fields(d.lost_frames));
   read_section(reader, "random", fields(d.random),
                [&](YamlReader& section) { d.random.start = section.number("start_s"); });
 }
@@ -527,8 +481,7 @@ void read_scenario(YamlReader& root, Scenario& scenario) {
   read_section(root, "disturbances", {},
                [&](YamlReader& section) { read_disturbances(section, scenario.disturbances); });
   read_section(root, "bench", fields(scenario.bench), [&](YamlReader& bench) {
-    for (const auto& [key, fields] : sections(scenario.bench))
-      read_section(bench, key, fields, [](YamlReader&) {});
+    for (const auto& [key, fields] : sections(scenario.bench)) read_section(bench, key, fields);
   });
 }
 

@@ -2,7 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/timerfd.h>
+#include <fmt/ranges.h>
 #include <turbojpeg.h>
 #include <unistd.h>
 
@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "host/core/config_error.h"
-#include "host/core/os/unique_fd.h"
+#include "host/core/os/timer.h"
 #include "host/core/png/png.h"
 #include "host/source/simulator/trajectory.h"
 
@@ -32,37 +32,12 @@ constexpr double kMaxJitters = 8.0;  // more than the mean delay; keeps the stam
 constexpr int kExposureSteps = 16;
 
 const sim::Scenario& checked(const sim::Scenario& scenario) {
-  const std::string problem = sim::problem(scenario);
-  if (!problem.empty()) throw ConfigError("scenario: " + problem);
+  const std::string wrong = sim::problem(scenario);
+  if (!wrong.empty()) throw ConfigError("scenario: " + wrong);
   return scenario;
 }
 
-std::unique_ptr<sim::AppliedLoad> person_at_desk(const sim::Scenario& scenario) {
-  if (scenario.trajectory.motion != sim::Motion::desk) return nullptr;
-  return std::make_unique<sim::DeskUse>(scenario);
-}
-
 Duration to_duration(double seconds) { return Duration(std::llround(1e9 * seconds)); }
-
-/// Seconds before and after the middle of a frame that the longest exposure reaches.
-double longest_half_window(const sim::Scenario& scenario) {
-  return 0.5 * sim::true_period(scenario);
-}
-
-timespec to_timespec(Duration since_boot) {
-  const auto ns = since_boot.count();
-  return {static_cast<time_t>(ns / 1'000'000'000), static_cast<long>(ns % 1'000'000'000)};
-}
-
-UniqueFd make_timer() {
-  UniqueFd timer(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
-  if (!timer) {
-    throw ConfigError(
-        "simulated sensor: no timer from the kernel ({}): close other programs and try again",
-        std::strerror(errno));
-  }
-  return timer;
-}
 
 }  // namespace
 
@@ -71,12 +46,14 @@ SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live, sim::
     : scenario_(checked(scenario)),
       disturbances_(scenario.disturbances, scenario.seed, scenario.camera.width_px,
                     static_cast<int>(scenario.target.tags.size())),
-      desk_(load == nullptr ? person_at_desk(scenario) : nullptr),
+      desk_(load == nullptr && scenario.trajectory.motion == sim::Motion::desk
+                ? std::make_unique<sim::DeskUse>(scenario)
+                : nullptr),
       load_(desk_ ? desk_.get() : load),
       renderer_(scenario),
       motion_(scenario.mechanics, sim::TrajectoryPlayer(scenario.trajectory, scenario.seed),
               -renderer_.half_window() - kWarmUp,
-              2 * longest_half_window(scenario) + 4 * sim::PlatformMotion::kStep, load_),
+              sim::true_period(scenario) + 4 * sim::PlatformMotion::kStep, load_),
       jpeg_(scenario.camera.width_px, scenario.camera.height_px, scenario.compression.jpeg_quality),
       pixels_(static_cast<std::size_t>(scenario.camera.width_px) *
               static_cast<std::size_t>(scenario.camera.height_px)) {
@@ -92,11 +69,15 @@ SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live, sim::
   truth_.visible = renderer_.visible();
   truth_.rest_position = scenario_.target.rest_position;
   renderer_.set_led(led);
-  if (live) {
-    timer_ = make_timer();
-    start_ = std::chrono::steady_clock::now() + period_;
-    arm();
+  if (!live) return;
+  timer_ = monotonic_timer();
+  if (!timer_) {
+    throw ConfigError(
+        "simulated sensor: no timer from the kernel ({}): close other programs and try again",
+        std::strerror(errno));
   }
+  start_ = std::chrono::steady_clock::now() + period_;
+  wake_at(timer_, delivery_time(next_sequence_));
 }
 
 /// The time stamp of a frame: the middle of its exposure, and what driver and cable add.
@@ -119,13 +100,6 @@ std::uint64_t SimulatorSource::newest_delivered(TimePoint now) const noexcept {
       std::max(next_sequence_, static_cast<std::uint64_t>(std::max<std::int64_t>(0, periods + 1)));
   while (newest > next_sequence_ && delivery_time(newest) > now) --newest;
   return newest;
-}
-
-/// Wakes the reader when the next frame is delivered.
-void SimulatorSource::arm() const noexcept {
-  itimerspec when{};
-  when.it_value = to_timespec(delivery_time(next_sequence_).time_since_epoch());
-  ::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &when, nullptr);
 }
 
 /// The first frame has nothing before it.
@@ -169,7 +143,7 @@ ReadStatus SimulatorSource::read(Frame& frame) noexcept {
     if (timer_) break;
   }
   next_sequence_ = lost ? sequence : sequence + 1;
-  if (timer_) arm();
+  if (timer_) wake_at(timer_, delivery_time(next_sequence_));
   if (lost) return ReadStatus::nothing;
   render(sequence);
 
@@ -182,20 +156,16 @@ ReadStatus SimulatorSource::read(Frame& frame) noexcept {
   return ReadStatus::frame;
 }
 
-void SimulatorSource::let_tags_slip(double time) noexcept {
-  for (std::size_t tag = 0; tag < truth_.tags.size(); ++tag) {
-    renderer_.slip_tag(tag, load_->slip(static_cast<int>(tag), time));
-    truth_.tags[tag] = renderer_.tags()[tag];
-  }
-}
-
 void SimulatorSource::render(std::uint64_t sequence) noexcept {
   truth_.sequence = sequence;
   truth_.stale = stale(sequence);
   if (truth_.stale) return;
   truth_.time = period_ * static_cast<std::int64_t>(sequence);
   const double time = std::chrono::duration<double>(truth_.time).count();
-  if (load_) let_tags_slip(time);
+  for (std::size_t tag = 0; load_ && tag < truth_.tags.size(); ++tag) {
+    renderer_.slip_tag(tag, load_->slip(static_cast<int>(tag), time));
+    truth_.tags[tag] = renderer_.tags()[tag];
+  }
   motion_.advance_to(time + renderer_.half_window());
   renderer_.render(motion_, time, sequence, pixels_.data());
   rendered_ = true;
@@ -282,17 +252,14 @@ void write_file(const fs::path& path, const void* data, std::size_t size) {
   }
 }
 
-bool is_frame_name(const fs::path& name) {
+bool is_ours(const fs::path& name) {
+  if (name == "frames.csv" || name == "truth.csv" || name == "sensor.yaml" || name == kPartial)
+    return true;
   const std::string stem = name.stem().string();
   const std::string ending = name.extension().string();
   return stem.size() == 6 &&
          std::ranges::all_of(stem, [](unsigned char c) { return std::isdigit(c) != 0; }) &&
          std::ranges::find(kEndings, ending) != kEndings.end();
-}
-
-bool is_ours(const fs::path& name) {
-  return name == "frames.csv" || name == "truth.csv" || name == "sensor.yaml" || name == kPartial ||
-         is_frame_name(name);
 }
 
 // What an earlier export left in the folder. Throws if anything else is there.
@@ -329,13 +296,6 @@ std::vector<fs::path> earlier_export(const fs::path& dir) {
   return found;
 }
 
-std::string truth_row(const Truth& truth) {
-  std::string row = fmt::format("{},{}", truth.sequence, truth.time.count());
-  for (const double value : truth.displacement) row += fmt::format(",{:.9g}", value);
-  for (const double value : truth.wrench) row += fmt::format(",{:.9g}", value);
-  return row + "\n";
-}
-
 void write_all(const Scenario& scenario, const fs::path& partial, int frames) {
   SimulatorSource source(scenario, false);
   std::string times = "file,t_ns\n";
@@ -349,7 +309,9 @@ void write_all(const Scenario& scenario, const fs::path& partial, int frames) {
     const auto bytes = encode_image(frame.image, scenario.compression);
     write_file(partial / name, bytes.data(), bytes.size());
     times += fmt::format("{},{}\n", name, frame.capture_time.time_since_epoch().count());
-    truths += truth_row(source.truth());
+    const Truth& truth = source.truth();
+    truths += fmt::format("{},{},{:.9g},{:.9g}\n", truth.sequence, truth.time.count(),
+                          fmt::join(truth.displacement, ","), fmt::join(truth.wrench, ","));
   }
   const std::string sensor = sensor_yaml(scenario);
   write_file(partial / "sensor.yaml", sensor.data(), sensor.size());
@@ -357,19 +319,9 @@ void write_all(const Scenario& scenario, const fs::path& partial, int frames) {
   write_file(partial / "frames.csv", times.data(), times.size());
 }
 
-void move_into_place(const fs::path& partial, const fs::path& dir) {
-  // truth.csv first: it marks the folder as ours should the rest fail.
-  fs::rename(partial / "truth.csv", dir / "truth.csv");
-  for (const auto& entry : fs::directory_iterator(partial))
-    fs::rename(entry.path(), dir / entry.path().filename());
-  fs::remove(partial);
-}
-
-std::string list(const double* values, std::size_t count, double scale) {
-  std::string text = "[";
-  for (std::size_t i = 0; i < count; ++i)
-    text += fmt::format("{}{:.10g}", i == 0 ? "" : ", ", scale * values[i]);
-  return text + "]";
+std::string list(const double* values, int count, double scale) {
+  const Eigen::VectorXd scaled = scale * Eigen::Map<const Eigen::VectorXd>(values, count);
+  return fmt::format("[{:.10g}]", fmt::join(scaled, ", "));
 }
 
 }  // namespace
@@ -422,8 +374,7 @@ std::string sensor_yaml(const Scenario& s) {
 void export_folder(const Scenario& scenario, const fs::path& dir, int frames) {
   if (frames < 1 || frames > kMaxFrames)
     throw ConfigError("--frames: must lie between 1 and {}", kMaxFrames);
-  const std::string wrong = problem(scenario);
-  if (!wrong.empty()) throw ConfigError("scenario: " + wrong);
+  checked(scenario);
   const std::vector<fs::path> earlier = earlier_export(dir);
   const fs::path partial = dir / kPartial;
   std::error_code ignored;
@@ -433,7 +384,11 @@ void export_folder(const Scenario& scenario, const fs::path& dir, int frames) {
     write_all(scenario, partial, frames);
     for (const fs::path& path : earlier)
       fs::remove_all(path == partial ? fs::path() : path, ignored);
-    move_into_place(partial, dir);
+    // truth.csv first: it marks the folder as ours should the rest fail.
+    fs::rename(partial / "truth.csv", dir / "truth.csv");
+    for (const auto& entry : fs::directory_iterator(partial))
+      fs::rename(entry.path(), dir / entry.path().filename());
+    fs::remove(partial);
   } catch (const fs::filesystem_error& error) {
     fs::remove_all(partial, ignored);
     cannot_write(dir, error.code().message());

@@ -100,9 +100,7 @@ class SimulatorSource final : public FrameSource, private CameraLight {
 
   TimePoint delivery_time(std::uint64_t sequence) const noexcept;
   std::uint64_t newest_delivered(TimePoint now) const noexcept;
-  void arm() const noexcept;
   bool stale(std::uint64_t sequence) const noexcept;
-  void let_tags_slip(double time) noexcept;
   void render(std::uint64_t sequence) noexcept;
 
   sim::Scenario scenario_;

@@ -46,7 +46,6 @@ double held(double time, double hold_time) {
   return hold_time > 0 ? on - smooth_step(time - kRampTime - hold_time, kRampTime) : on;
 }
 
-using std::numbers::pi;
 constexpr double kBeforeGesture = 0.5;  // s of rest at least
 constexpr double kAfterGesture = 0.8;
 constexpr double kFingerReach = 6e-3;  // m from the middle
@@ -151,10 +150,6 @@ Vector6 TrajectoryPlayer::sweep(double time) const noexcept {
   return on_axis(fade * std::sin(2 * pi * turns));
 }
 
-Vector6 TrajectoryPlayer::tap(double time) const noexcept {
-  return on_axis(kTapGain * half_sine(std::fmod(time, kTapEvery), kTapTime));
-}
-
 Vector6 TrajectoryPlayer::compound(double time) const noexcept {
   const double fade = smooth_step(time, 1.0);
   Vector6 wrench;
@@ -175,7 +170,7 @@ Vector6 TrajectoryPlayer::applied_wrench(double absolute_time) const noexcept {
     case Motion::push: return on_axis(held(time, trajectory_.hold_time));
     case Motion::steps: return steps(time);
     case Motion::sweep: return sweep(time);
-    case Motion::tap: return tap(time);
+    case Motion::tap: return on_axis(kTapGain * half_sine(std::fmod(time, kTapEvery), kTapTime));
     case Motion::compound: return compound(time);
     case Motion::hard: return hard(time);
     case Motion::hold:
@@ -297,10 +292,7 @@ void DeskUse::plan(const Scenario& scenario) {
 
 void DeskUse::add_rest(double seconds) {
   const double begin = acts_.empty() ? 0.0 : acts_.back().end;
-  DeskAct rest;
-  rest.begin = begin;
-  rest.end = begin + seconds;
-  acts_.push_back(rest);
+  acts_.push_back({.begin = begin, .end = begin + seconds});
 }
 
 /// One axis, two of them, or all.

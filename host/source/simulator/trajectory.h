@@ -91,7 +91,6 @@ class TrajectoryPlayer {
 
   Vector6 steps(double time) const noexcept;
   Vector6 sweep(double time) const noexcept;
-  Vector6 tap(double time) const noexcept;
   Vector6 compound(double time) const noexcept;
   Vector6 on_axis(double value) const noexcept;
 
