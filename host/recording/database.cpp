@@ -375,12 +375,6 @@ void Sink::event(std::int64_t id, EventKind kind, TimePoint time, int step, std:
   put(event_, id, time, name(kind), step, value, text);
 }
 
-void Sink::begin() { database_.run("BEGIN"); }
-
-void Sink::commit() { database_.run("COMMIT"); }
-
-void Sink::roll_back() noexcept { database_.try_run("ROLLBACK"); }
-
 bool Sink::close() noexcept {
   // One file that is read where nothing can be written, too.
   return database_.try_run("PRAGMA wal_checkpoint(TRUNCATE)") &&

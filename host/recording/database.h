@@ -128,9 +128,9 @@ class Sink {
              std::string_view text);
   void meta(std::string_view key, std::string_view value);
 
-  void begin();
-  void commit();
-  void roll_back() noexcept;
+  void begin() { database_.run("BEGIN"); }
+  void commit() { database_.run("COMMIT"); }
+  void roll_back() noexcept { database_.try_run("ROLLBACK"); }
   /// After the last commit: makes one plain file of it. False: it did not, and FILE-wal stays
   /// beside it, with nothing lost.
   bool close() noexcept;

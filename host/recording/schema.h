@@ -87,33 +87,27 @@ struct Head {
 
 /// A reading of a load cell (axes 1) or a six-axis reference (axes 6).
 struct ReferenceRecord {
+  using Six = std::array<double, 6>;
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  static constexpr Six kNoneOfSix{kNone, kNone, kNone, kNone, kNone, kNone};
 
   std::int64_t id = 0;  ///< set by the reader
   TimePoint time{};
   Duration time_sigma{};
   int channel = 0;
   int axes = 1;
-  std::array<double, 6> counts{kNone, kNone, kNone, kNone, kNone, kNone};
-  std::array<double, 6> value{kNone, kNone, kNone, kNone, kNone, kNone};  ///< N, N m
-  std::array<double, 6> sigma{kNone, kNone, kNone,
-                              kNone, kNone, kNone};  ///< one standard deviation
+  Six counts = kNoneOfSix;
+  Six value = kNoneOfSix;  ///< N, N m
+  Six sigma = kNoneOfSix;  ///< one standard deviation
   bool saturated = false;
   std::uint32_t lost_before = 0;  ///< readings between the one before and this one
 };
 
+// clang-format off
 enum class EventKind : std::uint8_t {
-  note,
-  missing,
-  disconnected,
-  reconnected,
-  board,
-  led,
-  clock,
-  button,
-  mark,
-  lost,
+  note, missing, disconnected, reconnected, board, led, clock, button, mark, lost,
 };
+// clang-format on
 
 /// As the database writes them.
 constexpr std::array<std::string_view, 10> kEventNames = {

@@ -35,8 +35,6 @@ std::byte* ByteRing::reserve(std::size_t bytes, std::size_t spare) noexcept {
   return memory_ + (written + skipped) % capacity_ + kAlignment;
 }
 
-void ByteRing::publish() noexcept { written_.store(reserved_, std::memory_order_release); }
-
 void ByteRing::wait_for_room() const noexcept {
   const std::uint64_t read = read_.load(std::memory_order_acquire);
   if (read != written_.load(std::memory_order_relaxed)) read_.wait(read);
@@ -207,9 +205,9 @@ void RecordingWriter::frame(const Frame& frame, const Region& decoded,
   const bool crop = keep_ == Keep::region || (keep_ == Keep::raw && raw.bytes.empty());
   const Region& part = row.all;
   const auto width = static_cast<std::size_t>(part.width);
-  std::size_t bytes = 0;
-  if (keep_ == Keep::raw) bytes = raw.bytes.size();
-  if (crop) bytes = width * static_cast<std::size_t>(part.height);
+  const std::size_t bytes = crop                 ? width * static_cast<std::size_t>(part.height)
+                            : keep_ == Keep::raw ? raw.bytes.size()
+                                                 : 0;
   row.fourcc = crop ? kCrop : raw.fourcc;
   row.stride = crop ? part.width : raw.stride;
   Filled<FrameRow>* item = put<FrameRow>(bytes, kSpare);
@@ -254,14 +252,6 @@ void RecordingWriter::reference(const ReferenceRecord& reading) noexcept {
 void RecordingWriter::event(EventKind kind, TimePoint time, std::string_view text,
                             std::int64_t value, int step) noexcept {
   put_row(ItemKind::event, ++id_, EventRow{kind, time, step, value}, text.substr(0, kMaxText));
-}
-
-void RecordingWriter::mark(int step, bool begin, TimePoint time, int zero) noexcept {
-  event(EventKind::mark, time, {}, begin ? kMarkBegins + zero : kMarkEnds, step);
-}
-
-void RecordingWriter::withdraw(int step, TimePoint time) noexcept {
-  event(EventKind::mark, time, {}, kMarkWithdrawn, step);
 }
 
 /// A loss is itself recorded, as soon as there is room.
@@ -424,24 +414,6 @@ void FrameRecorder::frame(const LoggedFrame& all) noexcept {
   writer_.frame(all.frame, all.decoded, all.raw);
   writer_.track(all.track);
   writer_.sample(all.sample);
-}
-
-void FrameRecorder::missing(const Sample& sample) noexcept { writer_.missing(sample); }
-
-void FrameRecorder::disconnected(std::string_view detail) noexcept {
-  writer_.event(EventKind::disconnected, now_of_frames(), detail);
-}
-
-void FrameRecorder::reconnected(std::string_view detail) noexcept {
-  writer_.event(EventKind::reconnected, now_of_frames(), detail);
-}
-
-void FrameRecorder::note(std::string_view line) noexcept {
-  if (!line.empty()) writer_.event(EventKind::note, now_of_frames(), line);
-}
-
-TimePoint FrameRecorder::now_of_frames() const noexcept {
-  return std::chrono::steady_clock::now() + clock_;
 }
 
 }  // namespace tagwrench::record

@@ -39,7 +39,7 @@ class ByteRing {
   /// Room for a record of so many bytes, aligned, in one piece; nullptr if there is none now. At
   /// least `spare` bytes stay free. Nothing is in the ring until publish().
   std::byte* reserve(std::size_t bytes, std::size_t spare = 0) noexcept;
-  void publish() noexcept;
+  void publish() noexcept { written_.store(reserved_, std::memory_order_release); }
   /// Sleeps until the reader has taken something, unless the ring is empty.
   void wait_for_room() const noexcept;
   /// Whether a record of so many bytes fits into an empty ring.
@@ -121,9 +121,13 @@ class RecordingWriter {
              int step = -1) noexcept;
   /// A step of a plan, counted from 0, begins or ends. Steps whose beginnings bear one `zero` count
   /// from one rest. A stretch may be marked after it has passed.
-  void mark(int step, bool begin, TimePoint time, int zero = 0) noexcept;
+  void mark(int step, bool begin, TimePoint time, int zero = 0) noexcept {
+    event(EventKind::mark, time, {}, begin ? kMarkBegins + zero : kMarkEnds, step);
+  }
   /// The stretch of this step that was marked last, and began at `time`, no longer counts.
-  void withdraw(int step, TimePoint time) noexcept;
+  void withdraw(int step, TimePoint time) noexcept {
+    event(EventKind::mark, time, {}, kMarkWithdrawn, step);
+  }
 
   WriterState state() const noexcept;
   /// One line, once state().failed.
@@ -197,17 +201,25 @@ class FrameRecorder : public FrameLog {
 
   // The loop's thread.
   void frame(const LoggedFrame& all) noexcept override;
-  void missing(const Sample& sample) noexcept override;
-  void disconnected(std::string_view detail) noexcept override;
-  void reconnected(std::string_view detail) noexcept override;
+  void missing(const Sample& sample) noexcept override { writer_.missing(sample); }
+  void disconnected(std::string_view detail) noexcept override {
+    event_now(EventKind::disconnected, detail);
+  }
+  void reconnected(std::string_view detail) noexcept override {
+    event_now(EventKind::reconnected, detail);
+  }
   /// What people were told; an empty line is nothing.
-  void note(std::string_view line) noexcept;
+  void note(std::string_view line) noexcept {
+    if (!line.empty()) event_now(EventKind::note, line);
+  }
 
   RecordingWriter& writer() noexcept { return writer_; }
   const RecordingWriter& writer() const noexcept { return writer_; }
 
  private:
-  TimePoint now_of_frames() const noexcept;
+  void event_now(EventKind kind, std::string_view text) noexcept {
+    writer_.event(kind, std::chrono::steady_clock::now() + clock_, text);
+  }
 
   RecordingWriter writer_;
   Duration clock_{};  ///< of the frames less CLOCK_MONOTONIC

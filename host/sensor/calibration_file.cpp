@@ -196,13 +196,12 @@ void check_covariance(const CalibrationReader& file, const std::string& key,
 FeatureSpec read_features(const CalibrationReader& file, const json& node) {
   FeatureSpec features;
   const std::string kind = file.text(file.at(node, "kind"), "kind");
-  int index = 0;
-  while (index < kFeatureKinds && name(static_cast<FeatureKind>(index)) != kind) ++index;
-  if (index == kFeatureKinds) {
+  const auto known = std::find(kFeatureNames.begin(), kFeatureNames.end(), kind);
+  if (known == kFeatureNames.end()) {
     file.fail(fmt::format("\"kind\" is \"{}\", which this version does not know; update tagwrench",
                           kind));
   }
-  features.kind = static_cast<FeatureKind>(index);
+  features.kind = static_cast<FeatureKind>(known - kFeatureNames.begin());
   if (features.kind == FeatureKind::creep) {
     features.time_constant = file.number(file.at(node, "time_constant_s"), "time_constant_s");
     if (features.time_constant <= 0) file.fail("\"time_constant_s\" must be greater than 0");
@@ -266,12 +265,10 @@ void read_model(const CalibrationReader& file, WrenchModel& model) {
 AxisFit read_axis(const CalibrationReader& file, const json& node) {
   AxisFit axis;
   const std::string state = file.text(file.at(node, "state"), "state");
-  constexpr std::array kStates = {AxisState::calibrated, AxisState::spring_model,
-                                  AxisState::not_determined};
-  const auto* known = std::find_if(kStates.begin(), kStates.end(),
-                                   [&](AxisState each) { return state == name(each); });
-  if (known == kStates.end()) file.fail(fmt::format("\"state\" of an axis is \"{}\"", state));
-  axis.state = *known;
+  const auto known = std::find(kAxisStateNames.begin(), kAxisStateNames.end(), state);
+  if (known == kAxisStateNames.end())
+    file.fail(fmt::format("\"state\" of an axis is \"{}\"", state));
+  axis.state = static_cast<AxisState>(known - kAxisStateNames.begin());
   axis.reason = file.text(file.at(node, "reason"), "reason");
   for (const auto& [key, member] : kAxisNumbers)
     axis.*member = file.number(file.at(node, key), key);

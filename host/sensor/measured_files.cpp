@@ -38,11 +38,9 @@ void check_format(YamlReader& root, const char* wanted) {
 }
 
 MeasuredStamp read_stamp(YamlReader& node) {
-  MeasuredStamp stamp;
-  stamp.date = optional_date(node, "date");
-  stamp.software = node.text_or("software", "");
-  stamp.sensor = node.text_or("sensor", "");
-  return stamp;
+  return {.date = optional_date(node, "date"),
+          .software = node.text_or("software", ""),
+          .sensor = node.text_or("sensor", "")};
 }
 
 /// The numbers of {rows: r, cols: c, data: [...]}, row by row.
@@ -127,11 +125,8 @@ std::string stamp_text(const MeasuredStamp& stamp, const char* indent) {
 }
 
 std::string matrix(const char* name, int rows, const std::vector<double>& numbers) {
-  std::string data;
-  for (const double number : numbers)
-    data += fmt::format("{}{:.10g}", data.empty() ? "" : ", ", number);
-  return fmt::format("{}:\n  rows: {}\n  cols: {}\n  data: [{}]\n", name, rows,
-                     numbers.size() / static_cast<std::size_t>(rows), data);
+  return fmt::format("{}:\n  rows: {}\n  cols: {}\n  data: [{:.10g}]\n", name, rows,
+                     numbers.size() / static_cast<std::size_t>(rows), fmt::join(numbers, ", "));
 }
 
 constexpr const char* kRemedy =
@@ -390,9 +385,8 @@ ReferenceImage load_reference_image(const fs::path& path, const CameraModel& cam
   check_header(path, bytes, camera);
   std::vector<std::uint16_t> counts;
   if (!decode_png(bytes, camera.width_px, camera.height_px, counts)) refuse(path, "is damaged");
-  ReferenceImage image;
-  image.width = camera.width_px;
-  image.height = camera.height_px;
+  ReferenceImage image{
+      .width = camera.width_px, .height = camera.height_px, .frames = 0, .level = {}};
   image.level.reserve(counts.size());
   for (const std::uint16_t count : counts)
     image.level.push_back(static_cast<float>(count) / kReferenceCountsPerLevel);
@@ -415,14 +409,14 @@ std::string encode_reference_image(const ReferenceImage& image) {
 
 SensorIdentity identity_of(const CameraModel& camera, const TargetDescription& target,
                            const ReferenceOptions& rest) {
-  SensorIdentity out;
-  out.family = std::string(name(target.family));
-  for (const Tag& tag : target.tags) out.tag_ids.push_back(tag.id);
-  out.tag_size_mm = target.tag_size * 1e3;
-  out.image_px = {camera.width_px, camera.height_px};
-  out.lens_px = {camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px};
-  out.target_sha256 = target_hash(target, rest);
-  return out;
+  std::vector<int> ids;
+  for (const Tag& tag : target.tags) ids.push_back(tag.id);
+  return {.family = std::string(name(target.family)),
+          .tag_ids = std::move(ids),
+          .tag_size_mm = target.tag_size * 1e3,
+          .image_px = {camera.width_px, camera.height_px},
+          .lens_px = std::array{camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px},
+          .target_sha256 = target_hash(target, rest)};
 }
 
 std::string difference(const SensorIdentity& its, const SensorIdentity& ours) {
@@ -466,10 +460,8 @@ std::string sha256_of(const CameraModel& camera) {
 }
 
 std::string sha256_of(const WrenchModel& model) {
-  std::string text;
-  for (const double number : model.K.reshaped()) text += fmt::format("{:.6g} ", number);
-  for (const double number : model.B) text += fmt::format("{:.6g} ", number);
-  return sha256_hex(text);
+  return sha256_hex(
+      fmt::format("{:.6g} {:.6g} ", fmt::join(model.K.reshaped(), " "), fmt::join(model.B, " ")));
 }
 
 }  // namespace tagwrench

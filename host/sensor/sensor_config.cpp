@@ -1,15 +1,16 @@
 #include "host/sensor/sensor_config.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/parse.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/geometry_keys.h"
@@ -40,17 +41,11 @@ CameraModel turned_back(CameraModel camera) {
   return camera;
 }
 
-std::string ids_of(const TargetDescription& target) {
+std::string described(const TargetDescription& target) {
   std::vector<int> ids;
   for (const Tag& tag : target.tags) ids.push_back(tag.id);
   std::sort(ids.begin(), ids.end());
-  std::string out;
-  for (const int id : ids) out += fmt::format("{}{}", out.empty() ? "" : ",", id);
-  return out;
-}
-
-std::string described(const TargetDescription& target) {
-  return fmt::format("tags {} of {}, {:.6g} mm", ids_of(target), name(target.family),
+  return fmt::format("tags {} of {}, {:.6g} mm", fmt::join(ids, ","), name(target.family),
                      target.tag_size * 1e3);
 }
 
@@ -373,18 +368,18 @@ ShapingOptions read_shaping(YamlReader node, ShapingOptions shaping) {
 
 /// "256f:c62e"
 HidIdentity read_identity(YamlReader node) {
-  HidIdentity identity;
   const std::string text = node.text("id");
-  const auto hex = [](std::string_view s, std::uint16_t& out) {
-    const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), out, 16);
-    return s.size() == 4 && error == std::errc() && end == s.data() + s.size();
+  const bool formed = text.size() == 9 && text[4] == ':';
+  const auto hex = [&](std::size_t at) {
+    return formed ? parse_whole<std::uint16_t>(std::string_view(text).substr(at, 4), 16)
+                  : std::nullopt;
   };
-  if (text.size() != 9 || text[4] != ':' ||
-      !hex(std::string_view(text).substr(0, 4), identity.vendor) ||
-      !hex(std::string_view(text).substr(5), identity.product)) {
+  const auto vendor = hex(0), product = hex(5);
+  if (!vendor || !product) {
     node.fail("id", fmt::format("'{}' is not vendor:product in hexadecimal, such as \"256f:c62e\"",
                                 text));
   }
+  const HidIdentity identity{*vendor, *product};
   if (identity.vendor == 0x046d && (identity.product == 0xc626 || identity.product == 0xc623)) {
     node.fail("id",
               "the kernel's hid-logitech driver takes this id and refuses virtual devices; use "

@@ -106,13 +106,11 @@ Profile default_profile(const SensorConfig& sensor);
 /// Of the following of zero. `tool` is WrenchEstimator::tool() of this sensor; `may_follow`: false
 /// keeps the zero where it is set.
 inline ZeroOptions zero_options(const SensorConfig& sensor, const Matrix6& tool, bool may_follow) {
-  ZeroOptions options;
-  options.follow = may_follow && sensor.zero.follow;
-  options.range = range_through(tool, sensor.wrench.range);
-  options.set = tool * sensor.zero.set;
-  options.band = sensor.zero.band;
-  options.rate = sensor.zero.rate;
-  return options;
+  return {.follow = may_follow && sensor.zero.follow,
+          .range = range_through(tool, sensor.wrench.range),
+          .set = tool * sensor.zero.set,
+          .band = sensor.zero.band,
+          .rate = sensor.zero.rate};
 }
 
 }  // namespace tagwrench

@@ -123,16 +123,15 @@ bool inside(const PixelView<Pixel>& image, double x, double y) {
   return x >= 0.0 && y >= 0.0 && x < image.width - 1.001 && y < image.height - 1.001;
 }
 
-constexpr double kCoarseHalf_px = 9.0;
-constexpr double kFineHalf_px = 6.0;
-constexpr int kCoarseSteps = 4;
-constexpr int kFineSteps = 5;
-constexpr double kCoarseEnough_px = 1.0;  ///< a step below this ends the coarse stage
-constexpr double kFineEnough_px = 0.03;   ///< and this the fine one: what is left is far smaller
-
-/// Robust scales below these would throw away inliers, px.
-constexpr double kCoarseMinScale_px = 0.7;
-constexpr double kFineMinScale_px = 0.04;
+struct Stage {
+  bool coarse;
+  double half_px;    ///< of the profiles
+  int steps;         ///< at most
+  double enough_px;  ///< a smaller step ends the stage; of the fine one what is left is far smaller
+  double min_scale_px;  ///< a robust scale below this would throw away inliers
+};
+constexpr Stage kCoarse{true, 9.0, 4, 1.0, 0.7};
+constexpr Stage kFine{false, 6.0, 5, 0.03, 0.04};
 
 constexpr int kMinPoints = 24;
 constexpr double kMinInlierFraction = 0.5;  ///< of a tag's points, for the tag to be held
@@ -338,10 +337,6 @@ void Refiner::set_target(EdgeTarget target) {
   excluded_.assign(target_.tags.size(), false);
 }
 
-std::span<EdgeMeasurement> Refiner::of_tag(std::size_t tag) noexcept {
-  return std::span(measurements_).subspan(first_[tag], first_[tag + 1] - first_[tag]);
-}
-
 Refinement Refiner::refine(const ImageView& image, const Eigen::Isometry3d& predicted) noexcept {
   Refinement fit;
   if (image.pixels == nullptr || target_.tags.empty() || !sane(predicted)) return fit;
@@ -364,27 +359,22 @@ Refinement Refiner::refine(const ImageView& image, const Eigen::Isometry3d& pred
 }
 
 bool Refiner::converge(const ImageView& image, Refinement& fit) noexcept {
-  for (const bool coarse : {true, false}) {
-    for (int i = 0; i < (coarse ? kCoarseSteps : kFineSteps); ++i) {
-      const Step step = iterate(image, coarse, fit);
-      if (!step.solved) return false;
-      if (step.size_px < (coarse ? kCoarseEnough_px : kFineEnough_px)) break;
+  for (const Stage& stage : {kCoarse, kFine}) {
+    for (int i = 0; i < stage.steps; ++i) {
+      for (std::size_t t = 0; t < target_.tags.size(); ++t) {
+        if (excluded_[t]) {
+          for (EdgeMeasurement& m : of_tag(t)) m.valid = false;
+        } else {
+          meter_.measure(pixel_view(image), target_.tags[t], fit.camera_T_platform, stage.half_px,
+                         stage.coarse, of_tag(t));
+        }
+      }
+      const std::optional<double> moved_px = solve(stage.min_scale_px, fit);
+      if (!moved_px) return false;
+      if (*moved_px < stage.enough_px) break;
     }
   }
   return true;
-}
-
-Refiner::Step Refiner::iterate(const ImageView& image, bool coarse, Refinement& fit) noexcept {
-  const double half_width_px = coarse ? kCoarseHalf_px : kFineHalf_px;
-  for (std::size_t t = 0; t < target_.tags.size(); ++t) {
-    if (excluded_[t]) {
-      for (EdgeMeasurement& m : of_tag(t)) m.valid = false;
-      continue;
-    }
-    meter_.measure(pixel_view(image), target_.tags[t], fit.camera_T_platform, half_width_px, coarse,
-                   of_tag(t));
-  }
-  return solve(coarse ? kCoarseMinScale_px : kFineMinScale_px, fit);
 }
 
 /// Standard deviation of the valid offsets about zero, from their median: half of the points may be
@@ -399,7 +389,7 @@ double Refiner::robust_scale_px() noexcept {
   return kMadToSigma * static_cast<double>(*middle);
 }
 
-Refiner::Step Refiner::solve(double min_scale_px, Refinement& fit) noexcept {
+std::optional<double> Refiner::solve(double min_scale_px, Refinement& fit) noexcept {
   Vector6 units;
   units << Eigen::Vector3d::Constant(kLengthScale), Eigen::Vector3d::Ones();
   const double cut = kTukey95 * std::max(robust_scale_px(), min_scale_px);
@@ -442,7 +432,7 @@ Refiner::Step Refiner::solve(double min_scale_px, Refinement& fit) noexcept {
   const double variance_px2 = residual_px2 / std::max(1.0, weights - 6.0);
   fit.residual_px = std::sqrt(residual_px2 / weights);
   fit.covariance = variance_px2 * (units.asDiagonal() * ldlt.inverse() * units.asDiagonal());
-  return {true, std::sqrt(moved_px2 / weights)};
+  return std::sqrt(moved_px2 / weights);
 }
 
 /// Excludes the tags that the fit or their looks speak against; the number of those left.

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -170,19 +171,16 @@ class Refiner {
   Refinement refine(const ImageView& image, const Eigen::Isometry3d& predicted) noexcept;
 
  private:
-  struct Step {
-    bool solved = false;
-    double size_px = 0;  // RMS change of the image points
-  };
-
   bool converge(const ImageView& image, Refinement& fit) noexcept;
-  Step iterate(const ImageView& image, bool coarse, Refinement& fit) noexcept;
-  Step solve(double min_scale_px, Refinement& fit) noexcept;
+  /// RMS change of the image points, px; nothing where there is no solution.
+  std::optional<double> solve(double min_scale_px, Refinement& fit) noexcept;
   double robust_scale_px() noexcept;
   int judge_tags(const ImageView& image, const Refinement& fit) noexcept;
   bool looks_like_tag(const ImageView& image, const EdgeTag& tag,
                       const Eigen::Isometry3d& pose) noexcept;
-  std::span<EdgeMeasurement> of_tag(std::size_t tag) noexcept;
+  std::span<EdgeMeasurement> of_tag(std::size_t tag) noexcept {
+    return std::span(measurements_).subspan(first_[tag], first_[tag + 1] - first_[tag]);
+  }
 
   EdgeMeter meter_;
   EdgeTarget target_;

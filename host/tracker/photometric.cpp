@@ -218,8 +218,8 @@ bool PhotometricAligner::factorise() noexcept {
   return inverse_.allFinite();
 }
 
-PhotometricAligner::Step PhotometricAligner::step(PhotometricFit& fit,
-                                                  PhotometricState& state) noexcept {
+std::optional<double> PhotometricAligner::step(PhotometricFit& fit,
+                                               PhotometricState& state) noexcept {
   std::array<PatchVector, kMaxTags> rhs;
   for (std::size_t t = 0; t < template_.tags; ++t) rhs[t].setZero();
   for (std::size_t n = 0; n < sums_.size(); ++n) {
@@ -255,7 +255,8 @@ PhotometricAligner::Step PhotometricAligner::step(PhotometricFit& fit,
   state.blur[1] += delta[7];
   // The template moved by delta would look like the image: the platform has moved the other way.
   fit.camera_T_platform = moved(fit.camera_T_platform, -delta.head<6>());
-  return {fit.camera_T_platform.matrix().allFinite(), shared.dot(delta)};
+  if (!fit.camera_T_platform.matrix().allFinite()) return {};
+  return shared.dot(delta);
 }
 
 PhotometricFit PhotometricAligner::align(const PixelWindow& image,
@@ -278,11 +279,11 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
     if (i >= kFirstSteps && typical > first_typical) return fit;  // running away
     judge_patches(typical, near);
     if (!factorise()) return fit;
-    const Step taken = step(fit, now);
-    if (!taken.solved) return fit;
+    const std::optional<double> taken = step(fit, now);
+    if (!taken) return fit;
     const double scale = std::max(1.0, typical);
     // In standard deviations as the residuals have them.
-    step_size = taken.squared_size / squared(scale);
+    step_size = *taken / squared(scale);
     inverse_cut = static_cast<float>(1.0 / (kTukey * scale));
     if (near && step_size < kSmallStep) {
       fit.converged = true;
@@ -374,24 +375,19 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
 }
 
 Region PhotometricAligner::region(const Eigen::Isometry3d& pose, int margin_px) const noexcept {
-  double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
+  Eigen::AlignedBox2d seen;
   for (const PixelPatch& patch : template_.patches) {
     const ProjectedPoint p = project(template_.camera, pose * patch.middle);
     if (!p.valid || !p.pixel.allFinite()) return {};
-    left = std::min(left, p.pixel.x() - patch.reach_px);
-    right = std::max(right, p.pixel.x() + patch.reach_px);
-    top = std::min(top, p.pixel.y() - patch.reach_px);
-    bottom = std::max(bottom, p.pixel.y() + patch.reach_px);
+    const Eigen::Vector2d reach = Eigen::Vector2d::Constant(patch.reach_px);
+    seen.extend(p.pixel - reach).extend(p.pixel + reach);
   }
-  const auto whole = [&](double v, int most) {
-    return static_cast<int>(std::clamp(v, 0.0, static_cast<double>(most)));
-  };
-  Region out;
-  out.x = whole(std::floor(left) - margin_px, template_.camera.width_px);
-  out.y = whole(std::floor(top) - margin_px, template_.camera.height_px);
-  out.width = whole(std::ceil(right) + margin_px + 1, template_.camera.width_px) - out.x;
-  out.height = whole(std::ceil(bottom) + margin_px + 1, template_.camera.height_px) - out.y;
-  return out;
+  const Eigen::Array2d image(template_.camera.width_px, template_.camera.height_px);
+  const Eigen::Array2d first = (seen.min().array().floor() - margin_px).max(0.0).min(image);
+  const Eigen::Array2d past = (seen.max().array().ceil() + margin_px + 1).max(0.0).min(image);
+  const int x = static_cast<int>(first.x());
+  const int y = static_cast<int>(first.y());
+  return {x, y, static_cast<int>(past.x()) - x, static_cast<int>(past.y()) - y};
 }
 
 Vector6 PhotometricAligner::motion_of(const Eigen::Isometry3d& pose,

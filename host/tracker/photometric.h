@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "host/tracker/pixel_sums.h"
@@ -80,17 +81,15 @@ class PhotometricAligner {
     Coupling coupling;   ///< shared against illumination
     Coupling eliminate;  ///< coupling times illumination_inverse
   };
-  struct Step {
-    bool solved = false;
-    double squared_size = 0;  ///< in standard deviations, all shared parameters together
-  };
 
   void view_patches(const Eigen::Isometry3d& pose, const RowMotion& rows,
                     const PhotometricState& state) noexcept;
   double typical_residual() noexcept;
   void judge_patches(double typical, bool near) noexcept;
   bool factorise() noexcept;
-  Step step(PhotometricFit& fit, PhotometricState& state) noexcept;
+  /// The step's size, squared, in standard deviations, all shared parameters together; nothing
+  /// where it leads nowhere.
+  std::optional<double> step(PhotometricFit& fit, PhotometricState& state) noexcept;
   void conclude(PhotometricFit& fit) const noexcept;
 
   PixelTemplate template_;

@@ -115,23 +115,21 @@ struct Box {
 
 /// The pixels that may see the square, clipped to the image.
 Box box_of(const CameraModel& camera, const TagPlane& plane) {
-  double left = camera.width_px, top = camera.height_px, right = 0, bottom = 0;
+  // Turned about where nothing of the square is in the image.
+  Eigen::AlignedBox2d seen(Eigen::Vector2d(camera.width_px, camera.height_px),
+                           Eigen::Vector2d(0, 0));
   for (const Eigen::Vector3d& corner : square_corners(plane.half)) {
     const ProjectedPoint p = project(camera, plane.camera_T_tag * corner);
     if (!p.valid) return {};
-    left = std::min(left, p.pixel.x());
-    right = std::max(right, p.pixel.x());
-    top = std::min(top, p.pixel.y());
-    bottom = std::max(bottom, p.pixel.y());
+    seen.extend(p.pixel);
   }
-  const auto first = [](double v, int end) {
-    return std::clamp(static_cast<int>(std::floor(v)) - kMargin_px, 0, end);
+  const auto within = [](double v, int margin, int end) {
+    return std::clamp(static_cast<int>(v) + margin, 0, end);
   };
-  const auto past = [](double v, int end) {
-    return std::clamp(static_cast<int>(std::ceil(v)) + kMargin_px, 0, end);
-  };
-  return {first(left, camera.width_px), first(top, camera.height_px), past(right, camera.width_px),
-          past(bottom, camera.height_px)};
+  return {within(std::floor(seen.min().x()), -kMargin_px, camera.width_px),
+          within(std::floor(seen.min().y()), -kMargin_px, camera.height_px),
+          within(std::ceil(seen.max().x()), kMargin_px, camera.width_px),
+          within(std::ceil(seen.max().y()), kMargin_px, camera.height_px)};
 }
 
 /// Rows of a rectangle of a picture, without padding.

@@ -54,20 +54,10 @@ TagPattern tag_pattern(TagFamily family, int id, double size, double border) {
   const cv::Ptr<cv::aruco::Dictionary> dictionary = tag_dictionary(family);
   const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(
       dictionary->bytesList.rowRange(id, id + 1), dictionary->markerSize);
-  TagPattern pattern;
-  pattern.id = id;
-  pattern.cells = dictionary->markerSize + 2;
-  pattern.size = size;
-  pattern.border = border;
-  pattern.white.assign(
-      static_cast<std::size_t>(pattern.cells) * static_cast<std::size_t>(pattern.cells), 0);
-  for (int row = 0; row < bits.rows; ++row) {
-    for (int column = 0; column < bits.cols; ++column) {
-      pattern.white[static_cast<std::size_t>((row + 1) * pattern.cells + column + 1)] =
-          bits.at<std::uint8_t>(row, column);
-    }
-  }
-  return pattern;
+  cv::Mat cells;  // with its black border
+  cv::copyMakeBorder(bits, cells, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
+  return {
+      .id = id, .cells = cells.rows, .size = size, .border = border, .white = cells.reshape(1, 1)};
 }
 
 std::optional<int> identify_tag(TagFamily family, const std::vector<std::uint8_t>& white) {

@@ -52,10 +52,10 @@ enum class FeatureKind : std::uint8_t {
 constexpr int kFeatureKinds = 4;
 constexpr int kMaxFeatures = 27;
 
+constexpr std::array<std::string_view, kFeatureKinds> kFeatureNames{"linear", "quadratic", "creep",
+                                                                    "hysteresis"};
 constexpr std::string_view name(FeatureKind kind) {
-  constexpr std::array<std::string_view, kFeatureKinds> kNames{"linear", "quadratic", "creep",
-                                                               "hysteresis"};
-  return kNames[static_cast<std::size_t>(kind)];
+  return kFeatureNames[static_cast<std::size_t>(kind)];
 }
 
 constexpr int feature_count(FeatureKind kind) {

@@ -97,13 +97,10 @@ enum class AxisState : std::uint8_t {
   not_determined,  ///< neither data nor springs say anything
 };
 
+constexpr std::array<const char*, 3> kAxisStateNames{"calibrated", "from the spring model",
+                                                     "not determined"};
 constexpr const char* name(AxisState state) {
-  switch (state) {
-    case AxisState::calibrated: return "calibrated";
-    case AxisState::spring_model: return "from the spring model";
-    case AxisState::not_determined: return "not determined";
-  }
-  return "?";
+  return kAxisStateNames[static_cast<std::size_t>(state)];
 }
 
 struct AxisFit {
