@@ -24,7 +24,7 @@
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
 #include "host/sensor/measured_files.h"
-#include "host/source/images.h"
+#include "host/source/replay.h"
 
 namespace tagwrench {
 namespace {

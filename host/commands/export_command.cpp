@@ -24,7 +24,7 @@
 #include "host/core/log.h"
 #include "host/output/line_outputs.h"
 #include "host/recording/reader.h"
-#include "host/source/recording.h"
+#include "host/source/replay.h"
 
 namespace tagwrench {
 namespace {

@@ -2,7 +2,7 @@
 // In:  what `--source` names; the region that the tracker wants to see.
 // Out: Frame: grey pixels, lent until the next read(), and their time (CLOCK_MONOTONIC).
 // Axes: the picture as delivered, px: x right, y down, pixel centres at whole numbers.
-// Then: v4l2_source.h, images.h, recording.h, decode.h, simulator/scenario.h.
+// Then: v4l2_source.h, replay.h, decode.h, simulator/scenario.h.
 //
 // Where frames come from. A camera, a folder, a recording and the simulator are equals behind this
 // interface.

@@ -1,6 +1,4 @@
 // What the loop recorded goes through the loop again: the same samples, and the same gaps.
-#include "host/source/recording.h"
-
 #include <sys/eventfd.h>
 
 #include <filesystem>
@@ -8,6 +6,7 @@
 #include "host/output/line_outputs.h"
 #include "host/recording/writer.h"
 #include "host/sensor/sensor_config.h"
+#include "host/source/replay.h"
 #include "tests/sim/played.h"
 #include "tests/support/temporary_folder.h"
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "host/recording/database.h"
-#include "host/source/recording.h"
+#include "host/source/replay.h"
 #include "tests/unit/recording/recorded.h"
 
 namespace tagwrench::record::test {

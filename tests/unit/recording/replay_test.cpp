@@ -1,8 +1,9 @@
 // A recording as a source: what was decoded is decoded again, and nothing more.
+#include "host/source/replay.h"
+
 #include <poll.h>
 
 #include "host/source/frame_source.h"
-#include "host/source/recording.h"
 #include "tests/unit/recording/recorded.h"
 
 namespace tagwrench::record::test {

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "host/source/images.h"
+#include "host/source/replay.h"
 #include "tests/unit/source/message.h"
 
 namespace tagwrench {

@@ -1,5 +1,3 @@
-#include "host/source/images.h"
-
 #include <gtest/gtest.h>
 #include <poll.h>
 
@@ -7,6 +5,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "host/source/replay.h"
 #include "tests/unit/source/jpeg_fixture.h"
 #include "tests/unit/source/message.h"
 

@@ -1,4 +1,8 @@
-// A folder of pictures as a camera: PNG, PGM and JPEG in the order of their names.
+// What was recorded, as a camera: a folder of pictures (PNG, PGM and JPEG in the order of their
+// names), and a recording, whose frames are decoded as they were, and where none came, none comes.
+//
+// `fast`: everything is delivered, as fast as read() is called; else the recorded times pace it,
+// beginning at the first read(), and a loop that is late loses frames.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +14,7 @@
 
 #include "host/core/os/unique_fd.h"
 #include "host/core/types.h"
+#include "host/recording/reader.h"
 #include "host/source/decode.h"
 #include "host/source/frame_source.h"
 
@@ -26,10 +31,9 @@ std::vector<Duration> parse_frame_times(std::string_view text, const std::string
 
 class ImagesSource final : public FrameSource {
  public:
-  /// Times come from DIR/frames.csv where there is one, else 25 frames a second. `fast`: every
-  /// frame is delivered, as fast as read() is called; else the recorded times pace it, beginning at
-  /// the first read(), and a loop that is late loses frames. Throws ConfigError: no folder, no
-  /// pictures, an unreadable header, sizes that differ, a bad frames.csv.
+  /// Times come from DIR/frames.csv where there is one, else 25 frames a second. Throws
+  /// ConfigError: no folder, no pictures, an unreadable header, sizes that differ, a bad
+  /// frames.csv.
   ImagesSource(const std::string& dir, bool fast);
 
   const SourceFormat& format() const noexcept override { return format_; }
@@ -66,6 +70,48 @@ class ImagesSource final : public FrameSource {
   std::size_t delivered_ = 0;  ///< index after the last frame that was handed on
   std::uint64_t corrupt_ = 0;
   std::size_t first_corrupt_ = 0;
+};
+
+class RecordingSource final : public FrameSource {
+ public:
+  /// Throws ConfigError: the recording holds no frames, or their pixels were not kept.
+  RecordingSource(std::unique_ptr<record::RecordingReader> recording, bool fast);
+
+  const SourceFormat& format() const noexcept override { return format_; }
+  int poll_fd() const noexcept override { return timer_ ? timer_.get() : -1; }
+  ReadStatus read(Frame& frame) noexcept override;
+  void want(const Region& region) noexcept override { wanted_ = region; }
+  /// Of a recording that kept regions: false, unless the frame was completed when it was recorded.
+  bool complete(Frame& frame) noexcept override;
+  RawFrame raw() const noexcept override;
+  std::string detail() const override { return detail_; }
+  std::string unusable() const override;
+
+  const record::RecordingReader& recording() const noexcept { return *recording_; }
+
+ private:
+  bool advance() noexcept;
+  TimePoint due() const noexcept { return start_ + (entry_.time - first_); }
+  void arm() const noexcept;
+  void pass_late(TimePoint now) noexcept;
+  bool decode(Frame& frame) noexcept;
+
+  std::unique_ptr<record::RecordingReader> recording_;
+  SourceFormat format_;
+  UniqueFd timer_;
+  RawDecoder decoder_;
+  std::vector<std::uint8_t> picture_;  ///< that crops are placed in
+  record::Entry entry_;                ///< the next, or the one just delivered
+  bool waiting_ = false;               ///< entry_ was not delivered yet
+  std::size_t frame_ = 0;              ///< number, from 0, of the next that will be delivered
+  bool started_ = false;
+  TimePoint start_{};
+  TimePoint first_{};
+  Region wanted_;
+  std::uint32_t passed_ = 0;  ///< frames that were skipped since the last one
+  std::uint64_t unusable_ = 0;
+  std::string damage_;
+  std::string detail_;
 };
 
 }  // namespace tagwrench
