@@ -42,8 +42,8 @@ std::optional<std::uint64_t> limit_reached(const std::filesystem::path& path) {
 
 /// Of a file that cannot grow; empty: something else.
 std::optional<Cause> cannot_grow(const std::filesystem::path& path, const DatabaseError& error) {
-  const int kind = error.code() & 0xff;
-  const int system = error.system_errno();
+  const int kind = error.code & 0xff;
+  const int system = error.system_errno;
   if (kind != SQLITE_FULL && kind != SQLITE_IOERR) return {};
   // First, because a write that ended in the middle passes for a full disk, or has no errno.
   if (const auto limit = limit_reached(path)) {
@@ -301,33 +301,30 @@ Sink::Sink(const std::filesystem::path& path, const Head& head)
       event_(database_, insert("events", 6)),
       meta_(database_, "INSERT OR REPLACE INTO meta VALUES (?,?)") {
   try {
-    write_head(head);
+    meta("created", head.created);
+    meta("software", head.software);
+    meta("source", head.source);
+    meta("width", std::to_string(head.width));
+    meta("height", std::to_string(head.height));
+    meta("period_ns", std::to_string(head.period.count()));
+    meta("keep", name(head.keep));
+    meta("closed", "0");
+    for (const auto& [key, value] : head.more) meta(key, value);
+    Statement file(database_, "INSERT INTO files VALUES (?,?,?)");
+    const auto keep = [&file](std::string_view role, std::string_view called,
+                              const std::string& content) {
+      put(file, role, called,
+          std::span(reinterpret_cast<const std::uint8_t*>(content.data()), content.size()));
+    };
+    keep("sensor.yaml", head.sensor_name, head.sensor_yaml);
+    if (!head.appearance.empty()) keep("appearance", "", head.appearance);
+    if (!head.calibration.empty()) keep("calibration", "", head.calibration);
+    for (const auto& [called, content] : head.measured)
+      keep(kMeasuredRole + called, called, content);
     commit();
   } catch (const DatabaseError& e) {
     throw not_begun(path, e);
   }
-}
-
-void Sink::write_head(const Head& head) {
-  meta("created", head.created);
-  meta("software", head.software);
-  meta("source", head.source);
-  meta("width", std::to_string(head.width));
-  meta("height", std::to_string(head.height));
-  meta("period_ns", std::to_string(head.period.count()));
-  meta("keep", name(head.keep));
-  meta("closed", "0");
-  for (const auto& [key, value] : head.more) meta(key, value);
-  Statement file(database_, "INSERT INTO files VALUES (?,?,?)");
-  const auto keep = [&file](std::string_view role, std::string_view called,
-                            const std::string& content) {
-    put(file, role, called,
-        std::span(reinterpret_cast<const std::uint8_t*>(content.data()), content.size()));
-  };
-  keep("sensor.yaml", head.sensor_name, head.sensor_yaml);
-  if (!head.appearance.empty()) keep("appearance", "", head.appearance);
-  if (!head.calibration.empty()) keep("calibration", "", head.calibration);
-  for (const auto& [called, content] : head.measured) keep(kMeasuredRole + called, called, content);
 }
 
 void Sink::meta(std::string_view key, std::string_view value) { put(meta_, key, value); }

@@ -18,18 +18,12 @@ struct sqlite3_stmt;
 namespace tagwrench::record {
 
 /// What SQLite or the disk said, or what a row holds that cannot be.
-class DatabaseError : public std::runtime_error {
- public:
-  DatabaseError(const std::string& what, int code, int system_errno = 0)
-      : std::runtime_error(what), code_(code), system_errno_(system_errno) {}
-  /// SQLite's extended result code.
-  int code() const noexcept { return code_; }
-  /// The system's errno where it was the disk; 0: not known.
-  int system_errno() const noexcept { return system_errno_; }
+struct DatabaseError : std::runtime_error {
+  DatabaseError(const std::string& what, int sqlite_code, int its_errno = 0)
+      : std::runtime_error(what), code(sqlite_code), system_errno(its_errno) {}
 
- private:
-  int code_;
-  int system_errno_;
+  int code;          ///< SQLite's extended result code
+  int system_errno;  ///< the system's where it was the disk; 0: not known
 };
 
 class Database {
@@ -136,8 +130,6 @@ class Sink {
   bool close() noexcept;
 
  private:
-  void write_head(const Head& head);
-
   Database database_;
   Statement frame_;
   Statement track_;

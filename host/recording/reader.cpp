@@ -326,11 +326,11 @@ RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path
     read_head();
     check_times();
   } catch (const DatabaseError& e) {
-    if (e.code() == SQLITE_NOTADB) {
+    if (e.code == SQLITE_NOTADB) {
       throw ConfigError("{}: is not a recording; give a file that `tagwrench record --out` made",
                         path.string());
     }
-    if ((e.code() & 0xff) == SQLITE_CANTOPEN || (e.code() & 0xff) == SQLITE_READONLY) {
+    if ((e.code & 0xff) == SQLITE_CANTOPEN || (e.code & 0xff) == SQLITE_READONLY) {
       throw ConfigError(
           "{}: cannot be opened: {}; if {}-wal is beside it, copy both to a folder of yours",
           path.string(), e.what(), path.filename().string());
@@ -340,10 +340,6 @@ RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path
 }
 
 RecordingReader::~RecordingReader() = default;
-
-std::string_view RecordingReader::unclosed() const noexcept {
-  return head_.closed ? "" : "was not closed: its last seconds may be missing";
-}
 
 void RecordingReader::damaged(const std::string& what) const {
   throw ConfigError(

@@ -68,7 +68,9 @@ class RecordingReader {
   const Head& head() const noexcept { return head_; }
   /// For people, without the file's name: what may be missing because the writer did not come to
   /// its end. Empty: it did.
-  std::string_view unclosed() const noexcept;
+  std::string_view unclosed() const noexcept {
+    return head_.closed ? "" : "was not closed: its last seconds may be missing";
+  }
   /// Of all frames; they grow.
   const std::vector<TimePoint>& frame_times() const noexcept { return times_; }
 

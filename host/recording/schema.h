@@ -9,8 +9,7 @@
 //          sources, the folder's or the simulator's own of others. origin_ns (where latency counts
 //          from) and output_ns (the output call) are CLOCK_MONOTONIC always.
 // Numbers  SI unless the name says else; displacement, wrench and corners as in host/core/types.h.
-// NULL
-//          is "not a number" or "none".
+// NULL     is "not a number" or "none".
 // Blobs    of numbers are little-endian doubles without padding.
 //
 // meta       key, value: created (UTC), software (version), source (one line), width, height,
@@ -21,8 +20,7 @@
 // frames     seq, t_ns, origin_ns, dropped; fourcc, stride and bytes of the frame as it came
 //            (keep: raw), or CROP and the luminance of the part all_* (keep: region), or
 //            NULL; first_* is the part that was decoded first, all_* what was decoded in the end
-// tracks     status, hint (number of tagwrench::Diagnostic), displacement, covariance (its
-// upper
+// tracks     status, hint (number of tagwrench::Diagnostic), displacement, covariance (its upper
 //            triangle, row by row, 21 numbers), residual_px, residual_fraction, blur_px2,
 //            tags_held, corners (for each tag 9 numbers: id, then x, y of four corners, px)
 // samples    as the outputs got them

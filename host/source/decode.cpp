@@ -51,8 +51,6 @@ void judge_message(j_common_ptr jpeg, int level) {
   if (damage || misled) leave(jpeg);
 }
 
-void say_nothing(j_common_ptr /*jpeg*/) {}
-
 void limit_scans(j_common_ptr jpeg) {
   if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number > kMaxScans) leave(jpeg);
 }
@@ -210,7 +208,7 @@ struct JpegLuma::State {
     jpeg.err = jpeg_std_error(&errors);
     errors.error_exit = leave;
     errors.emit_message = judge_message;
-    errors.output_message = say_nothing;
+    errors.output_message = [](j_common_ptr) {};
     jpeg.client_data = &caller;
     usable = ends_well(caller, [this] {
       jpeg_create_decompress(&jpeg);
@@ -225,68 +223,62 @@ struct JpegLuma::State {
     open();
   }
 
-  bool read(std::span<const std::uint8_t> bytes, int width, int height, const Region& region,
-            std::uint8_t* luma, Region& written);
-
- private:
-  int pass_rows_above(int y);
-};
-
-/// Between header and scan: moves on to the last restart marker from which whole rows of blocks
-/// follow, row `y` (px) among them. Returns how many rows of pixels were passed; none where the
-/// picture has no such markers.
-int JpegLuma::State::pass_rows_above(int y) {
-  caller.markers_passed = 0;
-  const bool interleaved = jpeg.num_components > 1;
-  if (jpeg.restart_interval == 0 || jpeg.progressive_mode || jpeg.arith_code ||
-      jpeg.comps_in_scan != jpeg.num_components || (!interleaved && jpeg.max_v_samp_factor > 1))
-    return 0;
-  // A minimum coded unit; of a single component it is one block (T.81, A.2).
-  const std::int64_t unit_width = DCTSIZE * (interleaved ? jpeg.max_h_samp_factor : 1);
-  const std::int64_t unit_height = DCTSIZE * jpeg.max_v_samp_factor;
-  const std::int64_t units_per_row = (jpeg.image_width + unit_width - 1) / unit_width;
-  std::int64_t row = y / unit_height;
-  while (row * units_per_row % jpeg.restart_interval != 0) --row;
-  if (row == 0) return 0;
-  caller.markers_passed = row * units_per_row / jpeg.restart_interval;
-  jpeg_source_mgr& source = *jpeg.src;
-  const auto entry = after_restart_markers({source.next_input_byte, source.bytes_in_buffer},
-                                           caller.markers_passed);
-  if (!entry) leave(common(jpeg));
-  source.next_input_byte += *entry;
-  source.bytes_in_buffer -= *entry;
-  source.resync_to_restart = judge_restart;
-  return static_cast<int>(row * unit_height);
-}
-
-/// Only inside ends_well().
-bool JpegLuma::State::read(std::span<const std::uint8_t> bytes, int width, int height,
-                           const Region& region, std::uint8_t* luma, Region& written) {
-  jpeg_mem_src(&jpeg, bytes.data(), static_cast<unsigned long>(bytes.size()));
-  jpeg_read_header(&jpeg, TRUE);
-  if (static_cast<int>(jpeg.image_width) != width ||
-      static_cast<int>(jpeg.image_height) != height || !luminance_is_finest(jpeg))
-    return false;
-  // Grey output makes libjpeg skip the chroma transforms. Huffman tables that a webcam leaves out
-  // are the standard ones, which libjpeg-turbo supplies by itself.
-  jpeg.out_color_space = JCS_GRAYSCALE;
-  jpeg.do_block_smoothing = FALSE;               // guesses of an unfinished progressive picture
-  const int passed = pass_rows_above(region.y);  // libjpeg takes the next row for the first
-  jpeg_start_decompress(&jpeg);
-
-  auto left = static_cast<JDIMENSION>(region.x);
-  auto columns = static_cast<JDIMENSION>(region.width);
-  if (region.width < width) jpeg_crop_scanline(&jpeg, &left, &columns);
-  written = {static_cast<int>(left), region.y, static_cast<int>(columns), region.height};
-  if (region.y > passed) jpeg_skip_scanlines(&jpeg, static_cast<JDIMENSION>(region.y - passed));
-  for (int y = region.y; y < region.y + region.height; ++y) {
-    JSAMPROW row = luma + static_cast<std::ptrdiff_t>(y) * width + written.x;
-    jpeg_read_scanlines(&jpeg, &row, 1);
+  /// Between header and scan: moves on to the last restart marker from which whole rows of blocks
+  /// follow, row `y` (px) among them. Returns how many rows of pixels were passed; none where the
+  /// picture has no such markers.
+  int pass_rows_above(int y) {
+    caller.markers_passed = 0;
+    const bool interleaved = jpeg.num_components > 1;
+    if (jpeg.restart_interval == 0 || jpeg.progressive_mode || jpeg.arith_code ||
+        jpeg.comps_in_scan != jpeg.num_components || (!interleaved && jpeg.max_v_samp_factor > 1))
+      return 0;
+    // A minimum coded unit; of a single component it is one block (T.81, A.2).
+    const std::int64_t unit_width = DCTSIZE * (interleaved ? jpeg.max_h_samp_factor : 1);
+    const std::int64_t unit_height = DCTSIZE * jpeg.max_v_samp_factor;
+    const std::int64_t units_per_row = (jpeg.image_width + unit_width - 1) / unit_width;
+    std::int64_t row = y / unit_height;
+    while (row * units_per_row % jpeg.restart_interval != 0) --row;
+    if (row == 0) return 0;
+    caller.markers_passed = row * units_per_row / jpeg.restart_interval;
+    jpeg_source_mgr& source = *jpeg.src;
+    const auto entry = after_restart_markers({source.next_input_byte, source.bytes_in_buffer},
+                                             caller.markers_passed);
+    if (!entry) leave(common(jpeg));
+    source.next_input_byte += *entry;
+    source.bytes_in_buffer -= *entry;
+    source.resync_to_restart = judge_restart;
+    return static_cast<int>(row * unit_height);
   }
-  // All rows were read: whatever is wrong in the rest of the file counts too.
-  if (jpeg.output_scanline == jpeg.output_height) jpeg_finish_decompress(&jpeg);
-  return true;
-}
+
+  /// Only inside ends_well().
+  bool read(std::span<const std::uint8_t> bytes, int width, int height, const Region& region,
+            std::uint8_t* luma, Region& written) {
+    jpeg_mem_src(&jpeg, bytes.data(), static_cast<unsigned long>(bytes.size()));
+    jpeg_read_header(&jpeg, TRUE);
+    if (static_cast<int>(jpeg.image_width) != width ||
+        static_cast<int>(jpeg.image_height) != height || !luminance_is_finest(jpeg))
+      return false;
+    // Grey output makes libjpeg skip the chroma transforms. Huffman tables that a webcam leaves out
+    // are the standard ones, which libjpeg-turbo supplies by itself.
+    jpeg.out_color_space = JCS_GRAYSCALE;
+    jpeg.do_block_smoothing = FALSE;               // guesses of an unfinished progressive picture
+    const int passed = pass_rows_above(region.y);  // libjpeg takes the next row for the first
+    jpeg_start_decompress(&jpeg);
+
+    auto left = static_cast<JDIMENSION>(region.x);
+    auto columns = static_cast<JDIMENSION>(region.width);
+    if (region.width < width) jpeg_crop_scanline(&jpeg, &left, &columns);
+    written = {static_cast<int>(left), region.y, static_cast<int>(columns), region.height};
+    if (region.y > passed) jpeg_skip_scanlines(&jpeg, static_cast<JDIMENSION>(region.y - passed));
+    for (int y = region.y; y < region.y + region.height; ++y) {
+      JSAMPROW row = luma + static_cast<std::ptrdiff_t>(y) * width + written.x;
+      jpeg_read_scanlines(&jpeg, &row, 1);
+    }
+    // All rows were read: whatever is wrong in the rest of the file counts too.
+    if (jpeg.output_scanline == jpeg.output_height) jpeg_finish_decompress(&jpeg);
+    return true;
+  }
+};
 
 JpegLuma::JpegLuma(int width, int height)
     : state_(std::make_unique<State>()), width_(width), height_(height) {

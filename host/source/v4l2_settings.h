@@ -33,8 +33,7 @@ struct V4l2Options {
   int height = 0;
   double fps = 0;
   std::optional<PixelFormat> pixels;
-  int preferred_width =
-      640;  ///< the sensor's size, taken when no size is asked and the camera has it
+  int preferred_width = 640;  ///< the sensor's size, taken when none is asked and the camera has it
   int preferred_height = 480;
   int exposure_us = 0;  ///< 0 keeps what automatic exposure settled on
 };

@@ -24,8 +24,7 @@ using Clock = std::chrono::steady_clock;
 constexpr Duration kRetryEvery = 500ms;
 constexpr Duration kReopenAfter = 2s;  ///< an open camera that gives no frame is opened afresh
 constexpr int kSettleFrames = 20;
-constexpr int kClockFrames =
-    3;  ///< enough to judge the driver's clock where nothing needs to settle
+constexpr int kClockFrames = 3;  ///< enough to judge the driver's clock if nothing has to settle
 constexpr Duration kSettleAtMost = 1500ms;
 constexpr double kExposureUnit_us = 100;  ///< of V4L2_CID_EXPOSURE_ABSOLUTE
 
@@ -227,8 +226,8 @@ RawFrame V4l2Source::raw() const noexcept {
 /// `queued`: how many buffers the driver had to fill since the last read().
 ReadStatus V4l2Source::drain(unsigned queued, Frame& frame) noexcept {
   std::optional<V4l2Buffer> newest;
-  const unsigned at_most =
-      2 * device_->buffer_count();  // a camera faster than this loop must not hold it
+  // A camera faster than this loop must not hold it.
+  const unsigned at_most = 2 * device_->buffer_count();
   unsigned taken = 0;
   while (taken < at_most) {
     V4l2Buffer buffer;

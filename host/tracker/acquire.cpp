@@ -14,6 +14,10 @@ namespace {
 
 using Rays = Square;  ///< at z = 1
 
+bool contains(const auto& ids, int id) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
 std::optional<Rays> rays_of(const CameraModel& camera, const Square& corners) {
   Rays rays;
   for (std::size_t c = 0; c < 4; ++c) {
@@ -70,8 +74,8 @@ constexpr TagFamily kLargest[] = {
 constexpr int kSmaller = 3;
 
 struct Bits {
-  std::vector<std::uint8_t>
-      inside;           ///< row by row, 1 is white; empty: not a tag of this many cells
+  /// Row by row, 1 is white; empty: not a tag of this many cells.
+  std::vector<std::uint8_t> inside;
   double impurity = 1;  ///< part of the pixels that differ from their cell
 };
 
@@ -88,10 +92,7 @@ class FlatSquare {
         level_[index(row, column)] = interpolated(image, at.x() / at.z(), at.y() / at.z());
       }
     }
-  }
-
-  /// The level that parts black and white best (Otsu, IEEE Trans. SMC 9, 1979), and their means.
-  void part() {
+    // The level that parts black and white best (Otsu, IEEE Trans. SMC 9, 1979), and their means.
     std::array<int, 256> histogram{};
     double all = 0;
     for (const std::uint8_t level : level_) {
@@ -147,8 +148,7 @@ class FlatSquare {
 
 Bits read_bits(const ImageView& image, const Square& square, int bits) {
   const int cells = bits + 2;
-  FlatSquare flat(image, square, cells);
-  flat.part();
+  const FlatSquare flat(image, square, cells);
   Bits read;
   if (flat.contrast() < kMinContrast) return read;
 
@@ -191,8 +191,7 @@ std::optional<ReadSquare> recognise(const std::vector<std::uint8_t>& white, int 
     for (auto row = flipped.begin(); row != flipped.end(); row += bits)
       std::reverse(row, row + bits);
     const auto id = identify_tag(expected, flipped);
-    if (id && std::find(missing.begin(), missing.end(), *id) != missing.end())
-      return ReadSquare{expected, *id, true};
+    if (id && contains(missing, *id)) return ReadSquare{expected, *id, true};
     if (const auto as_it_is = identify_tag(expected, white))
       return ReadSquare{expected, *as_it_is, false};
   }
@@ -298,9 +297,7 @@ Finding sorted(const CameraModel& camera, const TargetDescription& target, Squar
     const auto same = [id = list.ids[i]](const Tag& tag) { return tag.id == id; };
     if (std::any_of(target.tags.begin(), target.tags.end(), same)) continue;
     finding.squares.push_back(list.tags[i]);
-    auto& others = finding.other_ids;
-    if (std::find(others.begin(), others.end(), list.ids[i]) == others.end())
-      others.push_back(list.ids[i]);
+    if (!contains(finding.other_ids, list.ids[i])) finding.other_ids.push_back(list.ids[i]);
   }
   return finding;
 }
@@ -422,17 +419,14 @@ Acquirer::Acquirer(const CameraModel& camera, const TargetDescription& target)
 /// Blur as wide as a third of a cell hides the bits from the library's thresholds: tags not yet
 /// listed are looked for in a sharpened image.
 void Acquirer::add_sharpened(const ImageView& image, SquareList& list) {
-  const auto listed = [&list](int id) {
-    return std::find(list.ids.begin(), list.ids.end(), id) != list.ids.end();
-  };
   if (std::all_of(target_.tags.begin(), target_.tags.end(),
-                  [&](const Tag& tag) { return listed(tag.id); }))
+                  [&](const Tag& tag) { return contains(list.ids, tag.id); }))
     return;
   const std::optional<SquareList> more = finder_.find(image, true);
   if (!more) return;
   const std::vector<int> first = list.ids;
   for (std::size_t i = 0; i < more->ids.size(); ++i) {
-    if (std::find(first.begin(), first.end(), more->ids[i]) != first.end()) continue;
+    if (contains(first, more->ids[i])) continue;
     list.ids.push_back(more->ids[i]);
     list.tags.push_back(more->tags[i]);
   }

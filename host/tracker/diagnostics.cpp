@@ -23,19 +23,6 @@ constexpr double kMinMotion_px = 0.5;
 constexpr int kEnough = 8;         ///< pictures mended
 constexpr double kMaxOfAll = 0.5;  ///< of the pictures tried
 
-/// Only the product of readout and velocity matters.
-bool mended(PhotometricAligner& aligner, const PixelWindow& image, const Eigen::Isometry3d& pose,
-            const Vector6& velocity, const PhotometricState& before) noexcept {
-  const auto fits = [&](double readout) {
-    PhotometricState state = before;
-    const PhotometricFit fit = aligner.align(image, pose, {kUnit, readout * velocity}, state);
-    return accepted(fit, state);
-  };
-  const auto fits_backwards = [&](double readout) { return fits(-readout); };
-  return std::any_of(std::begin(kReadouts), std::end(kReadouts), fits) &&
-         std::none_of(std::begin(kReadouts), std::end(kReadouts), fits_backwards);
-}
-
 using std::chrono::milliseconds;
 
 /// A hand that passes by says nothing: the first look comes this late, and two must agree.
@@ -229,7 +216,15 @@ bool ShutterCheck::rolls(PhotometricAligner& aligner, const PixelWindow& image, 
                           std::max(1e-3, pose.translation().z());
   if (!(speed_px * kUnit > kMinMotion_px)) return false;
   ++tried_;
-  if (mended(aligner, image, pose, velocity, before)) ++mended_;
+  const auto fits = [&](double readout) {  // only its product with the velocity matters
+    PhotometricState state = before;
+    const PhotometricFit fit = aligner.align(image, pose, {kUnit, readout * velocity}, state);
+    return accepted(fit, state);
+  };
+  const auto fits_backwards = [&](double readout) { return fits(-readout); };
+  if (std::any_of(std::begin(kReadouts), std::end(kReadouts), fits) &&
+      std::none_of(std::begin(kReadouts), std::end(kReadouts), fits_backwards))
+    ++mended_;
   done_ = mended_ >= kEnough && mended_ > kMaxOfAll * tried_;
   return done_;
 }

@@ -157,8 +157,8 @@ bool sane(const Eigen::Isometry3d& pose) {
 }  // namespace
 
 EdgePoint shifted(EdgePoint point, double distance) {
-  const bool reversed = point.normal == EdgeNormal::minus_x || point.normal == EdgeNormal::minus_y;
-  (is_along_x(point.normal) ? point.x : point.y) += reversed ? -distance : distance;
+  (is_along_x(point.normal) ? point.x : point.y) +=
+      is_reversed(point.normal) ? -distance : distance;
   return point;
 }
 
@@ -277,11 +277,9 @@ void EdgeMeter::measure(const PixelView<Pixel>& image, const EdgeTag& tag,
     const Eigen::Vector2d along_x = projected.jacobian * axis_x;
     const Eigen::Vector2d along_y = projected.jacobian * axis_y;
     const bool normal_x = is_along_x(point.normal);
-    const bool reversed =
-        point.normal == EdgeNormal::minus_x || point.normal == EdgeNormal::minus_y;
     const Eigen::Vector2d& tangent = normal_x ? along_y : along_x;
     Eigen::Vector2d toward_white = normal_x ? along_x : along_y;
-    if (reversed) toward_white = -toward_white;
+    if (is_reversed(point.normal)) toward_white = -toward_white;
     const double length = tangent.norm();
     if (!(length > 0)) continue;
     Eigen::Vector2d direction(-tangent.y() / length, tangent.x() / length);

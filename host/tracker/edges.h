@@ -24,8 +24,9 @@ namespace tagwrench {
 /// The direction along which an edge goes from black to white, in the tag's axes.
 enum class EdgeNormal : std::uint8_t { plus_x, minus_x, plus_y, minus_y };
 
-constexpr bool is_along_x(EdgeNormal normal) {
-  return normal == EdgeNormal::plus_x || normal == EdgeNormal::minus_x;
+constexpr bool is_along_x(EdgeNormal normal) { return normal <= EdgeNormal::minus_x; }
+constexpr bool is_reversed(EdgeNormal normal) {
+  return normal == EdgeNormal::minus_x || normal == EdgeNormal::minus_y;
 }
 
 /// One place on a black-white boundary, in the tag's plane.

@@ -1,6 +1,6 @@
-#include "host/tracker/pixel_sums.h"
-
 #include <algorithm>
+
+#include "host/tracker/photometric.h"
 
 // Vectors of a length known only at run time (SVE, RVV) cannot be kept in arrays, as sums are here.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)

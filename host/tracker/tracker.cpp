@@ -76,18 +76,173 @@ struct Estimate {
 
 struct Tracker::Impl {
   Impl(const CameraModel& model, const TargetDescription& description,
-       const ReferenceOptions& options);
+       const ReferenceOptions& options)
+      : camera(model),
+        target(description),
+        acquirer(model, description),
+        refiner(model),
+        learner(model, description, options, acquirer.patterns()),
+        diagnostics(model, description) {
+    reference.given = options.camera_T_platform.has_value();
+    const bool placed = std::all_of(description.tags.begin(), description.tags.end(),
+                                    [](const Tag& tag) { return tag.platform_T_tag.has_value(); });
+    if (!placed || !reference.given) return;
+    LearnedReference given;
+    given.camera_T_platform = given.seen_from = *options.camera_T_platform;
+    for (std::size_t t = 0; t < description.tags.size(); ++t) {
+      const Tag& tag = description.tags[t];
+      given.target.tags.push_back(make_edge_tag(acquirer.patterns()[t], *tag.platform_T_tag));
+      given.tag_covariance.emplace_back(tag.sigma.cwiseAbs2().asDiagonal());
+    }
+    if (options.appearance) given.image = *options.appearance;
+    reference.picture_given = options.appearance.has_value();
+    adopt(given);
+    state = TrackingState::searching;
+  }
 
-  void adopt(const LearnedReference& learned);
-  void learn(FrameFacts& facts, Track& track);
-  void learn_picture(const Frame& frame);
-  PhotometricFit align(const Frame& frame, const Eigen::Isometry3d& start);
-  Estimate search(FrameFacts& facts);
-  Refinement find_near(const Frame& frame);
-  Refinement find_anywhere(FrameFacts& facts);
-  Refinement refine_within_reach(const Frame& frame, const Eigen::Isometry3d& start);
-  PhotometricFit finish(const Frame& frame, const Refinement& edges);
-  void conclude(const Estimate& found, FrameFacts& facts, Track& track);
+  /// From now on displacement counts from there.
+  void adopt(const LearnedReference& learned) {
+    reference.camera_T_platform = learned.camera_T_platform;
+    refiner.set_target(learned.target);
+    reference.platform_T_tag.clear();
+    for (const EdgeTag& tag : learned.target.tags)
+      reference.platform_T_tag.push_back(tag.platform_T_tag);
+    predictor.start({}, reference.camera_T_platform);
+    reference.known = true;
+    const ReferenceImage& image = learned.image;
+    if (image.level.empty() || image.width != camera.width_px || image.height != camera.height_px)
+      return;
+    aligner.set_template(
+        make_pixel_template(camera, {image.level.data(), image.width, image.height, image.width},
+                            std::max(1, image.frames), learned.noise, acquirer.patterns(),
+                            learned.target, learned.seen_from, {}));
+    pose_covariance = reference.given ? learned.pose_covariance : Matrix6::Zero();
+    geometry.set(aligner, learned.seen_from, learned.tag_covariance, !reference.given);
+    photometric = {};
+  }
+
+  void learn(FrameFacts& facts, Track& track) {
+    const Frame& frame = facts.frame;
+    if (learner.wants_finding()) search_whole(facts);
+    facts.learning = learner.add(frame.image, finding);
+    track.tags_held = static_cast<std::uint8_t>(learner.tags_seen());
+    if (facts.learning != ReferenceEstimator::Progress::done) return;
+    adopt(learner.learned());
+    predictor.start(frame.capture_time, reference.camera_T_platform);
+    enter_held();
+  }
+
+  /// Where reference pose and placement are given but no picture is, one is taken as soon as the
+  /// platform stands still, wherever that is.
+  void learn_picture(const Frame& frame) {
+    finding = learner.wants_finding() ? acquirer.find(frame.image) : Finding{};
+    if (learner.add(frame.image, finding) != ReferenceEstimator::Progress::done) return;
+    const Eigen::Isometry3d now = predictor.last();
+    adopt(learner.learned());
+    predictor.start(frame.capture_time, now);
+    enter_held();
+  }
+
+  PhotometricFit align(const Frame& frame, const Eigen::Isometry3d& start) {
+    const Region part = frame.readable();
+    const PixelWindow window{frame.image.pixels,  frame.image.stride,  part.x, part.y,
+                             part.x + part.width, part.y + part.height};
+    PhotometricFit fit = aligner.align(window, start, rows(frame.capture_time, start), photometric);
+    if (fit.converged && camera.readout > 0) {
+      fit = aligner.align(window, fit.camera_T_platform,
+                          rows(frame.capture_time, fit.camera_T_platform), photometric);
+    }
+    if (fit.converged && !within_reach(reference.camera_T_platform, fit.camera_T_platform))
+      fit.converged = false;
+    return fit;
+  }
+
+  Refinement refine_within_reach(const Frame& frame, const Eigen::Isometry3d& start) {
+    Refinement fit = refiner.refine(frame.image, start);
+    if (fit.verdict != Verdict::lost &&
+        !within_reach(reference.camera_T_platform, fit.camera_T_platform))
+      fit = {};
+    return fit;
+  }
+
+  /// The edges find a target that is further away than alignment reaches.
+  Refinement find_near(const Frame& frame) {
+    if (!is_held(state)) return {};
+    const Refinement fit = refine_within_reach(frame, predictor.predict(frame.capture_time));
+    // A motion that stops dead is nearer to where it was than to where it was going.
+    return fit.verdict != Verdict::lost ? fit : refine_within_reach(frame, predictor.last());
+  }
+
+  Refinement find_anywhere(FrameFacts& facts) {
+    search_whole(facts);
+    if (finding.tags.empty()) return {};
+    const std::optional<Eigen::Isometry3d> start =
+        pose_from_corners(camera, target.tag_size, finding.tags, reference.platform_T_tag,
+                          reference.camera_T_platform);
+    if (!start) return {};
+    return refine_within_reach(facts.frame, *start);
+  }
+
+  /// From what the edges found to the pose that counts.
+  PhotometricFit finish(const Frame& frame, const Refinement& edges) {
+    if (aligner.ready()) return align(frame, edges.camera_T_platform);
+    PhotometricFit fit;
+    fit.camera_T_platform = edges.camera_T_platform;
+    fit.covariance = edges.covariance;
+    fit.tags_held = edges.tags_held;
+    fit.converged = edges.verdict == Verdict::held;
+    return fit;
+  }
+
+  /// Alignment from the prediction was not accepted, or could not be tried.
+  Estimate search(FrameFacts& facts) {
+    Estimate near;
+    near.edges = find_near(facts.frame);
+    if (near.edges.verdict != Verdict::lost) {
+      near.fit = finish(facts.frame, near.edges);
+      if (is_accepted(near.fit)) return near;
+    }
+    Estimate anew;
+    anew.anew = true;
+    anew.edges = find_anywhere(facts);
+    if (anew.edges.verdict == Verdict::lost) return near;
+    anew.fit = finish(facts.frame, anew.edges);
+    return anew;
+  }
+
+  /// The target is there: numbers if the fit is accepted, and what the next frame needs.
+  void conclude(const Estimate& found, FrameFacts& facts, Track& track) {
+    const TimePoint time = facts.frame.capture_time;
+    const PhotometricFit& fit = found.fit;
+    const Eigen::Isometry3d& pose = found.pose();
+    if (!found.anew && is_held(state))
+      predictor.add(time, pose);
+    else
+      predictor.start(time, pose);
+    enter_held();
+    facts.accepted = is_accepted(fit);
+    facts.pose = pose;
+    facts.by_picture = state == TrackingState::held_by_picture;
+    track.tags_held = fit.converged ? fit.tags_held : found.edges.tags_held;
+    track.residual_px = found.edges.residual_px;
+    if (fit.converged) {
+      track.residual_fraction = fit.residual_fraction;
+      track.blur_px2 = 2 * photometric.blur[0];
+    }
+    track.status = Status::doubtful;
+    set_corners(camera, target, reference.platform_T_tag, pose, track);
+    if (!facts.accepted) return;
+    track.status = Status::ok;
+    track.displacement = motion_between(reference.camera_T_platform, pose);
+    track.covariance = displacement_covariance(fit.covariance, track.displacement) +
+                       geometry.covariance(track.displacement) + pose_covariance;
+    if (state == TrackingState::held_by_picture) {
+      // Supposing that the next frame comes after the same time as this one.
+      track.wanted = aligner.region(predictor.predict(time + predictor.period()), kMargin_px);
+    } else if (stands_still(predictor.step())) {
+      learn_picture(facts.frame);
+    }
+  }
 
   bool readable(const ImageView& image) const {
     return image.pixels != nullptr && image.width == camera.width_px &&
@@ -123,174 +278,6 @@ struct Tracker::Impl {
   GeometryUncertainty geometry;
   Matrix6 pose_covariance = Matrix6::Zero();  ///< of the picture's place against a given reference
 };
-
-Tracker::Impl::Impl(const CameraModel& model, const TargetDescription& description,
-                    const ReferenceOptions& options)
-    : camera(model),
-      target(description),
-      acquirer(model, description),
-      refiner(model),
-      learner(model, description, options, acquirer.patterns()),
-      diagnostics(model, description) {
-  reference.given = options.camera_T_platform.has_value();
-  const bool placed = std::all_of(description.tags.begin(), description.tags.end(),
-                                  [](const Tag& tag) { return tag.platform_T_tag.has_value(); });
-  if (!placed || !reference.given) return;
-  LearnedReference given;
-  given.camera_T_platform = given.seen_from = *options.camera_T_platform;
-  for (std::size_t t = 0; t < description.tags.size(); ++t) {
-    const Tag& tag = description.tags[t];
-    given.target.tags.push_back(make_edge_tag(acquirer.patterns()[t], *tag.platform_T_tag));
-    given.tag_covariance.emplace_back(tag.sigma.cwiseAbs2().asDiagonal());
-  }
-  if (options.appearance) given.image = *options.appearance;
-  reference.picture_given = options.appearance.has_value();
-  adopt(given);
-  state = TrackingState::searching;
-}
-
-/// From now on displacement counts from there.
-void Tracker::Impl::adopt(const LearnedReference& learned) {
-  reference.camera_T_platform = learned.camera_T_platform;
-  refiner.set_target(learned.target);
-  reference.platform_T_tag.clear();
-  for (const EdgeTag& tag : learned.target.tags)
-    reference.platform_T_tag.push_back(tag.platform_T_tag);
-  predictor.start({}, reference.camera_T_platform);
-  reference.known = true;
-  const ReferenceImage& image = learned.image;
-  if (image.level.empty() || image.width != camera.width_px || image.height != camera.height_px)
-    return;
-  aligner.set_template(
-      make_pixel_template(camera, {image.level.data(), image.width, image.height, image.width},
-                          std::max(1, image.frames), learned.noise, acquirer.patterns(),
-                          learned.target, learned.seen_from, {}));
-  pose_covariance = reference.given ? learned.pose_covariance : Matrix6::Zero();
-  geometry.set(aligner, learned.seen_from, learned.tag_covariance, !reference.given);
-  photometric = {};
-}
-
-void Tracker::Impl::learn(FrameFacts& facts, Track& track) {
-  const Frame& frame = facts.frame;
-  if (learner.wants_finding()) search_whole(facts);
-  facts.learning = learner.add(frame.image, finding);
-  track.tags_held = static_cast<std::uint8_t>(learner.tags_seen());
-  if (facts.learning != ReferenceEstimator::Progress::done) return;
-  adopt(learner.learned());
-  predictor.start(frame.capture_time, reference.camera_T_platform);
-  enter_held();
-}
-
-/// Where reference pose and placement are given but no picture is, one is taken as soon as the
-/// platform stands still, wherever that is.
-void Tracker::Impl::learn_picture(const Frame& frame) {
-  finding = learner.wants_finding() ? acquirer.find(frame.image) : Finding{};
-  if (learner.add(frame.image, finding) != ReferenceEstimator::Progress::done) return;
-  const Eigen::Isometry3d now = predictor.last();
-  adopt(learner.learned());
-  predictor.start(frame.capture_time, now);
-  enter_held();
-}
-
-PhotometricFit Tracker::Impl::align(const Frame& frame, const Eigen::Isometry3d& start) {
-  const Region part = frame.readable();
-  const PixelWindow window{frame.image.pixels,  frame.image.stride,  part.x, part.y,
-                           part.x + part.width, part.y + part.height};
-  PhotometricFit fit = aligner.align(window, start, rows(frame.capture_time, start), photometric);
-  if (fit.converged && camera.readout > 0) {
-    fit = aligner.align(window, fit.camera_T_platform,
-                        rows(frame.capture_time, fit.camera_T_platform), photometric);
-  }
-  if (fit.converged && !within_reach(reference.camera_T_platform, fit.camera_T_platform))
-    fit.converged = false;
-  return fit;
-}
-
-Refinement Tracker::Impl::refine_within_reach(const Frame& frame, const Eigen::Isometry3d& start) {
-  Refinement fit = refiner.refine(frame.image, start);
-  if (fit.verdict != Verdict::lost &&
-      !within_reach(reference.camera_T_platform, fit.camera_T_platform))
-    fit = {};
-  return fit;
-}
-
-/// The edges find a target that is further away than alignment reaches.
-Refinement Tracker::Impl::find_near(const Frame& frame) {
-  if (!is_held(state)) return {};
-  const Refinement fit = refine_within_reach(frame, predictor.predict(frame.capture_time));
-  // A motion that stops dead is nearer to where it was than to where it was going.
-  return fit.verdict != Verdict::lost ? fit : refine_within_reach(frame, predictor.last());
-}
-
-Refinement Tracker::Impl::find_anywhere(FrameFacts& facts) {
-  search_whole(facts);
-  if (finding.tags.empty()) return {};
-  const std::optional<Eigen::Isometry3d> start = pose_from_corners(
-      camera, target.tag_size, finding.tags, reference.platform_T_tag, reference.camera_T_platform);
-  if (!start) return {};
-  return refine_within_reach(facts.frame, *start);
-}
-
-/// From what the edges found to the pose that counts.
-PhotometricFit Tracker::Impl::finish(const Frame& frame, const Refinement& edges) {
-  if (aligner.ready()) return align(frame, edges.camera_T_platform);
-  PhotometricFit fit;
-  fit.camera_T_platform = edges.camera_T_platform;
-  fit.covariance = edges.covariance;
-  fit.tags_held = edges.tags_held;
-  fit.converged = edges.verdict == Verdict::held;
-  return fit;
-}
-
-/// Alignment from the prediction was not accepted, or could not be tried.
-Estimate Tracker::Impl::search(FrameFacts& facts) {
-  Estimate near;
-  near.edges = find_near(facts.frame);
-  if (near.edges.verdict != Verdict::lost) {
-    near.fit = finish(facts.frame, near.edges);
-    if (is_accepted(near.fit)) return near;
-  }
-  Estimate anew;
-  anew.anew = true;
-  anew.edges = find_anywhere(facts);
-  if (anew.edges.verdict == Verdict::lost) return near;
-  anew.fit = finish(facts.frame, anew.edges);
-  return anew;
-}
-
-/// The target is there: numbers if the fit is accepted, and what the next frame needs.
-void Tracker::Impl::conclude(const Estimate& found, FrameFacts& facts, Track& track) {
-  const TimePoint time = facts.frame.capture_time;
-  const PhotometricFit& fit = found.fit;
-  const Eigen::Isometry3d& pose = found.pose();
-  if (!found.anew && is_held(state))
-    predictor.add(time, pose);
-  else
-    predictor.start(time, pose);
-  enter_held();
-  facts.accepted = is_accepted(fit);
-  facts.pose = pose;
-  facts.by_picture = state == TrackingState::held_by_picture;
-  track.tags_held = fit.converged ? fit.tags_held : found.edges.tags_held;
-  track.residual_px = found.edges.residual_px;
-  if (fit.converged) {
-    track.residual_fraction = fit.residual_fraction;
-    track.blur_px2 = 2 * photometric.blur[0];
-  }
-  track.status = Status::doubtful;
-  set_corners(camera, target, reference.platform_T_tag, pose, track);
-  if (!facts.accepted) return;
-  track.status = Status::ok;
-  track.displacement = motion_between(reference.camera_T_platform, pose);
-  track.covariance = displacement_covariance(fit.covariance, track.displacement) +
-                     geometry.covariance(track.displacement) + pose_covariance;
-  if (state == TrackingState::held_by_picture) {
-    // Supposing that the next frame comes after the same time as this one.
-    track.wanted = aligner.region(predictor.predict(time + predictor.period()), kMargin_px);
-  } else if (stands_still(predictor.step())) {
-    learn_picture(facts.frame);
-  }
-}
 
 Tracker::Tracker(const CameraModel& camera, const TargetDescription& target,
                  const ReferenceOptions& reference)

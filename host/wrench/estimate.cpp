@@ -20,12 +20,9 @@ WrenchEstimator::WrenchEstimator(const WrenchModel& model)
       tool_(wrench_transform(model.camera_R_wrench_frame.transpose(),
                              -model.camera_R_wrench_frame.transpose() * model.wrench_origin)),
       features_(model.features) {
-  if (model.parameter_covariance.size() > 0) set_parameter_variances();
-}
-
-/// The parameters' covariance as it bears on each number put out, once and for all.
-void WrenchEstimator::set_parameter_variances() {
-  parameters_known_ = true;
+  // The parameters' covariance as it bears on each number put out, once and for all.
+  parameters_known_ = model.parameter_covariance.size() > 0;
+  if (!parameters_known_) return;
   const auto n = model_.parameter_covariance.rows() / 6;
   for (Quadratic& q : parameter_variance_) q.setZero(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {

@@ -131,7 +131,6 @@ class WrenchEstimator {
   using Quadratic =
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxFeatures + 1, kMaxFeatures + 1>;
 
-  void set_parameter_variances();
   Vector6 parameter_variance(const FeatureVector& features) const noexcept;
 
   WrenchModel model_;

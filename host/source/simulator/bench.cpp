@@ -303,10 +303,6 @@ void Bench::remember(double time, const Vector6& wrench) noexcept {
   ++felt_count_;
 }
 
-double Bench::oldest_felt() const noexcept {
-  return felt_count_ <= felt_.size() ? -kNever : felt_at(felt_count_ - felt_.size()).time;
-}
-
 Vector6 Bench::felt(double time) const noexcept {
   if (felt_count_ == 0) return Vector6::Zero();
   std::uint64_t low = felt_count_ - std::min<std::uint64_t>(felt_count_, felt_.size());

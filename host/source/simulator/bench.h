@@ -76,7 +76,9 @@ class Bench final : public AppliedLoad {
   /// The wrench on the platform as it was applied, from `oldest_felt()` to `newest_felt()`; beyond,
   /// at the nearer end.
   Vector6 felt(double time) const noexcept;
-  double oldest_felt() const noexcept;  ///< minus infinity as long as nothing was forgotten
+  double oldest_felt() const noexcept {  ///< minus infinity as long as nothing was forgotten
+    return felt_count_ <= felt_.size() ? -kNever : felt_at(felt_count_ - felt_.size()).time;
+  }
   double newest_felt() const noexcept {
     return felt_count_ == 0 ? 0 : felt_at(felt_count_ - 1).time;
   }

@@ -114,8 +114,8 @@ RigidPose platform_pose(const Target& target,
 Eigen::Matrix<double, 4, 3> spring_centres(const Mechanics& m) {
   const double x = m.spring_half_spacing_x;
   const double y = m.spring_half_spacing_y;
-  const double z =
-      m.spring_attachment_z - 0.5 * m.spring_length;  // the base is on the camera's side
+  // The base is on the camera's side.
+  const double z = m.spring_attachment_z - 0.5 * m.spring_length;
   Eigen::Matrix<double, 4, 3> centres;
   centres << -x, -y, z, x, -y, z, -x, y, z, x, y, z;
   return centres;
@@ -274,10 +274,6 @@ State PlatformMotion::at(double time) const noexcept {
 Vector6 PlatformMotion::seen(double time) const noexcept {
   const Vector6 displacement = at(time).displacement;
   return applied_ ? Vector6(displacement + applied_->rest_change(time)) : displacement;
-}
-
-Vector6 PlatformMotion::applied_wrench(double time) const noexcept {
-  return applied_ ? applied_->wrench(time, at(time).displacement) : player_.applied_wrench(time);
 }
 
 }  // namespace tagwrench::sim

@@ -107,8 +107,8 @@ class LedLight {
   virtual double mean(double from, double to) noexcept = 0;
 };
 
-Eigen::Matrix<double, 4, 3> spring_centres(
-    const Mechanics& mechanics);  ///< one row each, platform frame, m
+/// One row each, platform frame, m.
+Eigen::Matrix<double, 4, 3> spring_centres(const Mechanics& mechanics);
 Matrix6 stiffness(const Mechanics& mechanics);
 Matrix6 inertia(const Mechanics& mechanics);
 Matrix6 damping(const Mechanics& mechanics);
@@ -124,7 +124,7 @@ struct State {
 class PlatformMotion {
  public:
   static constexpr double kStep =
-      2.0e-4;  ///< s; the stiffest mode (about 90 Hz) turns 0.1 rad in it
+      2.0e-4;  ///< s; the stiffest mode (some 90 Hz) turns 0.1 rad in it
 
   /// `load`, borrowed, acts in place of the player's wrench, if there is one.
   PlatformMotion(const Mechanics& mechanics, const TrajectoryPlayer& player, double start_time,
@@ -141,7 +141,9 @@ class PlatformMotion {
   /// The displacement there as it looks from the camera: with what no load made.
   Vector6 seen(double time) const noexcept;
   /// What the user applies there.
-  Vector6 applied_wrench(double time) const noexcept;
+  Vector6 applied_wrench(double time) const noexcept {
+    return applied_ ? applied_->wrench(time, at(time).displacement) : player_.applied_wrench(time);
+  }
 
   void set_state(const State& state) noexcept {
     oldest_ = newest_;

@@ -67,32 +67,15 @@ class Random {
 
 /// Who draws from the scenario's seed; one stream each, so that a change in one leaves the others
 /// alone.
+// clang-format off
 enum Stream : std::uint64_t {
-  kPlacement = 1,
-  kMotion,
-  kPlate,
-  kNoiseTable,
-  kNoiseOffsets,
-  kHardMotion,
-  kHardMotionOrder,
-  kDisturbances,
-  kDisturbanceOrder,
-  kDirt,
-  kLostFrames,
-  kDeliveryJitter,
-  kStaleFrames,
-  kBenchMass,
-  kBenchPoint,
-  kBenchMounting,
-  kBenchAction,
-  kBenchStroke,
-  kBenchHand,
-  kLoadCell,
-  kSixAxis,
-  kBenchString,
-  kDeskActs,
-  kDeskWander,
+  kPlacement = 1, kMotion, kPlate, kNoiseTable, kNoiseOffsets,
+  kHardMotion, kHardMotionOrder, kDisturbances, kDisturbanceOrder, kDirt, kLostFrames,
+  kDeliveryJitter, kStaleFrames,
+  kBenchMass, kBenchPoint, kBenchMounting, kBenchAction, kBenchStroke, kBenchHand,
+  kLoadCell, kSixAxis, kBenchString, kDeskActs, kDeskWander,
   kPrint = 100
 };
+// clang-format on
 
 }  // namespace tagwrench::sim

@@ -66,6 +66,11 @@ void find_texels(const std::array<float, 9>& h, const float* x, const float* y, 
   }
 }
 
+/// A ray's coordinate 2 dx and 2 dy pixels beside its pixel's middle, by those of the neighbours.
+float beside(const float* ray, std::ptrdiff_t row_step, float dx, float dy) {
+  return ray[0] + dx * (ray[1] - ray[-1]) + dy * (ray[row_step] - ray[-row_step]);
+}
+
 constexpr int kVisibilityGrid = 16;  // points along each side of a tag
 constexpr double kMinContrast_counts = 10;
 constexpr double kSpotReach = 5;  // sigmas, where a spot of light ends
@@ -136,12 +141,9 @@ void Renderer::draw_fine(const View& view, int row) noexcept {
     for (int parity = 0; parity < 2; ++parity) {
       const int run = (count - parity + 1) / 2;
       for (int i = 0; i < run; ++i) {
-        const float* px = x + parity + 2 * i;
-        const float* py = y + parity + 2 * i;
-        scratch_.x[static_cast<std::size_t>(i)] =
-            px[0] + dx * (px[1] - px[-1]) + dy * (px[row_step] - px[-row_step]);
-        scratch_.y[static_cast<std::size_t>(i)] =
-            py[0] + dx * (py[1] - py[-1]) + dy * (py[row_step] - py[-row_step]);
+        const auto to = static_cast<std::size_t>(i);
+        scratch_.x[to] = beside(x + parity + 2 * i, row_step, dx, dy);
+        scratch_.y[to] = beside(y + parity + 2 * i, row_step, dx, dy);
       }
       const int turn = kOrders[(row + 2 * ((view.left + parity) & 1)) & 3][sample];
       for (int pass = 0; pass < passes; ++pass) {
@@ -172,8 +174,8 @@ void Renderer::draw_even(const View& view, int row) noexcept {
     const float dy = 0.5F * place(sample / kEvenSamples);
     for (int i = 0; i < count; ++i) {
       const auto to = static_cast<std::size_t>(i);
-      scratch_.x[to] = x[i] + dx * (x[i + 1] - x[i - 1]) + dy * (x[i + row_step] - x[i - row_step]);
-      scratch_.y[to] = y[i] + dx * (y[i + 1] - y[i - 1]) + dy * (y[i + row_step] - y[i - row_step]);
+      scratch_.x[to] = beside(x + i, row_step, dx, dy);
+      scratch_.y[to] = beside(y + i, row_step, dx, dy);
     }
     for (int i = 0; i < view.instant_count; ++i)
       add_samples(*view.texture, view.instants[static_cast<std::size_t>(i)], count, 0, 1);

@@ -78,8 +78,8 @@ class Renderer {
     std::array<TexelFromRay, kMaxInstants> instants{};
     int instant_count = 1;
     float shade = 1;
-    int left = 0, right = 0, top = 0,
-        bottom = 0;  ///< pixels that it can touch; right and bottom exclusive
+    /// Pixels that it can touch; right and bottom exclusive.
+    int left = 0, right = 0, top = 0, bottom = 0;
   };
   struct Scratch {  ///< one row of texel lookups
     std::vector<float> x, y, u, v, reflectance, coverage;

@@ -55,8 +55,8 @@ struct Mechanics {
   double bending_stiffness = 3.23e-3;
   double torsion_stiffness = 3.71e-3;
 
-  std::array<double, 6> range{0.9,   0.9,   2.5,
-                              0.016, 0.016, 0.009};  ///< usable range, N and N m, told to the user
+  /// Usable range, N and N m, told to the user.
+  std::array<double, 6> range{0.9, 0.9, 2.5, 0.016, 0.016, 0.009};
 
   // What real springs and glue add to Hooke's law; none of it by default.
 
@@ -78,19 +78,16 @@ struct Camera {
   double fy_px = 805.0;
   double cx_px = 319.5;
   double cy_px = 239.5;
-  std::array<double, 5> distortion{-0.06, 0.02, 4e-4, -3e-4,
-                                   0.0};  ///< k1 k2 p1 p2 k3, OpenCV's model
-  double frame_rate = 25.0;               ///< Hz
-  bool mirrored =
-      false;  ///< delivers the image flipped left to right; the numbers above describe it unflipped
+  std::array<double, 5> distortion{-0.06, 0.02, 4e-4, -3e-4, 0};  ///< OpenCV's k1 k2 p1 p2 k3
+  double frame_rate = 25.0;                                       ///< Hz
+  bool mirrored = false;  ///< delivers the image flipped left to right; this is of it unflipped
 };
 
 struct Optics {
   double psf_sigma_px = 0.9;        ///< of the Gaussian point spread at the focal distance
   double focus_distance = 20.0e-3;  ///< m
-  double defocus_px_per_m =
-      450.0;                 ///< growth of the point spread with |z - focus|, added in quadrature
-  double vignetting = 0.25;  ///< loss of light at the image corner, 0..1
+  double defocus_px_per_m = 450;    ///< growth of the point spread with |z - focus|, in quadrature
+  double vignetting = 0.25;         ///< loss of light at the image corner, 0..1
 };
 
 /// A tag as the designer drew it; the glued one differs by the placement errors of Target.
@@ -110,12 +107,10 @@ struct Target {
   double tag_size = 3.8e-3;  ///< edge of the black square, m
   double border = 0.35e-3;   ///< white margin, m
   std::vector<TagPlacement> tags = roof_placement(5, 2, 3.8e-3, 0.35e-3);
-  double position_error =
-      0.12e-3;  ///< largest placement error along each axis, m (seeded, uniform)
-  double rotation_error =
-      0.035;  ///< largest placement error about each axis, rad (seeded, uniform)
-  Eigen::Vector3d rest_position{0.15e-3, -0.10e-3,
-                                21.0e-3};  ///< of the platform origin in the camera frame, m
+  double position_error = 0.12e-3;  ///< largest along each axis, m (placement; seeded, uniform)
+  double rotation_error = 0.035;    ///< largest about each axis, rad (likewise)
+  /// Of the platform's origin in the camera frame, m.
+  Eigen::Vector3d rest_position{0.15e-3, -0.10e-3, 21.0e-3};
 
   double paper_reflectance = 0.86;
   double ink_reflectance = 0.14;
@@ -126,36 +121,29 @@ struct Target {
 };
 
 struct Light {
-  double level_counts =
-      238.0;  ///< grey level of a perfectly white plate facing the camera in the image centre
-  double unevenness =
-      0.25;                ///< fall of the LED's light from its bright side to its dark side, 0..1
-  double direction = 3.7;  ///< of the bright side in the image, rad from x towards y
-  double ambient = 0.65;   ///< share of light that does not depend on a surface's inclination, 0..1
+  double level_counts = 238;  ///< grey level of a white plate facing the camera in the image centre
+  double unevenness = 0.25;   ///< fall of the LED's light from its bright to its dark side, 0..1
+  double direction = 3.7;     ///< of the bright side in the image, rad from x towards y
+  double ambient = 0.65;  ///< share of light that does not depend on a surface's inclination, 0..1
   double glare_counts = 320.0;  ///< added in the blown-out corner
   /// Of use where an LED outside of the simulation lights the scene:
   double led_level = 0.3;  ///< its mean brightness that level_counts stands for, 0..1
   double room = 0.05;      ///< light that is there without the LED, over level_counts
 };
 
+/// `hard`: all of them in an order, with a size and at times drawn from the seed; `desk`: somebody
+/// works with it (trajectory.h).
+// clang-format off
 enum class Motion : std::uint8_t {
-  rest,
-  hold,
-  push,
-  steps,
-  sweep,
-  tap,
-  drop,
-  compound,
-  hard,  ///< all of them in an order, with a size and at times drawn from the seed
-  desk,  ///< somebody works with it (trajectory.h)
+  rest, hold, push, steps, sweep, tap, drop, compound, hard, desk
 };
+// clang-format on
 
 struct Trajectory {
   Motion motion = Motion::compound;
   double rest_time = 1.5;  ///< nothing touches the platform before, s
-  std::array<double, 6> amplitude{0.45,  0.45,  1.4,
-                                  0.007, 0.007, 0.004};  ///< largest wrench per axis, N and N m
+  /// Largest wrench per axis, N and N m.
+  std::array<double, 6> amplitude{0.45, 0.45, 1.4, 0.007, 0.007, 0.004};
   int axis = 2;              ///< of push, sweep and tap: 0..5 = fx fy fz mx my mz
   double share = 1.0;        ///< of push, sweep and tap: part of that axis's amplitude, with sign
   double hold_time = 0.0;    ///< of push and hold: released after this, s; 0 = never
@@ -163,8 +151,7 @@ struct Trajectory {
   double sweep_from = 0.2;   ///< Hz
   double sweep_to = 12.0;    ///< Hz
   double sweep_time = 20.0;  ///< s, then again from the start
-  double event_time =
-      2.0;  ///< of hard: each event has so long, its rest before and after included, s
+  double event_time = 2.0;   ///< of hard: s that each event has, its rest before and after included
 };
 
 struct Exposure {
@@ -379,8 +366,8 @@ struct LoadCellSettings {
 struct SixAxisSettings {
   bool ideal = false;  ///< no noise, no steps, no filter, no lag, no saturation, exactly in place
   double rate = 100;   ///< Hz
-  std::array<double, 6> counts_per_unit{96.11,   95.64,   20.92,
-                                        5425.36, 5524.60, 8103.25};  ///< per N, per N m
+  /// Per N, per N m.
+  std::array<double, 6> counts_per_unit{96.11, 95.64, 20.92, 5425.36, 5524.60, 8103.25};
   double noise_counts = 1;  ///< standard deviation of a reading, before it becomes whole counts
   double filter_hz = 15;    ///< of its first-order low pass
   double lag = 0.040;       ///< s in all at low frequency, the filter's share of it included

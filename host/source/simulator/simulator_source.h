@@ -26,11 +26,10 @@ struct Truth {
   Vector6 exposed_displacement =
       Vector6::Zero();  ///< mean of displacement over that exposure, which is what the picture
                         ///< shows; a ringing platform may be 20 um away from it in the middle
-  Vector6 wrench = Vector6::Zero();  ///< that the user applies to the platform, N and N m
-  RigidPose camera_T_platform;       ///< at that instant
-  Eigen::Vector3d rest_position =
-      Eigen::Vector3d::Zero();  ///< of the platform in the camera frame, m
-  std::vector<PlacedTag> tags;  ///< as glued, or where they have slipped to
+  Vector6 wrench = Vector6::Zero();        ///< that the user applies to the platform, N and N m
+  RigidPose camera_T_platform;             ///< at that instant
+  Eigen::Vector3d rest_position{0, 0, 0};  ///< of the platform in the camera frame, m
+  std::vector<PlacedTag> tags;             ///< as glued, or where they have slipped to
   std::uint32_t disturbances =
       0;                        ///< bit() of each DisturbanceKind that is there; the motion is none
   std::vector<double> visible;  ///< per tag, share of the black square that can be seen, 0..1

@@ -309,9 +309,7 @@ Vector6 DeskUse::direction(Random& random) const {
 }
 
 DeskAct DeskUse::push(Random& random) const {
-  DeskAct act;
-  act.what = DeskDoing::push;
-  act.end = log_uniform(random, 0.3, 8);
+  DeskAct act{.what = DeskDoing::push, .end = log_uniform(random, 0.3, 8)};
   const double size = random.uniform(0.1, 1);
   act.peak = size * direction(random).cwiseProduct(amplitude_);
   act.turned = act.peak;
@@ -326,9 +324,7 @@ DeskAct DeskUse::push(Random& random) const {
 }
 
 DeskAct DeskUse::hand(Random& random) const {
-  DeskAct act;
-  act.what = DeskDoing::hand;
-  act.end = random.uniform(1, 10);
+  DeskAct act{.what = DeskDoing::hand, .end = random.uniform(1, 10)};
   act.peak = act.turned = finger(random, log_uniform(random, 0.012, 0.16) * range_[2]);
   act.rise = random.uniform(0.15, 0.4);
   act.fall = random.uniform(0.1, 0.3);
@@ -337,9 +333,7 @@ DeskAct DeskUse::hand(Random& random) const {
 }
 
 DeskAct DeskUse::brush(Random& random) const {
-  DeskAct act;
-  act.what = DeskDoing::brush;
-  act.end = random.uniform(0.1, 0.4);
+  DeskAct act{.what = DeskDoing::brush, .end = random.uniform(0.1, 0.4)};
   act.peak = act.turned = random.uniform(0.05, 0.2) * direction(random).cwiseProduct(amplitude_);
   return act;
 }

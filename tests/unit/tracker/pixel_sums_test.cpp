@@ -1,13 +1,12 @@
 // The vector code of pixel_sums.h against the same sums written out for one pixel after the other,
 // in double precision, for every vector unit of this machine; and against numeric derivatives.
-#include "host/tracker/pixel_sums.h"
-
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
 #include <cmath>
 #include <numeric>
 
+#include "host/tracker/photometric.h"
 #include "host/tracker/rotation.h"
 #include "tests/unit/tracker/template_scene.h"
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "host/tracker/photometric.h"
-#include "host/tracker/pixel_sums.h"
 #include "host/tracker/pixel_template.h"
 #include "host/tracker/target.h"
 #include "tests/unit/tracker/render.h"
