@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <utility>
 
-#include "host/app/run_input.h"
 #include "host/core/config_error.h"
 #include "host/core/count_text.h"
 #include "host/core/log.h"

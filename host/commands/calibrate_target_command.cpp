@@ -1,5 +1,7 @@
-// `tagwrench calibrate target`: the platform at rest, then moved about, in; where the tags sit and
-// what they look like, in the folder measured/ beside sensor.yaml, out.
+// `tagwrench calibrate`, the verb above those that measure; and of these `target`: the platform at
+// rest, then moved about, in; where the tags sit and what they look like, in the folder measured/
+// beside sensor.yaml, out.
+
 #include <fmt/format.h>
 
 #include <chrono>
@@ -9,8 +11,7 @@
 #include "host/app/input.h"
 #include "host/calibration/target/recorder.h"
 #include "host/commands/commands.h"
-#include "host/commands/events.h"
-#include "host/commands/measured_results.h"
+#include "host/commands/measuring.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
@@ -196,6 +197,15 @@ void calibrate_target_command(command_line::Command family) {
       .check(calibration_seconds());
   add_events_option(verb, o->events);
   verb.runs([o] { return calibrate_target(*o); });
+}
+
+void calibrate_command(command_line::Command program) {
+  auto verb =
+      program.add_subcommand("calibrate", "measure this sensor and write it to its sensor.yaml");
+  verb.require_subcommand();
+  calibrate_camera_command(verb);
+  calibrate_target_command(verb);
+  calibrate_wrench_command(verb);
 }
 
 }  // namespace tagwrench

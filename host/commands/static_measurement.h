@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "host/calibration/check/in_situ.h"
-#include "host/commands/events.h"
+#include "host/commands/measuring.h"
 #include "host/core/os/unique_fd.h"
 #include "host/output/output.h"
 #include "host/sensor/sensor_config.h"

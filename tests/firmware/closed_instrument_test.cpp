@@ -10,7 +10,6 @@
 
 #include "host/app/scenario_config.h"
 #include "host/board/cell_calibration.h"
-#include "host/board/sample_history.h"
 #include "host/source/simulator/trajectory.h"
 #include "host/tools/camera_timing/measurement.h"
 #include "tests/firmware/lockstep_camera.h"

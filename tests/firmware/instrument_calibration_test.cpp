@@ -7,7 +7,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "host/board/sample_history.h"
+#include "host/board/cell_calibration.h"
 #include "host/calibration/wrench/guide.h"
 #include "host/calibration/wrench/plan.h"
 #include "host/calibration/wrench/record.h"

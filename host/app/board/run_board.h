@@ -14,7 +14,6 @@
 #include "host/board/board_session.h"
 #include "host/board/cell_calibration.h"
 #include "host/board/ring.h"
-#include "host/board/sample_history.h"
 #include "host/calibration/check/in_situ.h"
 #include "host/output/line_outputs.h"
 #include "host/output/output.h"

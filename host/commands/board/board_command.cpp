@@ -1,8 +1,35 @@
-// `tagwrench board`: its options, and the verbs below it.
-#include <fmt/format.h>
+// `tagwrench board`: its options, and of the verbs below it `info`, `led` and `flash`: avrdude
+// writes the image and checks the chip's signature; the board's greeting then tells its version.
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string_view>
+
+#include "host/app/board/board_loop.h"
+#include "host/board/cell_calibration.h"
+#include "host/board/serial_port.h"
 #include "host/commands/board/board.h"
 #include "host/commands/commands.h"
+#include "host/core/command_line/command_line.h"
+#include "host/core/config_error.h"
+#include "host/core/json/json_text.h"
+#include "host/core/log.h"
+#include "host/output/line_outputs.h"
+
+extern char** environ;
 
 namespace tagwrench {
 namespace {
@@ -42,6 +69,280 @@ void add_lines(command_line::Command verb, BoardOptions& o, const char* json) {
   verb.add_option("--every", o.line_period, "seconds between lines without --json")
       .check(number(0.01, 3600, "a number of seconds"));
   add_seconds(verb, o);
+}
+
+using link::BoardSession;
+
+double us(Duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
+
+std::string for_people(const BoardSession& session, const std::string& port) {
+  const link::Hello& hello = session.hello();
+  const link::Capabilities& can = session.capabilities();
+  const link::Status& status = session.status();
+  const link::ClockReport clock = session.clock().report();
+  const link::SessionCounters counters = session.counters();
+  std::string out;
+  const auto line = [&out](const char* what, const std::string& value) {
+    out += fmt::format("{:<12}{}\n", what, value);
+  };
+  const std::string id = link::id_text(hello.unique_id);
+  line("board", fmt::format("{}, firmware {}, protocol {}.{}", hello.board, hello.firmware,
+                            hello.protocol_major, hello.protocol_minor));
+  line("id", id.empty() ? "none" : id);
+  line("port", port);
+  line("started", fmt::format("by {} (boot {:08x})",
+                              link::reset_cause_name(static_cast<std::uint32_t>(hello.reset_cause)),
+                              hello.boot_id));
+  line("inputs", fmt::format("{} load cells, {} analogue ({} bits), {} buttons", can.cells,
+                             can.adc_channels, can.adc_bits, can.buttons));
+  line("LED",
+       fmt::format("{} levels; {:.0f} % for ever, full for {:.0f} s from cold", can.led_levels,
+                   can.led_sustained_permille / 10.0, can.led_full_time_ms / 1000.0));
+  line("strobe",
+       fmt::format("pulses of {} to {} us, one every {} to {} us", can.strobe_width_min_us,
+                   can.strobe_width_max_us, can.strobe_period_min_us, can.strobe_period_max_us));
+  line("clock", fmt::format("{:+.1f} +- {:.1f} ppm to this host, in steps of {} ns; times are good "
+                            "to {:.0f} us, {:.0f} us of it common to all{}",
+                            clock.skew_ppm, clock.skew_sigma_ppm, can.time_step_ns,
+                            std::hypot(us(clock.random_sigma), us(clock.asymmetry_sigma)),
+                            us(clock.asymmetry_sigma), clock.converged ? "" : "; not settled yet"));
+  if (session.has_status()) {
+    line("supply",
+         can.measures_supply ? fmt::format("{:.2f} V", status.supply_mv / 1000.0) : "not measured");
+    if (can.measures_temperature)
+      line("temperature", fmt::format("{:.1f} C", status.temperature_centidegree / 100.0));
+    line("loop", fmt::format("longest {} us; {} bytes of stack never used", status.longest_loop_us,
+                             status.stack_free_bytes));
+    line("board lost", fmt::format("{} bad frames, {} bytes, {} reports", status.bad_frames,
+                                   status.overruns, status.dropped_reports));
+  }
+  line("host lost", fmt::format("{} bad frames, {} frames missing", counters.damaged_frames,
+                                counters.lost_frames));
+  return out;
+}
+
+std::string as_json(const BoardSession& session, const std::string& port) {
+  const link::Hello& hello = session.hello();
+  const link::Capabilities& can = session.capabilities();
+  const link::Status& status = session.status();
+  const link::ClockReport clock = session.clock().report();
+  const link::SessionCounters counters = session.counters();
+  const nlohmann::ordered_json root{
+      {"board", hello.board},
+      {"firmware", hello.firmware},
+      {"protocol", fmt::format("{}.{}", hello.protocol_major, hello.protocol_minor)},
+      {"id", link::id_text(hello.unique_id)},
+      {"port", port},
+      {"boot_id", hello.boot_id},
+      {"reset_cause", link::reset_cause_name(static_cast<std::uint32_t>(hello.reset_cause))},
+      {"cells", can.cells},
+      {"adc_channels", can.adc_channels},
+      {"adc_bits", can.adc_bits},
+      {"buttons", can.buttons},
+      {"led_levels", can.led_levels},
+      {"led_sustained_permille", can.led_sustained_permille},
+      {"led_full_time_ms", can.led_full_time_ms},
+      {"skew_ppm", clock.skew_ppm},
+      {"skew_sigma_ppm", clock.skew_sigma_ppm},
+      {"time_sigma_us", std::hypot(us(clock.random_sigma), us(clock.asymmetry_sigma))},
+      {"clock_converged", clock.converged},
+      {"supply_mv", status.supply_mv},
+      {"bad_frames", status.bad_frames},
+      {"overruns", status.overruns},
+      {"dropped_reports", status.dropped_reports},
+      {"stack_free_bytes", status.stack_free_bytes},
+      {"longest_loop_us", status.longest_loop_us},
+      {"host_damaged_frames", counters.damaged_frames},
+      {"host_lost_frames", counters.lost_frames},
+  };
+  // The board's strings are bytes of a stranger; what is no UTF-8 is replaced.
+  return dump_json(root) + "\n";
+}
+
+using std::chrono::milliseconds;
+
+[[noreturn]] void not_a_light(const BoardOptions& options) {
+  std::string words;
+  for (const std::string& word : options.light) words += (words.empty() ? "" : " ") + word;
+  throw ConfigError(
+      "board led '{}': not a light; use off, LEVEL% (0 to 100), strobe PERIOD_US WIDTH_US "
+      "[PHASE_US] or pattern [BIT_US [SEED]]",
+      words);
+}
+
+struct Light {
+  link::Led led{};
+  double phase_us = 0;  ///< of a strobe
+};
+
+Light light_of(const BoardOptions& options) {
+  const std::vector<std::string>& words = options.light;
+  const auto number = [&](const std::string& text, double least, double most) {
+    const std::optional<double> value = command_line::to_number(text);
+    if (!value || !(*value >= least && *value <= most)) not_a_light(options);
+    return *value;
+  };
+  Light out;
+  const std::size_t count = words.size();
+  if (words[0] == "off" && count == 1) return out;
+  if (words[0] == "strobe" && (count == 3 || count == 4)) {
+    out.led.mode = link::LedMode::strobe;
+    out.led.period_us = static_cast<std::uint32_t>(number(words[1], 1, 60e6));
+    out.led.width_us = static_cast<std::uint16_t>(number(words[2], 1, 65535));
+    if (count == 4) out.phase_us = number(words[3], -60e6, 60e6);
+    return out;
+  }
+  if (words[0] == "pattern" && count <= 3) {
+    out.led.mode = link::LedMode::pattern;
+    out.led.period_us = static_cast<std::uint32_t>(count > 1 ? number(words[1], 1, 60e6) : 7000);
+    out.led.pattern_seed = static_cast<std::uint16_t>(count > 2 ? number(words[2], 1, 32767) : 1);
+    return out;
+  }
+  if (count != 1 || words[0].back() != '%') not_a_light(options);
+  const double percent = number(words[0].substr(0, words[0].size() - 1), 0, 100);
+  out.led.mode = link::LedMode::steady;
+  out.led.level_permille = static_cast<std::uint16_t>(std::lround(percent * 10));
+  return out;
+}
+
+/// Throws ConfigError for pulses that this board cannot do.
+void check_limits(const link::Led& led, const link::Capabilities& can) {
+  if (led.period_us == 0 || can.strobe_period_max_us == 0) return;
+  const auto check = [](const char* what, std::uint32_t value, std::uint32_t least,
+                        std::uint32_t most, const std::string& condition = {}) {
+    if (value < least || value > most)
+      throw ConfigError("{} {} us: this board does {} to {} us{}", what, value, least, most,
+                        condition);
+  };
+  const bool strobe = led.mode == link::LedMode::strobe;
+  check(strobe ? "period" : "bit", led.period_us, can.strobe_period_min_us,
+        can.strobe_period_max_us);
+  if (!strobe) return;
+  check("width", led.width_us, can.strobe_width_min_us, can.strobe_width_max_us);
+  // Dark between two pulses for as long as a pulse lasts at least.
+  const std::uint32_t dark = std::min<std::uint32_t>(can.strobe_width_min_us, led.period_us);
+  check("width", led.width_us, can.strobe_width_min_us, led.period_us - dark,
+        fmt::format(" with a period of {} us", led.period_us));
+}
+
+/// The next host time at which a pulse is due, as board time.
+std::uint32_t start_of(const Light& light, const link::ClockSync& clock) {
+  const TimePoint soon = std::chrono::steady_clock::now() + milliseconds(100);
+  const std::int64_t soon_ns = soon.time_since_epoch().count();
+  const std::int64_t period_ns = std::int64_t{light.led.period_us} * 1000;
+  const std::int64_t phase_ns = std::llround(light.phase_us * 1000);
+  const std::int64_t past = ((soon_ns - phase_ns) % period_ns + period_ns) % period_ns;
+  return clock.to_board(soon + Duration(period_ns - past));
+}
+
+namespace fs = std::filesystem;
+
+constexpr const char* kImageName = "tagwrench-atmega328p.hex";
+constexpr std::uintmax_t kMaxImageBytes = 128 * 1024;  ///< 32 KB of flash as Intel HEX
+
+/// Beside this program as it was built, or as it was installed; or in the clone where we are.
+std::string find_image() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  const fs::path above = program.parent_path().parent_path();
+  const fs::path folders[] = {above / "firmware", above / "share" / "tagwrench",
+                              fs::current_path(error) / "build" / "firmware"};
+  std::string looked;
+  for (const fs::path& folder : folders) {
+    if (fs::exists(folder / kImageName, error)) return (folder / kImageName).string();
+    looked += (looked.empty() ? "" : ", ") + folder.string();
+  }
+  throw ConfigError(
+      "board flash: no {} in {}; run `./run firmware` in the clone, or give --image FILE",
+      kImageName, looked);
+}
+
+enum class HexRecord : std::uint8_t { wrong, data, end };
+
+/// One line of Intel HEX: ":", then length, address (2), type, data and checksum in hex digits; all
+/// bytes together are 0 modulo 256 (Intel, "Hexadecimal Object File Format Specification", 1988).
+HexRecord hex_record(std::string_view line) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  if (line.size() < 11 || line.size() % 2 == 0 || line[0] != ':') return HexRecord::wrong;
+  unsigned sum = 0;
+  std::array<unsigned, 4> head{};
+  for (std::size_t i = 0; i < line.size() / 2; ++i) {
+    unsigned byte = 0;
+    const char* digits = line.data() + 1 + 2 * i;
+    const auto [end, error] = std::from_chars(digits, digits + 2, byte, 16);
+    if (error != std::errc{} || end != digits + 2) return HexRecord::wrong;
+    if (i < head.size()) head[i] = byte;
+    sum += byte;
+  }
+  if (sum % 256 != 0 || line.size() != 11 + 2 * head[0]) return HexRecord::wrong;
+  return head[3] == 1 ? HexRecord::end : HexRecord::data;
+}
+
+/// Half an image would be worse than none.
+void check_image(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error))
+    throw ConfigError("{}: there is no such file; give --image FILE.hex", path);
+  std::ifstream in(path);
+  HexRecord last = HexRecord::wrong;
+  if (fs::file_size(path, error) <= kMaxImageBytes) {
+    for (std::string line; std::getline(in, line);) {
+      last = hex_record(line);
+      if (last != HexRecord::data) break;
+    }
+  }
+  if (last != HexRecord::end)
+    throw ConfigError(
+        "{}: not an Intel HEX file of an ATmega328P, or not a whole one; give --image FILE.hex",
+        path);
+}
+
+std::string flash_port(const BoardOptions& options) {
+  if (const auto identity = link::parse_usb_identity(options.port))
+    return options.dry_run ? "PORT" : link::find_usb_port(*identity);
+  if (!options.port.empty()) return options.port;
+  if (!options.dry_run) return link::only_port();
+  const std::vector<std::string> ports = link::stable_ports();
+  return ports.size() == 1 ? ports.front() : "PORT";
+}
+
+/// The boot loader's speeds, as the Arduino core's boards.txt has them.
+std::vector<std::string> avrdude_arguments(const BoardOptions& options, const std::string& port,
+                                           const std::string& image) {
+  return {"avrdude",
+          "-p",
+          "m328p",
+          "-c",
+          "arduino",
+          "-b",
+          options.model == "nano-old" ? "57600" : "115200",
+          "-P",
+          port,
+          "-D",
+          "-U",
+          fmt::format("flash:w:{}:i", image)};
+}
+
+/// Exit status of the program, its messages on standard error.
+int run_program(std::vector<std::string> arguments) {
+  std::vector<char*> argv;
+  for (std::string& a : arguments) argv.push_back(a.data());
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, 2, 1);  // standard output is for data
+  pid_t child = -1;
+  const int failed = ::posix_spawnp(&child, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failed == ENOENT)
+    throw ConfigError("board flash: avrdude is not installed; `sudo apt install avrdude`");
+  if (failed != 0)
+    throw ConfigError("board flash: avrdude cannot be started: {}; try again",
+                      std::strerror(failed));
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
 }
 
 }  // namespace
@@ -118,6 +419,72 @@ void board_command(command_line::Command program) {
   optoforce.add_option("--filter", o.force_filter, "Hz: 500, 150, 50, 15, 5, 1.5 or 0 for none");
   optoforce.add_flag("--zero", o.force_zero, "what it shows now is zero");
   add_lines(optoforce, o, "one line of JSON per sample");
+}
+
+int board_info(const BoardOptions& options) {
+  BoardLoop loop(options.port, session_options(options));
+  if (!loop.settle()) return 0;
+  print_data(options.json ? as_json(loop.session(), loop.link().port())
+                          : for_people(loop.session(), loop.link().port()));
+  return 0;
+}
+
+int board_led(const BoardOptions& options) {
+  Light light = light_of(options);
+  BoardLoop loop(options.port, session_options(options));
+  if (!loop.settle()) return 0;
+  if (loop.session().has_capabilities()) check_limits(light.led, loop.session().capabilities());
+  if (light.led.period_us > 0) light.led.start_us = start_of(light, loop.session().clock());
+  loop.session().set_led(light.led);
+  loop.link().send();
+
+  const bool stays = light.led.mode != link::LedMode::off;
+  bool told = false;
+  const TimePoint begin = std::chrono::steady_clock::now();
+  while (loop.turn(begin + (stays ? std::chrono::hours(24 * 365) : milliseconds(300)))) {
+    if (loop.led_refused()) return 2;
+    if (!stays && std::chrono::steady_clock::now() - begin > milliseconds(300)) return 0;
+    if (stays && !told && loop.session().led_accepted()) {
+      told = true;
+      log_info("the light stays until Ctrl-C");
+    }
+  }
+  loop.session().set_led(link::Led{});
+  loop.link().send();
+  return 0;
+}
+
+int board_flash(const BoardOptions& options) {
+  const std::string image = options.image.empty() ? find_image() : options.image;
+  check_image(image);
+  const std::string port = flash_port(options);
+  const std::vector<std::string> arguments = avrdude_arguments(options, port, image);
+  if (options.dry_run) {
+    print_data(fmt::format("{}\n", fmt::join(arguments, " ")));
+    return 0;
+  }
+  { const link::SerialPort free(port, link::kBaud); }  // or it says what is the matter
+  log_info("running {}", fmt::join(arguments, " "));
+  if (const int status = run_program(arguments); status != 0) {
+    log_info(
+        "board flash: avrdude failed ({}); is it a {} with an ATmega328P? A Nano with the old boot "
+        "loader is --board nano-old",
+        status, options.model);
+    return 1;
+  }
+  BoardLoop loop(port, session_options(options));
+  if (!loop.connect()) return 0;
+  const link::Hello& hello = loop.session().hello();
+  if (options.image.empty() && std::string(hello.firmware) != TAGWRENCH_VERSION) {
+    log_info(
+        "board flash: the board says firmware {} after {} was written; check the image and try "
+        "again",
+        hello.firmware, TAGWRENCH_VERSION);
+    return 1;
+  }
+  log_info("the board answers: {}, firmware {}, protocol {}.{}", hello.board, hello.firmware,
+           hello.protocol_major, hello.protocol_minor);
+  return 0;
 }
 
 }  // namespace tagwrench

@@ -1,16 +1,18 @@
 #include "host/web/bridge/job_command.h"
 
 #include <fmt/format.h>
+#include <openssl/evp.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "host/calibration/print/board_spec.h"
 #include "host/calibration/wrench/plan.h"
 #include "host/core/config_error.h"
+#include "host/core/json/json_text.h"
 
 namespace tagwrench {
 namespace {
@@ -186,6 +188,45 @@ void add_check(JobOptions& options, std::vector<std::string>& arguments) {
   arguments.push_back("--at=" + place);
 }
 
+constexpr int kMaxPicture_px = 16'384;
+
+constexpr std::string_view kDigits =
+    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+const char* state_name(JobReport::State state) {
+  switch (state) {
+    case JobReport::State::running: return "running";
+    case JobReport::State::done: return "done";
+    case JobReport::State::failed: return "failed";
+    case JobReport::State::stopped: return "stopped";
+  }
+  return "?";
+}
+
+/// The member of this name, if it is of this type.
+const json* member(const json& object, const char* key, json::value_t type) {
+  const auto found = object.find(key);
+  return found == object.end() || found->type() != type ? nullptr : &*found;
+}
+
+int size_of(const json& picture, const char* key) {
+  const auto found = picture.find(key);
+  if (found == picture.end() || !found->is_number_integer()) return 0;
+  const auto size = found->get<std::int64_t>();
+  return size > 0 && size <= kMaxPicture_px ? static_cast<int>(size) : 0;
+}
+
+std::optional<JobPicture> picture_in(const json& event) {
+  const json* jpeg = member(event, "jpeg", json::value_t::string);
+  const json* tags = member(event, "tags", json::value_t::array);
+  if (jpeg == nullptr || tags == nullptr) return {};
+  std::optional<std::vector<std::uint8_t>> bytes = from_base64(jpeg->get_ref<const std::string&>());
+  JobPicture picture{size_of(event, "width"), size_of(event, "height"), *tags, {}};
+  if (!bytes || picture.width == 0 || picture.height == 0) return {};
+  picture.jpeg = std::move(*bytes);
+  return picture;
+}
+
 }  // namespace
 
 std::string checked_line(const char* key, std::string text) {
@@ -229,6 +270,88 @@ std::vector<std::string> possible_jobs(const JobPlace& place) {
 std::string certificate_folder(const JobPlace& place) {
   const std::filesystem::path folder = std::filesystem::path(place.sensor).parent_path();
   return folder.empty() ? "." : folder.string();
+}
+
+JobReport::JobReport(std::string verb, std::vector<std::string> keys)
+    : verb_(std::move(verb)), keys_(std::move(keys)) {}
+
+void JobReport::said(std::string_view line) {
+  constexpr std::string_view kProgram = "tagwrench: ";
+  constexpr std::string_view kTask = "> ";
+  if (line.starts_with(kProgram)) line.remove_prefix(kProgram.size());
+  const bool task = line.starts_with(kTask);
+  if (task) line.remove_prefix(kTask.size());
+  if (!line.empty()) add(task ? "task" : "note", std::string(line.substr(0, kMaxLine)));
+}
+
+void JobReport::printed(std::string_view text) {
+  printed_ += text.substr(0, kMaxText - std::min(kMaxText, printed_.size()));
+}
+
+std::optional<JobPicture> JobReport::event(std::string_view text) {
+  const json event = parse_json(text);
+  if (!event.is_object()) return {};
+  if (const json* line = member(event, "line", json::value_t::object)) {
+    const json* kind = member(*line, "kind", json::value_t::string);
+    const json* words = member(*line, "text", json::value_t::string);
+    if (kind != nullptr && words != nullptr)
+      add(kind->get<std::string>(), words->get<std::string>().substr(0, kMaxLine));
+  }
+  if (const json* live = member(event, "live", json::value_t::string))
+    live_ = live->get<std::string>();
+  if (const json* coverage = member(event, "coverage", json::value_t::object))
+    coverage_ = *coverage;
+  const auto progress = event.find("progress");
+  if (progress != event.end() && progress->is_number()) progress_ = *progress;
+  const json* picture = member(event, "picture", json::value_t::object);
+  return picture == nullptr ? std::nullopt : picture_in(*picture);
+}
+
+void JobReport::ended(State state, std::string why, json result) {
+  state_ = state;
+  live_.clear();
+  keys_.clear();
+  if (state == State::done) progress_ = 1.0;
+  // Its last words say why it failed, what it printed is what it found.
+  if (state == State::failed && !lines_.empty() && lines_.back().kind == "note")
+    lines_.back().kind = "warning";
+  if (!why.empty()) add(state == State::failed ? "warning" : "result", std::move(why));
+  result_ = std::move(result);
+  if (!printed_.empty()) {
+    if (!result_.is_object()) result_ = json::object();
+    result_["text"] = printed_;
+  }
+}
+
+json JobReport::to_json() const {
+  nlohmann::json lines = nlohmann::json::array();
+  for (const Line& line : lines_) lines.push_back({{"kind", line.kind}, {"text", line.text}});
+  return {{"verb", verb_},
+          {"state", state_name(state_)},
+          {"lines", std::move(lines)},
+          {"live", live_},
+          {"coverage", coverage_},
+          {"progress", progress_},
+          {"keys", keys_},
+          {"result", result_}};
+}
+
+void JobReport::add(std::string kind, std::string text) {
+  lines_.push_back({std::move(kind), std::move(text)});
+  if (lines_.size() > kMaxLines) lines_.pop_front();
+}
+
+std::optional<std::vector<std::uint8_t>> from_base64(std::string_view text) {
+  std::string_view digits = text;
+  while (digits.size() + 2 > text.size() && digits.ends_with('=')) digits.remove_suffix(1);
+  // libcrypto takes padding and white space for digits.
+  if (text.size() % 4 != 0 || digits.find_first_not_of(kDigits) != std::string_view::npos)
+    return {};
+  std::vector<std::uint8_t> bytes(text.size() / 4 * 3);
+  EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(text.data()),
+                  static_cast<int>(text.size()));
+  bytes.resize(bytes.size() - (text.size() - digits.size()));
+  return bytes;
 }
 
 }  // namespace tagwrench

@@ -1,60 +1,80 @@
 #include "host/web/bridge/jobs.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
-#include <openssl/evp.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <boost/asio/buffer.hpp>
+#include <cerrno>
 #include <cstring>
 #include <exception>
 #include <utility>
 
-#include "host/core/json/json_text.h"
-#include "host/web/bridge/job_process.h"
+#include "host/core/config_error.h"
+#include "host/core/os/child_process.h"
+#include "host/core/os/termination.h"
+#include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
 namespace {
 
-using nlohmann::json;
+constexpr int kAboveOthers = 10;       // no descriptor of the child's own
+constexpr int kRoom = 1 << 20;         // of the pipe for events: a picture is large
+constexpr int kUnknownEnd = 255 << 8;  // where the kernel does not keep it: SIGCHLD is ignored
+constexpr std::size_t kMaxSaid = 8192;
+constexpr std::size_t kMaxEvent = std::size_t{8} << 20;
 
-constexpr int kMaxPicture_px = 16'384;
+struct Pipe {
+  UniqueFd read;
+  UniqueFd write;
+};
 
-constexpr std::string_view kDigits =
-    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+Pipe make_pipe() {
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0)
+    throw ConfigError("job: no pipe to be had: {}; end other programs", std::strerror(errno));
+  const UniqueFd read(ends[0]);
+  const UniqueFd write(ends[1]);
+  return {UniqueFd(::fcntl(read.get(), F_DUPFD_CLOEXEC, kAboveOthers)),
+          UniqueFd(::fcntl(write.get(), F_DUPFD_CLOEXEC, kAboveOthers))};
+}
 
-const char* state_name(JobReport::State state) {
-  switch (state) {
-    case JobReport::State::running: return "running";
-    case JobReport::State::done: return "done";
-    case JobReport::State::failed: return "failed";
-    case JobReport::State::stopped: return "stopped";
+/// Of the child, between fork and exec: nothing but system calls, as other threads run and may hold
+/// any lock. (_Fork(): no handlers of libraries either.)
+struct Child {
+  std::array<int, 4> fds;  ///< that become 0 to 3
+  std::vector<int> kept;
+  std::string program;
+  std::vector<std::string> words;
+  std::vector<char*> argv;
+  Pipe* go;  ///< a byte comes once its end is watched: where SIGCHLD is ignored, one that has ended
+             ///< is nobody
+  pid_t parent = ::getpid();
+
+  [[noreturn]] void become() {
+    forget_termination();  // before it can come
+    sigset_t none;
+    sigemptyset(&none);
+    ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
+    ::signal(SIGPIPE, SIG_DFL);
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(127);
+    ::close(go->write.get());
+    char told;
+    if (::read(go->read.get(), &told, 1) != 1) ::_exit(127);
+    for (std::size_t i = 0; i < fds.size(); ++i)
+      if (::dup2(fds[i], static_cast<int>(i)) < 0) ::_exit(127);
+    close_all_but(kept);
+    ::execv(program.c_str(), argv.data());
+    ::_exit(127);
   }
-  return "?";
-}
-
-/// The member of this name, if it is of this type.
-const json* member(const json& object, const char* key, json::value_t type) {
-  const auto found = object.find(key);
-  return found == object.end() || found->type() != type ? nullptr : &*found;
-}
-
-int size_of(const json& picture, const char* key) {
-  const auto found = picture.find(key);
-  if (found == picture.end() || !found->is_number_integer()) return 0;
-  const auto size = found->get<std::int64_t>();
-  return size > 0 && size <= kMaxPicture_px ? static_cast<int>(size) : 0;
-}
-
-std::optional<JobPicture> picture_in(const json& event) {
-  const json* jpeg = member(event, "jpeg", json::value_t::string);
-  const json* tags = member(event, "tags", json::value_t::array);
-  if (jpeg == nullptr || tags == nullptr) return {};
-  std::optional<std::vector<std::uint8_t>> bytes = from_base64(jpeg->get_ref<const std::string&>());
-  JobPicture picture{size_of(event, "width"), size_of(event, "height"), *tags, {}};
-  if (!bytes || picture.width == 0 || picture.height == 0) return {};
-  picture.jpeg = std::move(*bytes);
-  return picture;
-}
+};
 
 constexpr std::chrono::milliseconds kTellEvery{100};
 constexpr int kFindings = 1;  // exit status of a verb that found something amiss
@@ -71,86 +91,159 @@ nlohmann::json result_of(const std::string& verb) {
 
 }  // namespace
 
-JobReport::JobReport(std::string verb, std::vector<std::string> keys)
-    : verb_(std::move(verb)), keys_(std::move(keys)) {}
-
-void JobReport::said(std::string_view line) {
-  constexpr std::string_view kProgram = "tagwrench: ";
-  constexpr std::string_view kTask = "> ";
-  if (line.starts_with(kProgram)) line.remove_prefix(kProgram.size());
-  const bool task = line.starts_with(kTask);
-  if (task) line.remove_prefix(kTask.size());
-  if (!line.empty()) add(task ? "task" : "note", std::string(line.substr(0, kMaxLine)));
+JobProcess::JobProcess(boost::asio::io_context& context, Listener listener)
+    : listener_(std::move(listener)),
+      out_(context),
+      err_(context),
+      events_(context),
+      keys_(context),
+      end_(context),
+      patience_(context) {
+  out_.by_lines = false;
+  out_.whole = listener_.printed;
+  err_.whole = listener_.said;
+  err_.longest = kMaxSaid;
+  events_.whole = listener_.event;
+  events_.longest = kMaxEvent;
 }
 
-void JobReport::printed(std::string_view text) {
-  printed_ += text.substr(0, kMaxText - std::min(kMaxText, printed_.size()));
+JobProcess::~JobProcess() { abandon(); }
+
+std::shared_ptr<JobProcess> JobProcess::start(boost::asio::io_context& context,
+                                              const std::string& program, const JobCommand& command,
+                                              Listener listener) {
+  const std::shared_ptr<JobProcess> job(new JobProcess(context, std::move(listener)));
+  job->spawn(program, command);
+  job->listen();
+  return job;
 }
 
-std::optional<JobPicture> JobReport::event(std::string_view text) {
-  const json event = parse_json(text);
-  if (!event.is_object()) return {};
-  if (const json* line = member(event, "line", json::value_t::object)) {
-    const json* kind = member(*line, "kind", json::value_t::string);
-    const json* words = member(*line, "text", json::value_t::string);
-    if (kind != nullptr && words != nullptr)
-      add(kind->get<std::string>(), words->get<std::string>().substr(0, kMaxLine));
+void JobProcess::spawn(const std::string& program, const JobCommand& command) {
+  Pipe in = make_pipe(), out = make_pipe(), err = make_pipe(), events = make_pipe();
+  Pipe go = make_pipe();
+  ::fcntl(events.write.get(), F_SETPIPE_SZ, kRoom);
+  Child child{{in.read.get(), out.write.get(), err.write.get(), events.write.get()},
+              {0, 1, 2, kEventsFd},
+              program,
+              {"tagwrench"},
+              {},
+              &go};
+  child.words.insert(child.words.end(), command.arguments.begin(), command.arguments.end());
+  if (command.tells_events) child.words.push_back(fmt::format("--events={}", kEventsFd));
+  for (std::string& word : child.words) child.argv.push_back(word.data());
+  child.argv.push_back(nullptr);
+  pid_ = ::_Fork();
+  if (pid_ == 0) child.become();
+  if (pid_ < 0) {
+    throw ConfigError("job: {} cannot be started: {}; end other programs", program,
+                      std::strerror(errno));
   }
-  if (const json* live = member(event, "live", json::value_t::string))
-    live_ = live->get<std::string>();
-  if (const json* coverage = member(event, "coverage", json::value_t::object))
-    coverage_ = *coverage;
-  const auto progress = event.find("progress");
-  if (progress != event.end() && progress->is_number()) progress_ = *progress;
-  const json* picture = member(event, "picture", json::value_t::object);
-  return picture == nullptr ? std::nullopt : picture_in(*picture);
-}
-
-void JobReport::ended(State state, std::string why, json result) {
-  state_ = state;
-  live_.clear();
-  keys_.clear();
-  if (state == State::done) progress_ = 1.0;
-  // Its last words say why it failed, what it printed is what it found.
-  if (state == State::failed && !lines_.empty() && lines_.back().kind == "note")
-    lines_.back().kind = "warning";
-  if (!why.empty()) add(state == State::failed ? "warning" : "result", std::move(why));
-  result_ = std::move(result);
-  if (!printed_.empty()) {
-    if (!result_.is_object()) result_ = json::object();
-    result_["text"] = printed_;
+  UniqueFd end(static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)));
+  if (!end) {
+    throw ConfigError("job: its end cannot be watched: {}; end other programs",
+                      std::strerror(errno));
+  }
+  if (::write(go.write.get(), "g", 1) != 1)
+    throw ConfigError("job: {} did not start: {}; try again", program, std::strerror(errno));
+  for (auto [stream, fd] : {std::pair{&out_.stream, &out.read},
+                            {&err_.stream, &err.read},
+                            {&events_.stream, &events.read},
+                            {&end_, &end}})
+    stream->assign(::fcntl(fd->get(), F_DUPFD_CLOEXEC, kAboveOthers));
+  if (command.takes_keys) {
+    ::fcntl(in.write.get(), F_SETFL, O_NONBLOCK);
+    keys_.assign(::fcntl(in.write.get(), F_DUPFD_CLOEXEC, kAboveOthers));
   }
 }
 
-json JobReport::to_json() const {
-  nlohmann::json lines = nlohmann::json::array();
-  for (const Line& line : lines_) lines.push_back({{"kind", line.kind}, {"text", line.text}});
-  return {{"verb", verb_},
-          {"state", state_name(state_)},
-          {"lines", std::move(lines)},
-          {"live", live_},
-          {"coverage", coverage_},
-          {"progress", progress_},
-          {"keys", keys_},
-          {"result", result_}};
+void JobProcess::listen() {
+  for (Channel* channel : {&out_, &err_, &events_}) {
+    channel->stream.non_blocking(true);
+    read(*channel);
+  }
+  wait_for_end();
 }
 
-void JobReport::add(std::string kind, std::string text) {
-  lines_.push_back({std::move(kind), std::move(text)});
-  if (lines_.size() > kMaxLines) lines_.pop_front();
+void JobProcess::read(Channel& channel) {
+  channel.stream.async_read_some(
+      boost::asio::buffer(channel.buffer),
+      [self = shared_from_this(), &channel](boost::system::error_code error, std::size_t count) {
+        if (error || self->pid_ <= 0) return;
+        self->take(channel, count);
+        self->read(channel);
+      });
 }
 
-std::optional<std::vector<std::uint8_t>> from_base64(std::string_view text) {
-  std::string_view digits = text;
-  while (digits.size() + 2 > text.size() && digits.ends_with('=')) digits.remove_suffix(1);
-  // libcrypto takes padding and white space for digits.
-  if (text.size() % 4 != 0 || digits.find_first_not_of(kDigits) != std::string_view::npos)
-    return {};
-  std::vector<std::uint8_t> bytes(text.size() / 4 * 3);
-  EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(text.data()),
-                  static_cast<int>(text.size()));
-  bytes.resize(bytes.size() - (text.size() - digits.size()));
-  return bytes;
+void JobProcess::take(Channel& channel, std::size_t count) {
+  std::string_view bytes(channel.buffer.data(), count);
+  if (!channel.by_lines) {
+    channel.whole(bytes);
+    return;
+  }
+  while (!bytes.empty()) {
+    const std::size_t end = bytes.find('\n');
+    const std::string_view part = bytes.substr(0, end);
+    channel.skipping = channel.skipping || channel.line.size() + part.size() > channel.longest;
+    if (!channel.skipping) channel.line += part;
+    if (end == std::string_view::npos) return;
+    if (!channel.skipping) channel.whole(channel.line);
+    channel.line.clear();
+    channel.skipping = false;
+    bytes.remove_prefix(end + 1);
+  }
+}
+
+/// What the child wrote before it ended.
+void JobProcess::drain(Channel& channel) {
+  for (ssize_t count; (count = ::read(channel.stream.native_handle(), channel.buffer.data(),
+                                      channel.buffer.size())) > 0;)
+    take(channel, static_cast<std::size_t>(count));
+  if (!channel.line.empty() && channel.by_lines) channel.whole(std::exchange(channel.line, {}));
+}
+
+void JobProcess::wait_for_end() {
+  end_.async_wait(Stream::wait_read, [self = shared_from_this()](boost::system::error_code error) {
+    if (!error) self->reap();
+  });
+}
+
+void JobProcess::reap() {
+  if (pid_ <= 0) return;  // abandoned meanwhile
+  int status = kUnknownEnd;
+  if (::waitpid(pid_, &status, WNOHANG) == 0) return wait_for_end();
+  for (Channel* channel : {&err_, &events_, &out_}) drain(*channel);
+  pid_ = 0;
+  close();
+  listener_.ended(status);
+}
+
+void JobProcess::press(char key) {
+  if (pid_ <= 0 || !keys_.is_open()) return;
+  // Who does not read his keys does not get more of them.
+  [[maybe_unused]] const ssize_t written = ::write(keys_.native_handle(), &key, 1);
+}
+
+void JobProcess::abandon() {
+  if (pid_ <= 0) return;
+  ::kill(pid_, SIGKILL);
+  ::waitpid(std::exchange(pid_, 0), nullptr, 0);
+  close();
+}
+
+void JobProcess::close() {
+  boost::system::error_code ignored;
+  for (Stream* stream : {&out_.stream, &err_.stream, &events_.stream, &keys_, &end_})
+    stream->close(ignored);
+  patience_.cancel();
+}
+
+void JobProcess::stop() {
+  if (pid_ <= 0 || std::exchange(stopping_, true)) return;
+  ::kill(pid_, SIGTERM);
+  patience_.expires_after(kPatience);
+  patience_.async_wait([self = shared_from_this()](boost::system::error_code error) {
+    if (!error && self->pid_ > 0) ::kill(self->pid_, SIGKILL);
+  });
 }
 
 Jobs::Jobs(boost::asio::io_context& context, std::string program, Hooks hooks)

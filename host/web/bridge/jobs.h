@@ -1,7 +1,13 @@
-// The one job at a time: waiting for the camera where it needs it, running, over; and what pages
-// are told of it. In the server's thread.
+// The one job at a time: a verb of our own program as a child, with its words, its keys and its
+// end; waiting for the camera where it needs it, running, over. All in the server's thread, which
+// never waits for it.
 #pragma once
 
+#include <sys/types.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -15,68 +21,70 @@
 #include "host/web/bridge/job_command.h"
 #include "host/web/server/server_timer.h"
 
-namespace boost::asio {
-class io_context;
-}
-
 namespace tagwrench {
 
-class JobProcess;
-
-// How a job goes, as pages are told: put together from what the verb says to people and to
-// programs.
-
-/// A picture that a job shows: what is seen in it, as a picture message has it, and a JPEG.
-struct JobPicture {
-  int width = 0;
-  int height = 0;
-  nlohmann::json tags = nlohmann::json::array();
-  std::vector<std::uint8_t> jpeg;
-};
-
-class JobReport {
+class JobProcess : public std::enable_shared_from_this<JobProcess> {
  public:
-  enum class State : std::uint8_t { running, done, failed, stopped };
-  static constexpr std::size_t kMaxLines = 200;
-  static constexpr std::size_t kMaxLine = 2000;
-  static constexpr std::size_t kMaxText = 65'536;
+  struct Listener {
+    std::function<void(std::string_view bytes)> printed;
+    std::function<void(std::string_view line)> said;
+    std::function<void(std::string_view line)> event;
+    /// The last that is heard of it; `status` as waitpid() has it.
+    std::function<void(int status)> ended;
+  };
+  /// From a request to stop to the end by force.
+  static constexpr std::chrono::seconds kPatience{5};
+  /// Its own descriptor for events.
+  static constexpr int kEventsFd = 3;
 
-  explicit JobReport(std::string verb, std::vector<std::string> keys);
+  /// The child dies with this process. Throws ConfigError if it cannot be started.
+  static std::shared_ptr<JobProcess> start(boost::asio::io_context& context,
+                                           const std::string& program, const JobCommand& command,
+                                           Listener listener);
+  JobProcess(const JobProcess&) = delete;
+  JobProcess& operator=(const JobProcess&) = delete;
+  /// Kills it if it is still there.
+  ~JobProcess();
 
-  void note(std::string text) { add("note", std::move(text)); }
-  /// A line of standard error.
-  void said(std::string_view line);
-  /// Some bytes of standard output.
-  void printed(std::string_view text);
-  /// A line of the events; a damaged or unknown one is nothing. Returns the picture, if it was one.
-  std::optional<JobPicture> event(std::string_view line);
-  /// `result`: beside what was printed.
-  void ended(State state, std::string why, nlohmann::json result);
-
-  State state() const { return state_; }
-  const std::string& verb() const { return verb_; }
-  nlohmann::json to_json() const;
+  void press(char key);
+  void stop();
+  /// Kills it; nothing more is heard of it.
+  void abandon();
+  bool stopping() const { return stopping_; }
+  pid_t pid() const { return pid_; }
 
  private:
-  void add(std::string kind, std::string text);
-
-  struct Line {
-    std::string kind;
-    std::string text;
+  using Stream = boost::asio::posix::stream_descriptor;
+  /// What a pipe brings, cut into lines where it has them.
+  struct Channel {
+    explicit Channel(boost::asio::io_context& context) : stream(context) {}
+    Stream stream;
+    std::vector<char> buffer = std::vector<char>(65'536);
+    std::string line;
+    std::size_t longest = 0;  ///< line; longer ones are left out
+    bool skipping = false;
+    std::function<void(std::string_view)> whole;
+    bool by_lines = true;
   };
-  std::string verb_;
-  std::vector<std::string> keys_;
-  State state_ = State::running;
-  std::deque<Line> lines_;
-  std::string live_;
-  std::string printed_;
-  nlohmann::json coverage_ = nullptr;
-  nlohmann::json progress_ = nullptr;
-  nlohmann::json result_ = nullptr;
-};
 
-/// Nothing, if the text is no base64.
-std::optional<std::vector<std::uint8_t>> from_base64(std::string_view text);
+  JobProcess(boost::asio::io_context& context, Listener listener);
+  void spawn(const std::string& program, const JobCommand& command);
+  void listen();
+  void read(Channel& channel);
+  void take(Channel& channel, std::size_t count);
+  void drain(Channel& channel);
+  void wait_for_end();
+  void reap();
+  void close();
+
+  Listener listener_;
+  Channel out_, err_, events_;
+  Stream keys_;
+  Stream end_;  ///< a pidfd: readable once the child has ended
+  boost::asio::steady_timer patience_;
+  pid_t pid_ = 0;
+  bool stopping_ = false;
+};
 
 class Jobs {
  public:

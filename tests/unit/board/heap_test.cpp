@@ -5,9 +5,9 @@
 
 #include "board_model.h"
 #include "host/board/board_link.h"
+#include "host/board/cell_calibration.h"
 #include "host/board/clock_sync.h"
 #include "host/board/optoforce.h"
-#include "host/board/sample_history.h"
 #include "optoforce_frames.h"
 #include "pty.h"
 #include "tests/support/heap_count.h"

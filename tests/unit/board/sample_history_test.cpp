@@ -1,9 +1,9 @@
-#include "host/board/sample_history.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
+
+#include "host/board/cell_calibration.h"
 
 namespace tagwrench::link {
 namespace {

@@ -5,7 +5,7 @@
 #include <csignal>
 #include <optional>
 
-#include "host/web/bridge/job_process.h"
+#include "host/web/bridge/jobs.h"
 
 namespace tagwrench {
 namespace {

@@ -1,7 +1,7 @@
 // What pages are told of a job, from what the job says.
 #include <gtest/gtest.h>
 
-#include "host/web/bridge/jobs.h"
+#include "host/web/bridge/job_command.h"
 
 namespace tagwrench {
 namespace {

@@ -1,12 +1,13 @@
-// What a verb tells a program that started it: how far it is, as one JSON object a line. People are
+// What verbs that measure share: the folder measured/, dates, an end before the result; and what
+// they tell a program that started them: how far they are, as one JSON object a line. People are
 // told the same in words, on standard error.
 #pragma once
 
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <initializer_list>
-#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,10 +15,48 @@
 #include <variant>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "host/core/command_line/command_line.h"
 #include "host/core/types.h"
+#include "host/sensor/measured_files.h"
 
 namespace tagwrench {
+
+/// Exit status of a calibration that its user has stopped.
+inline constexpr int kExitStopped = 1;
+/// Says so, where nothing was written, and returns it.
+int stopped_unwritten();
+
+/// YYYY-MM-DD, here.
+std::string today();
+
+/// Today, by this program, for this sensor.yaml.
+MeasuredStamp stamp_for(const std::filesystem::path& sensor);
+
+/// A sensor.yaml and, where --out asks for it, the new one that results are measured for: the same
+/// text in a folder of its own.
+class MeasuredSensor {
+ public:
+  /// Throws ConfigError unless `files` of its measured/ can be written, or if --out names a
+  /// sensor.yaml that is there already and says something else.
+  MeasuredSensor(const std::string& sensor, const std::string& out,
+                 const std::vector<const char*>& files);
+
+  const std::filesystem::path& sensor() const { return to_; }
+  std::filesystem::path folder() const { return measured_folder(to_); }
+  /// Makes the new one, with those files of the old one's measured/ that `keeps` names. Before any
+  /// result is written. Throws std::runtime_error.
+  void make(const std::vector<const char*>& keeps) const;
+
+ private:
+  std::filesystem::path from_;
+  std::filesystem::path to_;
+};
+
+/// A zero says nothing about another rest or another calibration: the one measured is set aside,
+/// and one in sensor.yaml is overruled. Throws ConfigError or std::runtime_error.
+void void_zero(const std::filesystem::path& sensor);
 
 /// {"line":{"kind":"task|note|warning","text":".."}}, {"live":".."}, {"progress":0.4},
 /// {"coverage":{..}}, {"picture":{"width":..,"height":..,"tags":[..],"jpeg":"base64"}}. Never
