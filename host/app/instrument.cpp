@@ -46,8 +46,7 @@ RunLimits limits_of(const RunSession& session) {
   const RunOptions& options = session.options;
   if (options.frames) limits.frames = static_cast<std::uint64_t>(*options.frames) - session.frames;
   if (options.seconds) {
-    limits.time =
-        std::chrono::duration_cast<Duration>(std::chrono::duration<double>(*options.seconds));
+    limits.time = in_seconds(*options.seconds);
     if (session.frames > 0)
       *limits.time -= std::min(*limits.time, std::chrono::steady_clock::now() - session.start);
   }
@@ -188,9 +187,21 @@ Instrument::Instrument(RunSession& session, Found found, std::optional<ControlSo
   open_outputs();
   announce();
   limits_ = limits_of(session_);
-  begin_pages(found.region);
+  if (session_.pages) {
+    pages_.emplace(
+        *session_.pages,
+        run_facts(session_.options, session_.asked, input_, board_ != nullptr, has_control_),
+        WebOutput::Parts{.source = found.region,
+                         .board = board_.get(),
+                         .programs = session_.outputs.programs()});
+  }
   watchdog_.emplace(session_.outputs.devices());
-  if (found.head) begin_recording(*found.head);
+  if (found.head) {  // of all that is seen, what is said to people and what the board says included
+    recording_.emplace(*session_.options.record, *found.head, is_lossless(session_.options, input_),
+                       limits_.frames, limits_.time);
+    if (board_) board_->record_to(recording_->writer());
+    if (pages_) pages_->output().pass_on_to(&*recording_);
+  }
   FrameLog* log = nullptr;
   if (pages_) log = &pages_->output();
   if (!pages_ && recording_) log = &*recording_;
@@ -228,25 +239,6 @@ void Instrument::announce() const {
         input_.sensor.completed_axes);
   }
   if (session_.watch) session_.watch->ready(source);
-}
-
-void Instrument::begin_pages(RegionSource* region) {
-  if (!session_.pages) return;
-  WebOutput::Parts parts;
-  parts.source = region;
-  parts.board = board_.get();
-  parts.programs = session_.outputs.programs();
-  const RunFacts facts =
-      run_facts(session_.options, session_.asked, input_, board_ != nullptr, has_control_);
-  pages_.emplace(*session_.pages, facts, parts);
-}
-
-/// Of all that is seen, what is said to people and what the board says included.
-void Instrument::begin_recording(const record::Head& head) {
-  recording_.emplace(*session_.options.record, head, is_lossless(session_.options, input_),
-                     limits_.frames, limits_.time);
-  if (board_) board_->record_to(recording_->writer());
-  if (pages_) pages_->output().pass_on_to(&*recording_);
 }
 
 std::vector<Output*> Instrument::fed() {

@@ -77,8 +77,6 @@ class Instrument {
 
   void open_outputs();
   void announce() const;
-  void begin_pages(RegionSource* region);
-  void begin_recording(const record::Head& head);
   std::vector<Output*> fed();
   void end_loop(const RunReport& report);
 

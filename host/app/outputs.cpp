@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -262,68 +261,23 @@ Outputs::Outputs(const std::vector<OutputSpec>& asked, bool unasked) {
                         [](const Entry& entry) { return entry.spec.is(OutputKind::device); });
 }
 
-Outputs::~Outputs() = default;
-
 void Outputs::open(OutputSetup setup) {
   setup.standard_output = std::any_of(entries_.begin(), entries_.end(), [](const Entry& entry) {
     return entry.spec.argument == "-";
   });
   std::string last_refusal;
-  for (Entry& entry : entries_)
-    if (entry.spec.row->open != nullptr && entry.opened.output == nullptr)
-      open(entry, setup, last_refusal);
-}
-
-/// Unasked devices often lack the same thing: it is said once.
-void Outputs::open(Entry& entry, const OutputSetup& setup, std::string& last_refusal) {
-  const OutputRow& row = *entry.spec.row;
-  try {
-    entry.opened = row.open(setup, entry.spec.argument);
-  } catch (const ConfigError& e) {
-    if (entry.asked) throw;
-    if (last_refusal == e.what()) return;
-    last_refusal = e.what();
-    log_info("running without {}: {}", row.name, last_refusal);
+  for (Entry& entry : entries_) {
+    const OutputRow& row = *entry.spec.row;
+    if (row.open == nullptr || entry.opened.output != nullptr) continue;
+    try {
+      entry.opened = row.open(setup, entry.spec.argument);
+    } catch (const ConfigError& e) {
+      if (entry.asked) throw;
+      if (last_refusal == e.what()) continue;  // unasked ones often lack the same thing
+      last_refusal = e.what();
+      log_info("running without {}: {}", row.name, last_refusal);
+    }
   }
-}
-
-void Outputs::close_for_job() {
-  for (Entry& entry : entries_)
-    if (!entry.spec.row->outlives_job) entry.opened = {};
-}
-
-void Outputs::close() {
-  for (Entry& entry : entries_) entry.opened = {};
-}
-
-std::vector<Output*> Outputs::all() const {
-  std::vector<Output*> all;
-  for (const Entry& entry : entries_)
-    if (entry.opened.output) all.push_back(entry.opened.output.get());
-  return all;
-}
-
-std::vector<WatchdogDevice> Outputs::devices() const {
-  std::vector<WatchdogDevice> devices;
-  for (const Entry& entry : entries_)
-    devices.insert(devices.end(), entry.opened.devices.begin(), entry.opened.devices.end());
-  return devices;
-}
-
-const SpnavOutput* Outputs::programs() const {
-  for (const Entry& entry : entries_)
-    if (entry.opened.programs != nullptr) return entry.opened.programs;
-  return nullptr;
-}
-
-bool Outputs::any_moves() const {
-  return std::any_of(entries_.begin(), entries_.end(),
-                     [](const Entry& entry) { return entry.spec.moves(); });
-}
-
-bool Outputs::any_hid_asked() const {
-  return std::any_of(entries_.begin(), entries_.end(),
-                     [](const Entry& entry) { return entry.asked && entry.spec.row->hid; });
 }
 
 }  // namespace tagwrench

@@ -3,6 +3,7 @@
 // that.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -87,26 +88,50 @@ class Outputs {
   Outputs(const std::vector<OutputSpec>& asked, bool unasked);
   Outputs(const Outputs&) = delete;
   Outputs& operator=(const Outputs&) = delete;
-  ~Outputs();
 
   /// Opens those that are not open: devices first, files are only then overwritten. Throws
   /// ConfigError; of unasked ones it says why they cannot be.
   void open(OutputSetup setup);
   /// All but those that outlive a job.
-  void close_for_job();
+  void close_for_job() {
+    for (Entry& entry : entries_)
+      if (!entry.spec.row->outlives_job) entry.opened = {};
+  }
   /// Neutral, then gone.
-  void close();
+  void close() {
+    for (Entry& entry : entries_) entry.opened = {};
+  }
 
   /// Those that are open, devices first. Borrowed.
-  std::vector<Output*> all() const;
-  std::vector<WatchdogDevice> devices() const;
+  std::vector<Output*> all() const {
+    std::vector<Output*> all;
+    for (const Entry& entry : entries_)
+      if (entry.opened.output) all.push_back(entry.opened.output.get());
+    return all;
+  }
+  std::vector<WatchdogDevice> devices() const {
+    std::vector<WatchdogDevice> devices;
+    for (const Entry& entry : entries_)
+      devices.insert(devices.end(), entry.opened.devices.begin(), entry.opened.devices.end());
+    return devices;
+  }
   /// Null: nobody knows them.
-  const SpnavOutput* programs() const;
+  const SpnavOutput* programs() const {
+    for (const Entry& entry : entries_)
+      if (entry.opened.programs != nullptr) return entry.opened.programs;
+    return nullptr;
+  }
 
   /// Whether something that profiles move is among them.
-  bool any_moves() const;
+  bool any_moves() const {
+    return std::any_of(entries_.begin(), entries_.end(),
+                       [](const Entry& entry) { return entry.spec.moves(); });
+  }
   /// Whether a virtual device was asked for.
-  bool any_hid_asked() const;
+  bool any_hid_asked() const {
+    return std::any_of(entries_.begin(), entries_.end(),
+                       [](const Entry& entry) { return entry.asked && entry.spec.row->hid; });
+  }
 
  private:
   struct Entry {
@@ -114,8 +139,6 @@ class Outputs {
     bool asked = true;
     OpenedOutput opened{};
   };
-
-  void open(Entry& entry, const OutputSetup& setup, std::string& last_refusal);
 
   std::vector<Entry> entries_;  ///< devices first
 };

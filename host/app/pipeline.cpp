@@ -1,11 +1,9 @@
 #include "host/app/pipeline.h"
 
 #include <algorithm>
-#include <exception>
 #include <utility>
 
 #include "host/core/log.h"
-#include "host/tracker/tracker.h"
 
 namespace tagwrench {
 namespace {
@@ -215,12 +213,6 @@ OutputScheduler::Move OutputScheduler::sample(bool numbers, Duration period,
   }
   if (next_ == TimePoint::max()) next_ = now;  // at once, and from then on by the clock
   return due(now, period) ? Move::on : Move::none;
-}
-
-bool OutputScheduler::due(TimePoint now, Duration period) noexcept {
-  if (now < next_) return false;
-  next_ = now - next_ > period ? now + period : next_ + period;
-  return true;
 }
 
 void StatusLines::say(std::string_view line) noexcept {

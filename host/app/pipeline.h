@@ -74,7 +74,11 @@ class OutputScheduler {
 
   /// Whether devices are to move on. The next time is one period later, and not earlier than now:
   /// what a loop has slept through is not made up for.
-  bool due(TimePoint now, Duration period) noexcept;
+  bool due(TimePoint now, Duration period) noexcept {
+    if (now < next_) return false;
+    next_ = now - next_ > period ? now + period : next_ + period;
+    return true;
+  }
 
   /// When due() is asked next; never, while devices move with samples alone.
   TimePoint next() const noexcept { return next_; }
@@ -83,8 +87,7 @@ class OutputScheduler {
   TimePoint next_ = TimePoint::max();
 };
 
-// What a run says to people: lines to the outputs that show them, else to the log; diagnostics once
-// each.
+// What a run says to people, to outputs that show it, else to the log; diagnostics once each.
 
 class StatusLines {
  public:
@@ -136,8 +139,7 @@ class Pipeline {
   /// Takes the zero off every sample; without it the wrench stays as it is estimated. Borrowed.
   void follow_zero(ZeroTracking& zero) noexcept { zero_ = &zero; }
 
-  /// Runs until a limit, the source's end, a stop or a failed output. Does not throw on account of
-  /// the outside world.
+  /// Runs until a limit, the source's end, a stop or a failed output; does not throw for these.
   RunReport run(const RunLimits& limits) noexcept;
   /// While it runs, for its own thread.
   const RunReport& so_far() const noexcept { return report_; }

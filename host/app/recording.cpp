@@ -7,13 +7,10 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <exception>
-#include <filesystem>
-#include <optional>
 #include <system_error>
 
 #include "host/core/config_error.h"
@@ -145,25 +142,9 @@ Recording::Recording(const RecordOptions& options, const record::Head& head, boo
   ::timerfd_settime(timer_.get(), 0, &every, nullptr);
 }
 
-SendStatus Recording::send(const Sample& sample) noexcept {
-  dropped_ += sample.dropped;
-  return writer().state().failed ? SendStatus::failed : SendStatus::ok;
-}
-
-/// What people are told is kept too, but for its own progress.
-bool Recording::notice(std::string_view line) noexcept {
-  if (line.data() != line_.data()) note(line);
-  return false;
-}
-
 std::string_view Recording::service() noexcept {
   std::uint64_t ticks = 0;
   if (::read(timer_.get(), &ticks, sizeof ticks) <= 0) return {};
-  line_ = progress();
-  return line_;
-}
-
-std::string Recording::progress() {
   const TimePoint now = std::chrono::steady_clock::now();
   const record::WriterState state = writer().state();
   const double elapsed = in_seconds(now - start_);
@@ -172,16 +153,16 @@ std::string Recording::progress() {
   const double speed = static_cast<double>(state.bytes) / std::max(1e-3, elapsed);
   last_frames_ = state.frames;
   last_line_ = now;
-  std::string line = fmt::format("recording: {:.1f} frames/s, {} dropped", rate, dropped_);
+  line_ = fmt::format("recording: {:.1f} frames/s, {} dropped", rate, dropped_);
   if (state.lost_frames > 0 || state.lost_others > 0) {
-    line += fmt::format(", {} and {} lost by a slow disk", count_text(state.lost_frames, "frame"),
-                        count_text(state.lost_others, "other row"));
+    line_ += fmt::format(", {} and {} lost by a slow disk", count_text(state.lost_frames, "frame"),
+                         count_text(state.lost_others, "other row"));
   }
-  line += fmt::format(", {} at {}/s, {} left on the disk ({})",
-                      bytes_text(static_cast<double>(state.bytes)), bytes_text(speed),
-                      bytes_text(static_cast<double>(state.disk_free)),
-                      time_text(static_cast<double>(state.disk_free) / std::max(1.0, speed)));
-  if (state.fill > 0.1) line += fmt::format(", buffer {:.0f} % full", 100 * state.fill);
+  line_ += fmt::format(", {} at {}/s, {} left on the disk ({})",
+                       bytes_text(static_cast<double>(state.bytes)), bytes_text(speed),
+                       bytes_text(static_cast<double>(state.disk_free)),
+                       time_text(static_cast<double>(state.disk_free) / std::max(1.0, speed)));
+  if (state.fill > 0.1) line_ += fmt::format(", buffer {:.0f} % full", 100 * state.fill);
   std::optional<double> left;
   if (time_) left = in_seconds(*time_) - elapsed;
   if (frames_ && rate > 0) {
@@ -189,8 +170,8 @@ std::string Recording::progress() {
         (static_cast<double>(*frames_) - static_cast<double>(state.frames)) / rate;
     left = left ? std::min(*left, of_frames) : of_frames;
   }
-  if (left) line += fmt::format(", {} to go", time_text(std::max(0.0, *left)));
-  return line;
+  if (left) line_ += fmt::format(", {} to go", time_text(std::max(0.0, *left)));
+  return line_;
 }
 
 std::string Recording::summary() const {

@@ -1,5 +1,4 @@
-// A run that is recorded: what the pipeline tells of each frame, what people are told, and how it
-// goes.
+// A run that is recorded: what the pipeline tells of each frame, what people are told, its course.
 #pragma once
 
 #include <filesystem>
@@ -34,11 +33,18 @@ class Recording final : public Output, public record::FrameRecorder {
             std::optional<std::uint64_t> frames, std::optional<Duration> time);
 
   // Output: fails when nothing more can be written.
-  SendStatus send(const Sample& sample) noexcept override;
+  SendStatus send(const Sample& sample) noexcept override {
+    dropped_ += sample.dropped;
+    return writer().state().failed ? SendStatus::failed : SendStatus::ok;
+  }
   std::string failure() const override { return writer().failure(); }
   int poll_fd() const noexcept override { return timer_.get(); }
   std::string_view service() noexcept override;
-  bool notice(std::string_view line) noexcept override;
+  /// What people are told is kept too, but for its own progress.
+  bool notice(std::string_view line) noexcept override {
+    if (line.data() != line_.data()) note(line);
+    return false;
+  }
 
   /// Ends it. One line about what went wrong; empty if nothing did.
   std::string finish() noexcept { return writer().finish(); }
@@ -46,8 +52,6 @@ class Recording final : public Output, public record::FrameRecorder {
   std::string summary() const;
 
  private:
-  std::string progress();
-
   std::string file_;
   UniqueFd timer_;
   std::optional<std::uint64_t> frames_;

@@ -8,9 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
@@ -18,12 +16,9 @@
 #include <filesystem>
 #include <memory>
 #include <span>
-#include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
-#include "host/app/input.h"
 #include "host/app/instrument.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
@@ -31,6 +26,7 @@
 #include "host/core/os/uninterrupted.h"
 #include "host/core/os/unique_fd.h"
 #include "host/core/os/user_folders.h"
+#include "host/output/gadget_tree.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/v4l2_device.h"
 #include "host/source/v4l2_source.h"
@@ -63,15 +59,6 @@ void check_board(const RunOptions& options, std::span<const OutputSpec> outputs)
         "--board",
         options.source);
   }
-}
-
-void check_name(const std::string& name) {
-  const bool usable = !name.empty() && name.size() <= 32 &&
-                      std::all_of(name.begin(), name.end(), [](unsigned char c) {
-                        return std::isalnum(c) != 0 || c == '-' || c == '_';
-                      });
-  if (!usable)
-    throw ConfigError("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name);
 }
 
 /// In the browser of the desktop, where there is one; the shell leaves it to itself, and Ctrl-C in
@@ -232,7 +219,7 @@ int run(const RunOptions& given) {
   const UniqueFd caught = termination_fd();  // what comes while it is set up ends it in order, too
   const std::vector<OutputSpec> asked = parse_outputs(given.outputs);  // refused before anything
   check_board(given, asked);                                           // is opened or lit
-  check_name(given.name);
+  check_gadget_name(given.name);
   const bool pages = has_web(given, asked);
   RunSession session{with_own_sensor(given), asked};
   if (session.options.record) check_recording(*session.options.record);

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 
-#include "host/core/config_error.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/source/simulator/disturbances.h"
 #include "host/tools/design/parameters.h"

@@ -1,5 +1,4 @@
-// scenario.yaml -> sim::Scenario. Every key has the default of scenario.h; an unknown key is an
-// error.
+// scenario.yaml -> sim::Scenario. Defaults are those of scenario.h; an unknown key is an error.
 #pragma once
 
 #include <string>

@@ -130,8 +130,6 @@ void BoardLink::arm(TimePoint when) noexcept {
   ::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &timer, nullptr);
 }
 
-bool BoardLink::next(BoardEvent& news) noexcept { return session_.next(news) || news_.pop(news); }
-
 std::string BoardLink::why_no_board() const {
   const SessionCounters counters = session_.counters();
   if (counters.bytes == 0) {

@@ -37,10 +37,9 @@ class BoardLink {
   const BoardSession& session() const noexcept { return session_; }
   bool plugged() const noexcept { return static_cast<bool>(serial_); }
   const std::string& port() const noexcept { return path_; }
-  std::uint64_t dropped_bytes() const noexcept { return serial_.dropped_bytes(); }
 
   /// BoardEvent of the session and of the port, oldest first.
-  bool next(BoardEvent& news) noexcept;
+  bool next(BoardEvent& news) noexcept { return session_.next(news) || news_.pop(news); }
 
   /// One line: what came from the port instead of a board's greeting, and what may be the matter.
   std::string why_no_board() const;

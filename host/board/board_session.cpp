@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 #include "protocol/codec.h"
 #include "protocol/pattern.h"
@@ -153,19 +152,6 @@ void BoardSession::set_led(const Led& led) noexcept {
   remember_led_start();
 }
 
-void BoardSession::tare(std::uint8_t cell_mask, std::uint16_t conversions) noexcept {
-  tare_ = {cell_mask, conversions};
-  tare_due_ = true;
-  next_tare_ = {};
-}
-
-void BoardSession::configure(const Configure& configuration) noexcept {
-  options_.configuration = configuration;
-  if (state_ == BoardState::ready) state_ = BoardState::configuring;
-  configured_ = false;
-  next_configure_ = {};
-}
-
 template <class Message>
 std::uint8_t BoardSession::put(const Message& message) noexcept {
   std::array<std::uint8_t, kMaxBodyBytes> body;
@@ -281,10 +267,6 @@ TimePoint BoardSession::next_poll() const noexcept {
   return next;
 }
 
-std::uint64_t BoardSession::overwritten() const noexcept {
-  return cells_.lost() + adc_.lost() + buttons_.lost() + faults_.lost();
-}
-
 void BoardSession::take(std::span<const std::uint8_t> bytes, TimePoint arrival) noexcept {
   counters_.bytes += bytes.size();
   for (std::size_t i = 0; i < bytes.size(); ++i) {
@@ -340,14 +322,20 @@ void BoardSession::take_frame(TimePoint arrival, std::uint16_t wire_bytes) noexc
     case Kind::adc_sample:
       return read(AdcSample{}, [&](const AdcSample& m) { take_adc(m, arrival); });
     case Kind::button_event:
-      return read(ButtonEvent{}, [&](const ButtonEvent& m) { take_button(m, arrival); });
+      return read(ButtonEvent{}, [&](const ButtonEvent& m) {
+        buttons_.push({m.button, m.pressed, host_time(m.time_us, arrival)});
+      });
     case Kind::time_reply:
       return read(TimeReply{},
                   [&](const TimeReply& m) { take_time_reply(m, arrival, wire_bytes); });
     case Kind::status: return read(Status{}, [&](const Status& m) { take_status(m, arrival); });
     case Kind::answer: return read(Answer{}, [&](const Answer& m) { take_answer(m); });
     case Kind::tare_result: return read(TareResult{}, [&](const TareResult& m) { tares_.push(m); });
-    case Kind::fault: return read(Fault{}, [&](const Fault& m) { take_fault(m, arrival); });
+    case Kind::fault:
+      return read(Fault{}, [&](const Fault& m) {
+        faults_.push({m.code, m.channel, host_time(m.time_us, arrival)});
+        log_info(BoardEvent::Kind::fault, static_cast<std::uint32_t>(m.code), m.channel);
+      });
     default: ++counters_.unknown_frames;
   }
 }
@@ -385,23 +373,20 @@ void BoardSession::take_hello(const Hello& hello, TimePoint arrival) noexcept {
     state_ = BoardState::other_version;
     return;
   }
-  if (!known) restart_streams();
+  if (!known) {  // what belonged to the board's last life
+    clock_.restart();
+    half_ = {};
+    requests_.fill({});
+    cell_sequence_.fill({});
+    adc_sequence_.fill({});
+    has_status_ = false;
+  }
   if (known && state_ >= BoardState::configuring) return;  // a repeated answer
   log_info(BoardEvent::Kind::connected, version);
   state_ = configured_ ? BoardState::ready : BoardState::configuring;
   set_id_due_ = hello.unique_id.count == 0 && options_.new_id.count > 0;
   next_set_id_ = next_configure_ = next_led_ = next_time_request_ = next_tare_ = {};
   quick_requests_ = kQuickRequests;
-}
-
-/// What belonged to the board's last life.
-void BoardSession::restart_streams() noexcept {
-  clock_.restart();
-  half_ = {};
-  requests_.fill({});
-  cell_sequence_.fill({});
-  adc_sequence_.fill({});
-  has_status_ = false;
 }
 
 void BoardSession::take_answer(const Answer& answer) noexcept {
@@ -453,12 +438,6 @@ void BoardSession::take_status(const Status& status, TimePoint arrival) noexcept
   greet_again(arrival);
 }
 
-/// Its answer's boot id says whether it started anew.
-void BoardSession::greet_again(TimePoint now) noexcept {
-  state_ = BoardState::waiting;
-  next_hello_ = now;
-}
-
 void BoardSession::take_time_reply(const TimeReply& reply, TimePoint arrival,
                                    std::uint16_t wire_bytes) noexcept {
   if (half_.waiting && reply.previous_valid &&
@@ -504,15 +483,6 @@ void BoardSession::take_adc(const AdcSample& sample, TimePoint arrival) noexcept
   }
   adc_.push({sample.channel, sample.counts, host_time(sample.time_us, arrival), sample.sequence,
              lost_between(adc_sequence_[sample.channel], sample.sequence)});
-}
-
-void BoardSession::take_button(const ButtonEvent& event, TimePoint arrival) noexcept {
-  buttons_.push({event.button, event.pressed, host_time(event.time_us, arrival)});
-}
-
-void BoardSession::take_fault(const Fault& fault, TimePoint arrival) noexcept {
-  faults_.push({fault.code, fault.channel, host_time(fault.time_us, arrival)});
-  log_info(BoardEvent::Kind::fault, static_cast<std::uint32_t>(fault.code), fault.channel);
 }
 
 HostTime BoardSession::host_time(std::uint32_t board_us, TimePoint arrival) const noexcept {

@@ -144,8 +144,11 @@ class BoardSession {
   void set_led(const Led& led) noexcept;
   /// Whether the board has confirmed it.
   bool led_accepted() const noexcept { return led_accepted_; }
-  void tare(std::uint8_t cell_mask, std::uint16_t conversions) noexcept;
-  void configure(const Configure& configuration) noexcept;
+  void tare(std::uint8_t cell_mask, std::uint16_t conversions) noexcept {
+    tare_ = {cell_mask, conversions};
+    tare_due_ = true;
+    next_tare_ = {};
+  }
 
   // ---- What the board said ----
 
@@ -159,7 +162,9 @@ class BoardSession {
   ClockSync& clock() noexcept { return clock_; }
   const SessionCounters& counters() const noexcept { return counters_; }
   /// Samples that nobody took before they were overwritten.
-  std::uint64_t overwritten() const noexcept;
+  std::uint64_t overwritten() const noexcept {
+    return cells_.lost() + adc_.lost() + buttons_.lost() + faults_.lost();
+  }
 
   bool next(CellReading& reading) noexcept { return cells_.pop(reading); }
   bool next(AdcReading& reading) noexcept { return adc_.pop(reading); }
@@ -200,10 +205,11 @@ class BoardSession {
                        std::uint16_t wire_bytes) noexcept;
   void take_cell(const CellSample& sample, TimePoint arrival) noexcept;
   void take_adc(const AdcSample& sample, TimePoint arrival) noexcept;
-  void take_button(const ButtonEvent& event, TimePoint arrival) noexcept;
-  void take_fault(const Fault& fault, TimePoint arrival) noexcept;
-  void restart_streams() noexcept;
-  void greet_again(TimePoint now) noexcept;
+  /// Its answer's boot id says whether it started anew.
+  void greet_again(TimePoint now) noexcept {
+    state_ = BoardState::waiting;
+    next_hello_ = now;
+  }
   void log_info(BoardEvent::Kind kind, std::uint32_t value = 0, std::uint32_t other = 0) noexcept {
     news_.push({kind, value, other});
   }

@@ -245,12 +245,6 @@ void save_cells(const std::string& path, const std::string& board_id,
   }
 }
 
-void SampleHistory::clear() noexcept {
-  samples_.clear();
-  third_squares_ = 0;
-  thirds_ = 0;
-}
-
 void SampleHistory::add(TimePoint time, Duration time_sigma, double value, double sigma,
                         bool lost_before) noexcept {
   const auto delay = Duration(std::llround(options_.delay * 1e9));

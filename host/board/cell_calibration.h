@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -112,7 +113,11 @@ class SampleHistory {
   /// tells of samples that are missing before this one. Times must grow; others are ignored.
   void add(TimePoint time, Duration time_sigma, double value, double sigma = 0,
            bool lost_before = false) noexcept;
-  void clear() noexcept;
+  void clear() noexcept {
+    samples_.clear();
+    third_squares_ = 0;
+    thirds_ = 0;
+  }
 
   Aligned at(TimePoint time) const noexcept;
   /// Standard deviation of one sample, as seen; 0 before there are enough.

@@ -1,8 +1,5 @@
 #include "host/board/clock_sync.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace tagwrench::link {
 namespace {
 
@@ -22,6 +19,15 @@ Duration to_duration(double seconds) {
 }
 double squared(double x) { return x * x; }
 
+constexpr double kFirstJitter = 5e-3;  ///< s, before any is seen
+constexpr double kMinJitter = 20e-6;   ///< s
+constexpr double kPeriodSigma = 0.02;  ///< of the nominal period
+constexpr double kWander = 1e-6;       ///< of the period, relative, per square root of a second
+constexpr double kForget = 0.02;       ///< of the jitter's estimate, per sample
+constexpr double kCounterGate = 36;    ///< squared innovation over its variance
+constexpr double kMisfitTime = 0.5;    ///< s
+constexpr double kMaxSteps = 30'000;   ///< half of the counter's range: a bridge of a long silence
+
 }  // namespace
 
 void ClockSync::restart() noexcept {
@@ -32,11 +38,6 @@ void ClockSync::restart() noexcept {
   misfit_ = {};
   unsteady_ = 0;
   out_of_order_ = 0;
-}
-
-void ClockSync::set_asymmetry(Duration asymmetry, Duration sigma) noexcept {
-  asymmetry_ = std::chrono::duration<double>(asymmetry).count();
-  asymmetry_sigma_ = std::abs(std::chrono::duration<double>(sigma).count());
 }
 
 std::int64_t ClockSync::unwrap(std::uint32_t board_us, std::int64_t near_us) const noexcept {
@@ -108,14 +109,6 @@ void ClockSync::refit() noexcept {
   }
 }
 
-/// One jump is a clock that was set. Two in a window are one that the filter cannot follow.
-void ClockSync::note_jump(double size, std::int64_t host_ns) noexcept {
-  const bool again = jumps_ > 0 && std::abs(host_ns - last_jump_ns_) <= kWindow.count();
-  unsteady_ = again ? std::max(unsteady_, size) : 0;
-  last_jump_ns_ = host_ns;
-  ++jumps_;
-}
-
 void ClockSync::append(const Entry& entry) noexcept {
   while (count_ > 0 && entry.host_ns - this->entry(0).host_ns > kWindow.count()) drop_oldest(1);
   if (count_ == kMaxEntries) drop_oldest(1);
@@ -123,15 +116,6 @@ void ClockSync::append(const Entry& entry) noexcept {
   ++count_;
   board_reference_us2_ = entry.board_us2;
   host_reference_ = TimePoint(Duration(entry.host_ns));
-}
-
-void ClockSync::drop_oldest(std::size_t count) noexcept {
-  first_ = (first_ + count) % kMaxEntries;
-  count_ -= count;
-}
-
-double ClockSync::round_trip(const Entry& entry) const noexcept {
-  return entry.host_span - entry.board_span * (1 + state_.mean[1]);
 }
 
 /// The fastest round trip of all that might be. The n-th fastest sum of two delays exceeds the
@@ -153,11 +137,6 @@ ClockSync::RoundTrip ClockSync::least_round_trip() const noexcept {
   if (count_ >= 4 * fastest.size()) excess = std::max(excess, (fastest[15] - fastest[0]) / 3);
   const double bound = fastest[0] - excess;
   return {fastest[0] > 0 ? std::max(bound, 0.0) : bound, excess, beyond_zero};
-}
-
-/// What a delay might exceed its least by; where the wire times are not as told, either way.
-double ClockSync::excess(const Entry& entry) const noexcept {
-  return std::abs(round_trip(entry) - least_.time);
 }
 
 /// Host minus board time, both since the reference.
@@ -292,19 +271,6 @@ ClockReport ClockSync::report() const noexcept {
   out.converged = count_ >= kFewForRoundTrip && out.random_sigma <= kConverged;
   return out;
 }
-
-namespace {
-
-constexpr double kFirstJitter = 5e-3;  ///< s, before any is seen
-constexpr double kMinJitter = 20e-6;   ///< s
-constexpr double kPeriodSigma = 0.02;  ///< of the nominal period
-constexpr double kWander = 1e-6;       ///< of the period, relative, per square root of a second
-constexpr double kForget = 0.02;       ///< of the jitter's estimate, per sample
-constexpr double kCounterGate = 36;    ///< squared innovation over its variance
-constexpr double kMisfitTime = 0.5;    ///< s
-constexpr double kMaxSteps = 30'000;   ///< half of the counter's range: a bridge of a long silence
-
-}  // namespace
 
 void CounterClock::start(std::uint16_t counter, TimePoint arrival) noexcept {
   known_ = true;

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -75,7 +77,10 @@ class ClockSync {
 
   /// Delay of the way to the board minus delay of the way back, and its standard deviation; from an
   /// event that both clocks saw. Half of it is added to every host time.
-  void set_asymmetry(Duration asymmetry, Duration sigma) noexcept;
+  void set_asymmetry(Duration asymmetry, Duration sigma) noexcept {
+    asymmetry_ = std::chrono::duration<double>(asymmetry).count();
+    asymmetry_sigma_ = std::abs(std::chrono::duration<double>(sigma).count());
+  }
 
   bool known() const noexcept { return count_ > 0; }
   /// The last exchange's; host times are good about here.
@@ -123,15 +128,29 @@ class ClockSync {
 
   const Entry& entry(std::size_t i) const noexcept { return entries_[(first_ + i) % kMaxEntries]; }
   void append(const Entry& entry) noexcept;
-  void drop_oldest(std::size_t count) noexcept;
+  void drop_oldest(std::size_t count) noexcept {
+    first_ = (first_ + count) % kMaxEntries;
+    count_ -= count;
+  }
   std::int64_t unwrap(std::uint32_t board_us, std::int64_t near_us) const noexcept;
-  double round_trip(const Entry& entry) const noexcept;
+  double round_trip(const Entry& entry) const noexcept {
+    return entry.host_span - entry.board_span * (1 + state_.mean[1]);
+  }
   RoundTrip least_round_trip() const noexcept;
-  double excess(const Entry& entry) const noexcept;
+  /// What a delay might exceed its least by; where the wire times are not as told, either way.
+  double excess(const Entry& entry) const noexcept {
+    return std::abs(round_trip(entry) - least_.time);
+  }
   double offset(const Entry& entry) const noexcept;
   bool begins_anew(const Entry& late) noexcept;
   void refit() noexcept;
-  void note_jump(double size, std::int64_t host_ns) noexcept;
+  /// One jump is a clock that was set. Two in a window are one that the filter cannot follow.
+  void note_jump(double size, std::int64_t host_ns) noexcept {
+    const bool again = jumps_ > 0 && std::abs(host_ns - last_jump_ns_) <= kWindow.count();
+    unsteady_ = again ? std::max(unsteady_, size) : 0;
+    last_jump_ns_ = host_ns;
+    ++jumps_;
+  }
   Pass pass(double scale) const noexcept;
   void start(State& state, const Entry& entry, double excess) const noexcept;
   void predict(State& state, double seconds) const noexcept;

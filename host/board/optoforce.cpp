@@ -68,12 +68,6 @@ std::string status_text(std::uint16_t status) {
   return out;
 }
 
-void OptoforceParser::reset() noexcept {
-  count_ = 0;
-  have_frame_ = false;
-  interrupted_ = false;
-}
-
 bool OptoforceParser::next(OptoforceFrame& frame) noexcept {
   while (count_ > 0) {
     if (!may_begin()) {
@@ -122,12 +116,6 @@ bool OptoforceParser::checksum_fits(std::size_t length) const noexcept {
   unsigned sum = 0;
   for (std::size_t i = 0; i < length - kChecksumBytes; ++i) sum += pending_[i];
   return big_endian(&pending_[length - kChecksumBytes]) == (sum & 0xFFFF);
-}
-
-void OptoforceParser::skip() noexcept {
-  ++counters_.skipped_bytes;
-  interrupted_ = true;
-  consume(1);
 }
 
 void OptoforceParser::consume(std::size_t count) noexcept {

@@ -67,7 +67,11 @@ class OptoforceParser {
   }
 
   /// The bytes before are not continued: the port was opened anew.
-  void reset() noexcept;
+  void reset() noexcept {
+    count_ = 0;
+    have_frame_ = false;
+    interrupted_ = false;
+  }
 
   const Counters& counters() const noexcept { return counters_; }
   /// Of the last reply; 0 is success.
@@ -80,7 +84,11 @@ class OptoforceParser {
   std::size_t length() const noexcept;
   bool may_begin() const noexcept;
   bool checksum_fits(std::size_t length) const noexcept;
-  void skip() noexcept;
+  void skip() noexcept {
+    ++counters_.skipped_bytes;
+    interrupted_ = true;
+    consume(1);
+  }
   void consume(std::size_t count) noexcept;
   void read(OptoforceFrame& frame, std::size_t length) noexcept;
 
@@ -134,8 +142,6 @@ class OptoforceSensor {
   bool next(OptoforceReading& reading) noexcept { return readings_.pop(reading); }
   bool plugged() const noexcept { return static_cast<bool>(serial_); }
   const OptoforceParser::Counters& counters() const noexcept { return parser_.counters(); }
-  std::uint64_t overwritten() const noexcept { return readings_.lost(); }
-  double rate_hz() const noexcept { return 1 / clock_.period(); }
 
  private:
   void begin(TimePoint now) noexcept;

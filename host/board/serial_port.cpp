@@ -18,7 +18,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -26,6 +25,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/parse.h"
 
 namespace tagwrench::link {
 namespace {
@@ -78,11 +78,7 @@ std::string line_of(const fs::path& file) {
 }
 
 std::optional<std::uint16_t> hex16(std::string_view text) {
-  unsigned value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-  if (error != std::errc() || end != text.data() + text.size() || value > 0xFFFF || text.empty())
-    return {};
-  return static_cast<std::uint16_t>(value);
+  return parse_whole<std::uint16_t>(text, 16);
 }
 
 /// The folder of the USB device above a tty's; empty if it hangs on none.
@@ -337,8 +333,7 @@ SerialFailure SerialPort::open(const char* path, unsigned baud) noexcept {
   if (!fd) return failure_of(errno);
   if (!::isatty(fd.get())) return failure_of(ENOTTY);
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) return failure_of(errno);
-  // Keeps programs out that know no locks. A pseudo-terminal would stay exclusive after its
-  // closing.
+  // Keeps programs out that know no locks. A pseudo-terminal would stay exclusive when closed.
   if (!is_pseudo(about)) ::ioctl(fd.get(), TIOCEXCL);
   const speed_t speed = speed_of(baud);
   if (speed == B0 || !set_raw(fd.get(), speed)) return {SerialFailure::Kind::no_such_baud, 0};
@@ -381,8 +376,6 @@ bool TerminalMark::look(const char* path, TerminalMark& mark) noexcept {
       link ? std::int64_t{about.st_mtim.tv_sec} * 1'000'000'000 + about.st_mtim.tv_nsec : 0;
   return true;
 }
-
-void TerminalMark::set(const char* path) noexcept { look(path, *this); }
 
 bool TerminalMark::may_reopen(const char* path) const noexcept {
   struct stat about {};

@@ -19,8 +19,7 @@ constexpr const char* kStablePorts = "/dev/serial/by-id";
 /// Stable paths of all serial ports with a USB identity, sorted; of the folder that udev keeps.
 std::vector<std::string> stable_ports(const std::string& folder = kStablePorts);
 
-/// "give --port one of: ...", or that nothing is plugged in. `option` is what the port was named
-/// by.
+/// "give --port one of: ...", or that nothing is plugged in; `option` names the port.
 std::string port_advice(const std::string& option = kPortOption,
                         const std::string& folder = kStablePorts);
 
@@ -123,7 +122,7 @@ class SerialPort {
 class TerminalMark {
  public:
   /// Of a path that was just opened.
-  void set(const char* path) noexcept;
+  void set(const char* path) noexcept { look(path, *this); }
   /// False for a pseudo-terminal, if the path is not a link that was made anew.
   bool may_reopen(const char* path) const noexcept;
 

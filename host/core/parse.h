@@ -9,11 +9,11 @@
 
 namespace tagwrench {
 
-/// Without the blanks, tabs and carriage returns at its ends.
-inline std::string_view trimmed(std::string_view text) noexcept {
-  const std::size_t first = text.find_first_not_of(" \t\r");
+/// Without the blanks, tabs and carriage returns, or other `blanks`, at its ends.
+inline std::string_view trimmed(std::string_view text, std::string_view blanks = " \t\r") noexcept {
+  const std::size_t first = text.find_first_not_of(blanks);
   if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
 /// Always one part more than there are separators.

@@ -6,24 +6,17 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <string_view>
 #include <utility>
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
 #include "host/core/os/user_folders.h"
+#include "host/core/parse.h"
 
 namespace tagwrench {
 namespace {
 
 constexpr int kPatience_ms = 2000;
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\n";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
 
 sockaddr_un address_of(const std::string& path) {
   sockaddr_un address{};
@@ -71,10 +64,11 @@ bool listens(const std::string& path) { return somebody_listens(address_of(path)
 
 ControlRequest parse_request(std::string_view bytes) noexcept {
   using Kind = ControlRequest::Kind;
-  const std::string_view request = trimmed(bytes);
+  constexpr std::string_view kBlank = " \t\r\n";
+  const std::string_view request = trimmed(bytes, kBlank);
   const auto [line, text] = split_at(request, '\n');
   const auto [word, behind] = split_at(line, ' ');
-  const std::string_view name = trimmed(behind);
+  const std::string_view name = trimmed(behind, kBlank);
   if (word == "try" && !name.empty()) return {Kind::attempt, name, text};
   if (!text.empty()) return {Kind::unknown, word};
   if (word == "profile" && !name.empty()) return {Kind::profile, name};
@@ -105,10 +99,6 @@ ControlSocket::ControlSocket(std::string path)
                         ? path_ + ": another bridge runs on this sensor; stop it first"
                         : path_ + ": cannot listen: " + std::strerror(error) +
                               "; set XDG_RUNTIME_DIR to a folder of yours");
-}
-
-ControlSocket::~ControlSocket() {
-  if (socket_) ::unlink(path_.c_str());
 }
 
 ControlRequest ControlSocket::next() noexcept {

@@ -5,7 +5,6 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -50,13 +49,14 @@ class ControlSocket {
   explicit ControlSocket(std::string path);
   ControlSocket(ControlSocket&&) = default;
   ControlSocket& operator=(ControlSocket&&) = delete;
-  ~ControlSocket();
+  ~ControlSocket() {
+    if (socket_) ::unlink(path_.c_str());
+  }
 
   int fd() const noexcept { return socket_.get(); }
   /// The next request; none when all are taken.
   ControlRequest next() noexcept;
-  /// Who had the last request, tells askers apart; empty if he has no address. Valid until the
-  /// next.
+  /// Who had the last request, to tell askers apart; empty without address. Valid until the next.
   std::string_view asker() const noexcept;
   /// To whoever had the last request, if he listens. Never blocks.
   void answer(std::string_view text) noexcept;
@@ -78,8 +78,7 @@ class ControlClient {
   /// Of the sensor that listens at `path`. Throws ConfigError: nobody does.
   explicit ControlClient(const std::string& path);
 
-  /// Sends a request, and waits for its answer. Throws ConfigError: nobody listens any more, or
-  /// answers.
+  /// Sends a request, waits for its answer. Throws ConfigError: nobody listens or answers.
   std::string ask(std::string_view request);
 
  private:

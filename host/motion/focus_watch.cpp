@@ -3,11 +3,9 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <systemd/sd-bus.h>
-#include <unistd.h>
 #include <xcb/xcb.h>
 #include <xcb/xcbext.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
@@ -15,7 +13,6 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -79,52 +76,6 @@ std::optional<Focus> focused_in(const Json& tree) {
   }
   return {};
 }
-
-}  // namespace
-
-std::string i3_message(I3Type type, std::string_view payload) {
-  const auto size = static_cast<std::uint32_t>(payload.size());
-  std::string bytes(kMagic);
-  bytes.append(reinterpret_cast<const char*>(&size), sizeof size);
-  bytes.append(reinterpret_cast<const char*>(&type), sizeof type);
-  return bytes.append(payload);
-}
-
-bool I3Stream::put(std::string_view bytes) {
-  const std::size_t over = std::min(passed_over_, bytes.size());
-  passed_over_ -= over;
-  bytes_.append(bytes.substr(over));
-  const std::string_view begin = std::string_view(bytes_).substr(0, kMagic.size());
-  return kMagic.starts_with(begin);
-}
-
-std::optional<I3Message> I3Stream::next() {
-  if (bytes_.size() < kHead || !bytes_.starts_with(kMagic)) return {};
-  const std::size_t size = word_at(bytes_, kMagic.size());
-  I3Message message{word_at(bytes_, kMagic.size() + 4), {}};
-  if (size > kMax) {
-    const std::size_t here = std::min(size, bytes_.size() - kHead);
-    passed_over_ = size - here;
-    bytes_.erase(0, kHead + here);
-    return message;
-  }
-  if (bytes_.size() < kHead + size) return {};
-  message.payload = bytes_.substr(kHead, size);
-  bytes_.erase(0, kHead + size);
-  return message;
-}
-
-std::optional<Focus> focus_in(const I3Message& message) {
-  const Json json = parse_json(message.payload);
-  if (!json.is_object()) return {};
-  if (message.type == static_cast<std::uint32_t>(I3Type::tree)) return focused_in(json);
-  if (message.type != static_cast<std::uint32_t>(I3Type::window_event)) return {};
-  const auto window = json.find("container");
-  if (text_of(json, "change") != "focus" || window == json.end() || !window->is_object()) return {};
-  return Focus{.told = true, .program = program_of(*window)};
-}
-
-namespace {
 
 class I3Focus : public FocusWatch {
  public:
@@ -380,6 +331,48 @@ std::unique_ptr<FocusWatch> focus_in_kwin() {
 }
 
 }  // namespace
+
+std::string i3_message(I3Type type, std::string_view payload) {
+  const auto size = static_cast<std::uint32_t>(payload.size());
+  std::string bytes(kMagic);
+  bytes.append(reinterpret_cast<const char*>(&size), sizeof size);
+  bytes.append(reinterpret_cast<const char*>(&type), sizeof type);
+  return bytes.append(payload);
+}
+
+bool I3Stream::put(std::string_view bytes) {
+  const std::size_t over = std::min(passed_over_, bytes.size());
+  passed_over_ -= over;
+  bytes_.append(bytes.substr(over));
+  const std::string_view begin = std::string_view(bytes_).substr(0, kMagic.size());
+  return kMagic.starts_with(begin);
+}
+
+std::optional<I3Message> I3Stream::next() {
+  if (bytes_.size() < kHead || !bytes_.starts_with(kMagic)) return {};
+  const std::size_t size = word_at(bytes_, kMagic.size());
+  I3Message message{word_at(bytes_, kMagic.size() + 4), {}};
+  if (size > kMax) {
+    const std::size_t here = std::min(size, bytes_.size() - kHead);
+    passed_over_ = size - here;
+    bytes_.erase(0, kHead + here);
+    return message;
+  }
+  if (bytes_.size() < kHead + size) return {};
+  message.payload = bytes_.substr(kHead, size);
+  bytes_.erase(0, kHead + size);
+  return message;
+}
+
+std::optional<Focus> focus_in(const I3Message& message) {
+  const Json json = parse_json(message.payload);
+  if (!json.is_object()) return {};
+  if (message.type == static_cast<std::uint32_t>(I3Type::tree)) return focused_in(json);
+  if (message.type != static_cast<std::uint32_t>(I3Type::window_event)) return {};
+  const auto window = json.find("container");
+  if (text_of(json, "change") != "focus" || window == json.end() || !window->is_object()) return {};
+  return Focus{.told = true, .program = program_of(*window)};
+}
 
 std::unique_ptr<FocusWatch> FocusWatch::open() {
   // X11 last: sway and KWin start an X server too, which knows nothing of Wayland's windows.

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cstddef>
 #include <cstdint>
@@ -63,8 +62,7 @@ struct I3Message {
   std::string payload;
 };
 
-/// Bytes as they come, cut into messages. Of a message longer than kMax the payload is passed
-/// over and counts as empty.
+/// Bytes as they come, cut into messages. Of one longer than kMax the payload counts as empty.
 class I3Stream {
  public:
   static constexpr std::size_t kMax = 1 << 20;

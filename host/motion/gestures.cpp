@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/motion/shaping.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -49,14 +48,14 @@ bool Gestures::looks_for_twists() const noexcept {
   return wanted && band_[kTurn] <= kMaxBand * options_.twist_torque;
 }
 
-bool Gestures::at_rest(const Vector6& load, double part) const noexcept {
-  return (load.array().abs() <= part * band_.array()).all();
-}
-
 GestureResult Gestures::feel(const Sample& sample) noexcept {
   result_ = {};
   if (!carries_numbers(sample.status) || !sample.wrench.allFinite()) {
-    interrupt(sample.status);
+    // Devices are neutral. A frame that is doubtful, as the blow of a finger may make it, is as
+    // good as lost, and the frames around it tell; after anything worse what goes on is no gesture.
+    buttons_ = held_button_ = 0;
+    pulse_.spoiled = pulse_.spoiled || sample.status != Status::doubtful;
+    if (phase_ == Phase::pressing || phase_ == Phase::held) unsettle();
     return {};
   }
   const bool late = started_ && sample.capture_time <= last_.time;  // a replay that jumps back
@@ -64,11 +63,19 @@ GestureResult Gestures::feel(const Sample& sample) noexcept {
   if (late || gap || sample.touched) forget();
   if (started_ && sample.capture_time - last_.time > kStale) wanted_ = GestureCommand::none;
 
-  Reading now;
-  note(sample, now);
+  const Reading now{sample.capture_time, turned(options_.hid_R_camera, sample.wrench),
+                    sample.status == Status::saturated};
+  if (phase_ == Phase::unsettled || phase_ == Phase::ready) {
+    // Under load the sensor knows less; what rest is has been seen at rest.
+    const Vector6 sigma = turned_sigma(options_.hid_R_camera, sample.wrench_sigma);
+    band_ = options_.quiet.cwiseMax(kNoiseSigmas * sigma);
+  }
   if (buttons_ != 0 && (late || now.time >= release_at_)) buttons_ = 0;
   step(now);
-  follow_swing(now);
+  if (swings_) {
+    calm_frames_ = at_rest(now.load, kCalm) ? calm_frames_ + 1 : 0;
+    if (calm_frames_ >= kCalmFrames || now.time >= swing_until_) swings_ = false;
+  }
   last_ = now;
   started_ = true;
 
@@ -77,16 +84,6 @@ GestureResult Gestures::feel(const Sample& sample) noexcept {
   result_.hold_motion = options_.hold_motion && (going_on || swings_);
   result_.buttons = buttons_ | held_button_;
   return result_;
-}
-
-void Gestures::note(const Sample& sample, Reading& now) noexcept {
-  now.time = sample.capture_time;
-  now.load = turned(options_.hid_R_camera, sample.wrench);
-  now.saturated = sample.status == Status::saturated;
-  if (phase_ != Phase::unsettled && phase_ != Phase::ready) return;
-  // Under load the sensor knows less; what rest is has been seen at rest.
-  const Vector6 sigma = turned_sigma(options_.hid_R_camera, sample.wrench_sigma);
-  band_ = options_.quiet.cwiseMax(kNoiseSigmas * sigma);
 }
 
 void Gestures::step(const Reading& now) noexcept {
@@ -341,45 +338,10 @@ void Gestures::give_up(const Reading& now) noexcept {
   if (!pushed) await_more();
 }
 
-/// The other half of a double tap may come, and is to be no tap.
-void Gestures::await_more() noexcept {
-  if (options_.double_tap.does_something()) patience_ = options_.double_within;
-}
-
-void Gestures::unsettle() noexcept {
-  patience_ = options_.quiet_before;
-  phase_ = Phase::unsettled;
-  quiet_ = false;
-  first_tap_ = false;
-}
-
-/// A frame without numbers: devices are neutral. One that is doubtful, as the blow of a finger may
-/// make it, is as good as lost, and the frames around it tell; after anything worse what goes on is
-/// no gesture.
-void Gestures::interrupt(Status status) noexcept {
-  buttons_ = held_button_ = 0;
-  pulse_.spoiled = pulse_.spoiled || status != Status::doubtful;
-  if (phase_ == Phase::pressing || phase_ == Phase::held) unsettle();
-}
-
-/// Whatever went on, nobody saw how.
-void Gestures::forget() noexcept {
-  unsettle();
-  await_more();
-  held_button_ = 0;
-  swings_ = false;
-}
-
 void Gestures::begin_swing(TimePoint now) noexcept {
   swings_ = true;
   swing_until_ = now + kMaxSwing;
   calm_frames_ = 0;
-}
-
-void Gestures::follow_swing(const Reading& now) noexcept {
-  if (!swings_) return;
-  calm_frames_ = at_rest(now.load, kCalm) ? calm_frames_ + 1 : 0;
-  if (calm_frames_ >= kCalmFrames || now.time >= swing_until_) swings_ = false;
 }
 
 GestureOptions gestures_for(const Vector6& range, const Eigen::Matrix3d& hid_R_camera) {

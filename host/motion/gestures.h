@@ -44,8 +44,7 @@ struct GestureAction {
   bool operator==(const GestureAction&) const = default;
 };
 
-/// Loads are for the published sensor (0.9, 0.9, 2.5 N, 16, 16, 9 mN m); gestures_for() scales
-/// them.
+/// Loads of the published sensor (0.9, 0.9, 2.5 N, 16, 16, 9 mN m); gestures_for() scales them.
 struct GestureOptions {
   /// Rows: HID X, Y, Z along the axes of the wrench.
   Eigen::Matrix3d hid_R_camera = ShapingOptions{}.hid_R_camera;
@@ -53,8 +52,7 @@ struct GestureOptions {
   double tap_force = 0.5;      ///< N, least peak of a tap
   double press_force = 1.0;    ///< N, least force of a press-hold
   double twist_torque = 3e-3;  ///< N m, least peak of a twist-click
-  /// Largest load per axis that counts as rest, N and N m; never less than four standard deviations
-  /// of the reading.
+  /// Largest load per axis that is rest, N and N m; at least four of the reading's sigmas.
   Vector6 quiet = (Vector6() << 0.054, 0.054, 0.15, 0.96e-3, 0.96e-3, 0.54e-3).finished();
   /// Largest load on the other axes during a twist-click, N and N m; the last one is of no use.
   Vector6 twist_others = (Vector6() << 0.27, 0.27, 0.75, 4.8e-3, 4.8e-3, 2.7e-3).finished();
@@ -151,8 +149,9 @@ class Gestures {
 
   bool looks_for_taps() const noexcept;
   bool looks_for_twists() const noexcept;
-  void note(const Sample& sample, Reading& now) noexcept;
-  bool at_rest(const Vector6& load, double part = 1) const noexcept;
+  bool at_rest(const Vector6& load, double part = 1) const noexcept {
+    return (load.array().abs() <= part * band_.array()).all();
+  }
   void step(const Reading& now) noexcept;
   void settle(const Reading& now) noexcept;
   void begin_pulse(const Reading& now, bool second) noexcept;
@@ -175,12 +174,24 @@ class Gestures {
   void keep_pressed(const Reading& now) noexcept;
   void complete(Gesture gesture, TimePoint now) noexcept;
   void give_up(const Reading& now) noexcept;
-  void unsettle() noexcept;
-  void interrupt(Status status) noexcept;
-  void await_more() noexcept;
-  void forget() noexcept;
+  void unsettle() noexcept {
+    patience_ = options_.quiet_before;
+    phase_ = Phase::unsettled;
+    quiet_ = false;
+    first_tap_ = false;
+  }
+  /// The other half of a double tap may come, and is to be no tap.
+  void await_more() noexcept {
+    if (options_.double_tap.does_something()) patience_ = options_.double_within;
+  }
+  /// Whatever went on, nobody saw how.
+  void forget() noexcept {
+    unsettle();
+    await_more();
+    held_button_ = 0;
+    swings_ = false;
+  }
   void begin_swing(TimePoint now) noexcept;
-  void follow_swing(const Reading& now) noexcept;
 
   GestureOptions options_;
   Phase phase_ = Phase::unsettled;

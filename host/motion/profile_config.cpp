@@ -12,7 +12,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <vector>
 
 #include "host/core/config_error.h"
 #include "host/core/yaml/yaml_reader.h"
@@ -442,12 +441,6 @@ void ProfileFiles::watch() {
   if (!good)
     throw ConfigError(std::string("profiles: cannot be watched: ") + std::strerror(errno) +
                       "; raise fs.inotify.max_user_watches, or take ready-made ones");
-}
-
-std::string ProfileFiles::file_of(std::size_t profile) const {
-  for (const File& file : files_)
-    if (file.profile == profile) return file.folder + "/" + file.name;
-  return {};
 }
 
 Profile ProfileFiles::parse(const std::string& text, std::size_t profile) const {

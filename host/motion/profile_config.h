@@ -76,7 +76,11 @@ class ProfileFiles {
   /// At least one.
   const std::vector<Profile>& profiles() const noexcept { return profiles_; }
   /// Where a profile is on disk; empty if it is not.
-  std::string file_of(std::size_t profile) const;
+  std::string file_of(std::size_t profile) const {
+    for (const File& file : files_)
+      if (file.profile == profile) return file.folder + "/" + file.name;
+    return {};
+  }
   /// What a text says that would stand in a profile's place. Throws ConfigError: the first fault.
   Profile parse(const std::string& text, std::size_t profile) const;
   /// Until its file is saved again.

@@ -73,13 +73,6 @@ void ProfileManager::shape(Sample& sample) noexcept {
   latest_ = {sample.status, sample.wrench, sample.deflection, sample.buttons};
 }
 
-void ProfileManager::service() noexcept {
-  if (files_.fd() >= 0) take_files();
-  if (control_) take_requests();
-  if (trial_) take_lapse();
-  if (focus_) take_focus();
-}
-
 void ProfileManager::take_files() {
   for (const ProfileFiles::Change& change : files_.reread()) {
     if (change.profile == current_) apply();
@@ -152,24 +145,44 @@ void ProfileManager::take_requests() {
 
 std::string ProfileManager::granted(const ControlRequest& request) {
   using Kind = ControlRequest::Kind;
+  const auto chosen = [this] { return "ok: " + files_.profiles()[current_].name + "\n"; };
+  constexpr const char* kNoTrial = "error: nothing of yours is on trial\n";
   switch (request.kind) {
     case Kind::none: return {};
     case Kind::zero: zero_wanted_ = true; return "ok: as soon as nobody touches the sensor\n";
     case Kind::next_profile:
       use((current_ + 1) % files_.profiles().size(), "as asked");
-      return "ok: " + files_.profiles()[current_].name + "\n";
-    case Kind::profile: return choose(request.name);
+      return chosen();
+    case Kind::profile: {
+      const std::optional<std::size_t> found = find(request.name);
+      if (!found) return unknown(request.name);
+      use(*found, "as asked");
+      return chosen();
+    }
     case Kind::status: {
       std::string line = "ok: profile " + profile().name + " of";
       for (const Profile& p : files_.profiles()) line += " " + p.name;
       return line + "\n";
     }
-    case Kind::window: return window(request.name);
-    case Kind::live: return live();
+    case Kind::window:  // as if the desktop had told it; without a name: nobody knows any more
+      follow_focus(!request.name.empty(), request.name);
+      return chosen();
+    case Kind::live: {
+      LiveReading now = latest_;
+      now.on_trial = asker_tries();
+      return live_text(now);
+    }
     case Kind::show: return show(request.name);
     case Kind::attempt: return attempt(request);
-    case Kind::keep: return keep();
-    case Kind::revert: return revert();
+    case Kind::keep:
+      if (!asker_tries()) return kNoTrial;
+      files_.replace(trial_->of, trial_->profile);
+      status_line_ = "profile " + trial_->profile.name + ": as tuned, until this run ends";
+      return "ok: " + trial_->profile.name + "\n";
+    case Kind::revert:
+      if (!asker_tries()) return kNoTrial;
+      end_trial();
+      return "ok: " + profile().name + "\n";
     case Kind::unknown: break;
   }
   return "error: requests are zero, next, profile NAME, window NAME, status, live and show NAME\n";
@@ -185,25 +198,6 @@ std::string ProfileManager::unknown(std::string_view name) const {
   std::string known;
   for (const Profile& p : files_.profiles()) known += (known.empty() ? "" : ", ") + p.name;
   return "error: no profile '" + std::string(name) + "'; there are " + known + "\n";
-}
-
-std::string ProfileManager::choose(std::string_view name) {
-  const std::optional<std::size_t> found = find(name);
-  if (!found) return unknown(name);
-  use(*found, "as asked");
-  return "ok: " + files_.profiles()[current_].name + "\n";
-}
-
-/// As if the desktop itself had told it. Without a name: nobody knows any more.
-std::string ProfileManager::window(std::string_view program) {
-  follow_focus(!program.empty(), program);
-  return "ok: " + files_.profiles()[current_].name + "\n";
-}
-
-std::string ProfileManager::live() const {
-  LiveReading now = latest_;
-  now.on_trial = asker_tries();
-  return live_text(now);
 }
 
 /// "ok: FILE", or "ok: " where there is none, and the profile with all that it leaves out.
@@ -235,19 +229,6 @@ std::string ProfileManager::attempt(const ControlRequest& request) {
   } catch (const ConfigError& e) {
     return "error: " + std::string(e.what()) + "\n";
   }
-}
-
-std::string ProfileManager::keep() {
-  if (!asker_tries()) return "error: nothing of yours is on trial\n";
-  files_.replace(trial_->of, trial_->profile);
-  status_line_ = "profile " + trial_->profile.name + ": as tuned, until this run ends";
-  return "ok: " + trial_->profile.name + "\n";
-}
-
-std::string ProfileManager::revert() {
-  if (!asker_tries()) return "error: nothing of yours is on trial\n";
-  end_trial();
-  return "ok: " + profile().name + "\n";
 }
 
 bool ProfileManager::asker_tries() const noexcept {

@@ -27,8 +27,7 @@
 
 namespace tagwrench {
 
-// What the sensor reads at this moment, as one line of text: for who watches while a profile is
-// tuned.
+// What the sensor reads now, as one line of text: for who watches while a profile is tuned.
 
 struct LiveReading {
   Status status = Status::acquiring;
@@ -48,8 +47,7 @@ class ProfileManager {
   /// The sensor's own shaping, for good.
   explicit ProfileManager(const Profile& defaults)
       : ProfileManager(ProfileFiles({}, defaults), {}, {}) {}
-  /// The first profile is in force until somebody says otherwise. Throws ConfigError if the system
-  /// has no more descriptors.
+  /// The first profile is in force until somebody says otherwise. ConfigError: no more descriptors.
   ProfileManager(ProfileFiles files, std::optional<ControlSocket> control,
                  std::unique_ptr<FocusWatch> focus);
 
@@ -77,7 +75,12 @@ class ProfileManager {
   /// Readable when service() has something to do.
   int poll_fd() const noexcept { return events_.get(); }
   /// Changed files, requests, the focus.
-  void service() noexcept;
+  void service() noexcept {
+    if (files_.fd() >= 0) take_files();
+    if (control_) take_requests();
+    if (trial_) take_lapse();
+    if (focus_) take_focus();
+  }
 
   /// In force: the one on trial, else the one chosen.
   const Profile& profile() const noexcept {
@@ -102,13 +105,8 @@ class ProfileManager {
   void take_program() noexcept;
   void take_lapse();
   std::string granted(const ControlRequest& request);
-  std::string choose(std::string_view name);
-  std::string window(std::string_view program);
-  std::string live() const;
   std::string show(std::string_view name) const;
   std::string attempt(const ControlRequest& request);
-  std::string keep();
-  std::string revert();
   std::optional<std::size_t> find(std::string_view name) const noexcept;
   std::string unknown(std::string_view name) const;
   bool asker_tries() const noexcept;

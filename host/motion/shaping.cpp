@@ -115,14 +115,6 @@ void Shaping::suppress(Sample& sample) noexcept {
   fill_.reset();
 }
 
-void Shaping::begin_anew() noexcept {
-  started_ = false;
-  zones_ = {};
-  swing_.reset();
-  fill_.reset();
-  strongest_ = -1;
-}
-
 Shaping::Order Shaping::order(TimePoint time) const noexcept {
   if (!started_ || time - last_ > kMaxGap || last_ - time > kMaxGap) return Order::first;
   return time > last_ ? Order::next : Order::stale;
@@ -219,10 +211,6 @@ void Shaping::keep_strongest(Vector6& motion) noexcept {
     if (i != strongest_) motion[i] = 0;
 }
 
-Vector6 Shaping::motion_at(TimePoint time) const noexcept {
-  return options_.fill == Fill::predict ? fill_.at(time, limit_) : fill_.newest();
-}
-
 double DeadZone::deflection(double smooth, double raw, const Edges& edges) noexcept {
   const double push = std::abs(smooth);
   const double nearest = kNearest * edges.full_scale;
@@ -297,17 +285,6 @@ ShapingOptions shaping_for(const Vector6& range, const Eigen::Matrix3d& hid_R_ca
   return options;
 }
 
-void AxisFilter::start(const Vector6& value) noexcept {
-  smooth_ = last_ = value;
-  speed_.setZero();
-}
-
-const Vector6& AxisFilter::step(double seconds, const Vector6& value) noexcept {
-  smooth_ += weight(seconds, value) * (value - smooth_);
-  last_ = value;
-  return smooth_;
-}
-
 double AxisFilter::weight(double seconds, const Vector6& value) noexcept {
   switch (options_.kind) {
     case FilterKind::none: return 1;
@@ -348,11 +325,6 @@ void NoiseFloor::learn_scatter(double seconds, double weight, const Vector6& val
   values_ = {value, values_[0]};
   known_ = std::min(known_ + 1, 2);
   last_step_ = seconds;
-}
-
-void RingdownSuppressor::reset() noexcept {
-  size_ = 0;
-  push_.setZero();
 }
 
 void RingdownSuppressor::add(double seconds, const Vector6& push) noexcept {

@@ -1,5 +1,4 @@
-// Wrench -> motion of an input device: mounting, filter, dead zone, full scale, curve, and what
-// moves at all.
+// Wrench -> motion of an input device: mounting, filter, dead zone, full scale, curve, what moves.
 #pragma once
 
 #include <Eigen/Core>
@@ -112,9 +111,16 @@ class AxisFilter {
       : options_(options), full_scale_(full_scale) {}
 
   /// From here on as if `value` had been there for ever.
-  void start(const Vector6& value) noexcept;
+  void start(const Vector6& value) noexcept {
+    smooth_ = last_ = value;
+    speed_.setZero();
+  }
   /// The next value, `seconds` > 0 after the last.
-  const Vector6& step(double seconds, const Vector6& value) noexcept;
+  const Vector6& step(double seconds, const Vector6& value) noexcept {
+    smooth_ += weight(seconds, value) * (value - smooth_);
+    last_ = value;
+    return smooth_;
+  }
   /// One axis, or all of them, forget what they lag behind.
   void settle(int axis) noexcept { smooth_[axis] = last_[axis]; }
   void settle() noexcept { smooth_ = last_; }
@@ -175,7 +181,10 @@ class RingdownSuppressor {
   /// `decay`: s, in which a swing falls to 1/e; 0: nothing is taken for one.
   explicit RingdownSuppressor(double decay) noexcept : decay_(decay) {}
 
-  void reset() noexcept;
+  void reset() noexcept {
+    size_ = 0;
+    push_.setZero();
+  }
   /// `push` in full scales, `seconds` after the last one.
   void add(double seconds, const Vector6& push) noexcept;
   /// In full scales: what may be swing, on any axis.
@@ -276,8 +285,7 @@ ShapingOptions shaping_for(const Vector6& range, const Eigen::Matrix3d& hid_R_ca
 Vector6 turned(const Eigen::Matrix3d& rotation, const Vector6& load);
 Vector6 turned_sigma(const Eigen::Matrix3d& rotation, const Vector6& sigma);
 
-/// Remembers the last frames. Depends on samples and their times alone, so that a replay gives the
-/// same. No heap.
+/// Depends on the last samples and their times alone, so that a replay gives the same. No heap.
 class Shaping {
  public:
   explicit Shaping(const ShapingOptions& options) noexcept;
@@ -298,7 +306,9 @@ class Shaping {
 
   /// The motion at `time` by the frames so far, on the clock of capture times: of the newest frame
   /// for Fill::none, carried on from it for Fill::predict.
-  Vector6 motion_at(TimePoint time) const noexcept;
+  Vector6 motion_at(TimePoint time) const noexcept {
+    return options_.fill == Fill::predict ? fill_.at(time, limit_) : fill_.newest();
+  }
 
  private:
   enum class Order : std::uint8_t { first, next, stale };
@@ -310,7 +320,13 @@ class Shaping {
   Vector6 meant(double seconds, const Vector6& raw) noexcept;
   Vector6 deflection(const Vector6& raw) noexcept;
   void keep_strongest(Vector6& motion) noexcept;
-  void begin_anew() noexcept;
+  void begin_anew() noexcept {
+    started_ = false;
+    zones_ = {};
+    swing_.reset();
+    fill_.reset();
+    strongest_ = -1;
+  }
 
   ShapingOptions options_;
   std::array<ResponseCurve, 6> curves_;

@@ -13,7 +13,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <string_view>
@@ -24,19 +23,15 @@
 #include "host/core/os/termination.h"
 #include "host/core/os/uninterrupted.h"
 #include "host/output/hid_report.h"
-#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {
 
-std::int16_t count_at(const std::uint8_t* low) noexcept {
-  return static_cast<std::int16_t>(low[0] | low[1] << 8);
-}
-
 /// Of a SpaceMouse's motion report.
 Counts6 counts_of(const std::uint8_t* report) noexcept {
   Counts6 counts;
-  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] = count_at(report + 1 + 2 * i);
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    counts[i] = static_cast<std::int16_t>(report[1 + 2 * i] | report[2 + 2 * i] << 8);
   return counts;
 }
 
@@ -49,72 +44,6 @@ constexpr milliseconds kLastWords{200};  // for who wants to go
 std::string_view file_name(std::string_view path) noexcept {
   return path.substr(path.rfind('/') + 1);
 }
-
-}  // namespace
-
-GadgetReports::GadgetReports(GadgetFace face) noexcept : face_(face) {
-  const auto add = [this](std::span<const std::uint8_t> neutral, bool stream, bool axes) {
-    Kind& kind = kinds_[count_++];
-    kind.id = neutral[0];
-    kind.size = neutral.size();
-    kind.stream = stream;
-    kind.axes = axes;
-    std::copy(neutral.begin(), neutral.end(), kind.newest.begin());
-    kind.last = kind.newest;
-  };
-  if (face == GadgetFace::spacemouse) {
-    add(spacemouse_button_report(0), false, false);
-    add(spacemouse_report({}), true, true);
-  } else {
-    add(neutral_wrench_report(), true, false);
-  }
-}
-
-void GadgetReports::put(std::span<const std::uint8_t> reports) noexcept {
-  while (!reports.empty()) {
-    const auto kind = std::ranges::find(kinds(), reports[0], &Kind::id);
-    if (kind == kinds().end() || reports.size() < kind->size) return;
-    const std::span<const std::uint8_t> report = reports.first(kind->size);
-    std::ranges::copy(report, kind->newest.begin());
-    const bool changed = !std::equal(report.begin(), report.end(), kind->last.begin());
-    kind->owed = kind->owed || kind->stream || changed;
-    reports = reports.subspan(kind->size);
-  }
-}
-
-void GadgetReports::rest() noexcept {
-  *this = GadgetReports(face_);
-  renew();
-}
-
-void GadgetReports::renew() noexcept {
-  for (Kind& kind : kinds()) kind.owed = true;
-}
-
-GadgetReports::Kind* GadgetReports::first_owed() noexcept {
-  const auto kind = std::ranges::find(kinds(), true, &Kind::owed);
-  return kind == kinds().end() ? nullptr : &*kind;
-}
-
-std::span<const std::uint8_t> GadgetReports::next() noexcept {
-  const Kind* kind = first_owed();
-  if (kind == nullptr) return {};
-  if (!kind->axes) return kind->bytes();
-  const SpacemouseReport report =
-      spacemouse_report(dithered(counts_of(kind->newest.data()), counts_of(kind->last.data())));
-  std::copy(report.begin(), report.end(), out_.begin());
-  return {out_.data(), report.size()};
-}
-
-void GadgetReports::taken() noexcept {
-  const std::span<const std::uint8_t> written = next();
-  Kind* kind = first_owed();
-  if (kind == nullptr) return;
-  kind->owed = false;
-  std::copy(written.begin(), written.end(), kind->last.begin());
-}
-
-namespace {
 
 class GadgetDaemon {
  public:
@@ -352,6 +281,59 @@ std::string up_command(const GadgetOptions& options) {
 
 }  // namespace
 
+GadgetReports::GadgetReports(GadgetFace face) noexcept : face_(face) {
+  const auto add = [this](std::span<const std::uint8_t> neutral, bool stream, bool axes) {
+    Kind& kind = kinds_[count_++];
+    kind.id = neutral[0];
+    kind.size = neutral.size();
+    kind.stream = stream;
+    kind.axes = axes;
+    std::copy(neutral.begin(), neutral.end(), kind.newest.begin());
+    kind.last = kind.newest;
+  };
+  if (face == GadgetFace::spacemouse) {
+    add(spacemouse_button_report(0), false, false);
+    add(spacemouse_report({}), true, true);
+  } else {
+    add(neutral_wrench_report(), true, false);
+  }
+}
+
+void GadgetReports::put(std::span<const std::uint8_t> reports) noexcept {
+  while (!reports.empty()) {
+    const auto kind = std::ranges::find(kinds(), reports[0], &Kind::id);
+    if (kind == kinds().end() || reports.size() < kind->size) return;
+    const std::span<const std::uint8_t> report = reports.first(kind->size);
+    std::ranges::copy(report, kind->newest.begin());
+    const bool changed = !std::equal(report.begin(), report.end(), kind->last.begin());
+    kind->owed = kind->owed || kind->stream || changed;
+    reports = reports.subspan(kind->size);
+  }
+}
+
+GadgetReports::Kind* GadgetReports::first_owed() noexcept {
+  const auto kind = std::ranges::find(kinds(), true, &Kind::owed);
+  return kind == kinds().end() ? nullptr : &*kind;
+}
+
+std::span<const std::uint8_t> GadgetReports::next() noexcept {
+  const Kind* kind = first_owed();
+  if (kind == nullptr) return {};
+  if (!kind->axes) return kind->bytes();
+  const SpacemouseReport report =
+      spacemouse_report(dithered(counts_of(kind->newest.data()), counts_of(kind->last.data())));
+  std::copy(report.begin(), report.end(), out_.begin());
+  return {out_.data(), report.size()};
+}
+
+void GadgetReports::taken() noexcept {
+  const std::span<const std::uint8_t> written = next();
+  Kind* kind = first_owed();
+  if (kind == nullptr) return;
+  kind->owed = false;
+  std::copy(written.begin(), written.end(), kind->last.begin());
+}
+
 void run_gadget_daemon(GadgetFace face, UniqueFd link, UniqueFd watch, OpenedNode node,
                        OpenGadgetNode open) noexcept {
   GadgetDaemon(face, std::move(link), std::move(watch), std::move(node), std::move(open)).run();
@@ -441,19 +423,13 @@ void keep_gadget(const GadgetInheritance& given) {
 }
 
 GadgetOutput::GadgetOutput(GadgetPort port) : port_(std::move(port)) {
-  start_daemon();
-  port_.node.fd.reset();
-  await_daemon();
-}
-
-/// By exec and not by fork alone: it allocates, and a thread of a library may hold malloc's lock.
-void GadgetOutput::start_daemon() {
+  // By exec and not by fork alone: it allocates, and a thread of a library may hold malloc's lock.
   const UniqueFd watch = watch_nodes(port_.places.devices);
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0)
     no_daemon("cannot make a socket", std::strerror(errno));
   link_.reset(ends[0]);
-  const UniqueFd daemon_end(ends[1]);
+  UniqueFd daemon_end(ends[1]);
   const int inherited[] = {daemon_end.get(), watch.get(), port_.node.fd.get()};
   const int error =
       spawn_daemon(daemon_, port_.program,
@@ -462,9 +438,8 @@ void GadgetOutput::start_daemon() {
                     port_.function, "--node", port_.node.path},
                    inherited, DaemonSignals::blocked);
   if (error != 0) no_daemon("cannot start its process", std::strerror(error));
-}
-
-void GadgetOutput::await_daemon() {
+  port_.node.fd.reset();
+  daemon_end.reset();  // or its end would not be seen
   pollfd first{link_.get(), POLLIN, 0};
   uninterrupted([&] { return ::poll(&first, 1, kStart_ms); });
   GadgetEvent status_line{};
@@ -504,13 +479,8 @@ SendStatus GadgetOutput::send(const Sample& sample) noexcept {
 
 SendStatus GadgetOutput::move(const Sample& sample) noexcept {
   if (port_.face != GadgetFace::spacemouse) return SendStatus::ok;
-  Counts6 counts{};
-  std::uint32_t pressed = 0;
-  if (carries_numbers(shown_status(sample))) {
-    pressed = sample.buttons;
-    counts = to_counts(sample.deflection, kSpacemouseLimit_counts);
-    if (port_.spnav_order) counts = to_spnav_order(counts);
-  }
+  auto [counts, pressed] = shown_motion(sample, kSpacemouseLimit_counts);
+  if (port_.spnav_order) counts = to_spnav_order(counts);
   return put(packet(counts, pressed));
 }
 

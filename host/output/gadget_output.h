@@ -4,7 +4,6 @@
 #include <sys/types.h>
 
 #include <array>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -40,8 +39,7 @@ struct GadgetPort {
 /// Throws ConfigError: not up, another face, no permission, another bridge writes to it.
 GadgetPort find_gadget(const GadgetOptions& options);
 
-/// The life of the daemon that a GadgetOutput starts (`tagwrench gadget keep`), by what it was
-/// given.
+/// The life of the daemon of a GadgetOutput (`tagwrench gadget keep`), of what it is given.
 struct GadgetInheritance {
   GadgetFace face = GadgetFace::spacemouse;
   KernelPlaces places;
@@ -69,8 +67,6 @@ class GadgetOutput : public Output {
   void add_to(std::vector<WatchdogDevice>& devices) const;
 
  private:
-  void start_daemon();
-  void await_daemon();
   SendStatus put(std::span<const std::uint8_t> reports) noexcept;
 
   GadgetPort port_;  ///< whose node is the daemon's alone
@@ -93,9 +89,14 @@ class GadgetReports {
   void put(std::span<const std::uint8_t> reports) noexcept;
 
   /// All at rest, and owed.
-  void rest() noexcept;
+  void rest() noexcept {
+    *this = GadgetReports(face_);
+    renew();
+  }
   /// A computer that has seen nothing yet is owed all.
-  void renew() noexcept;
+  void renew() noexcept {
+    for (Kind& kind : kinds()) kind.owed = true;
+  }
 
   bool owed() noexcept { return first_owed() != nullptr; }
   /// The one to write next: buttons before motion, which is owed nearly always. A motion that has

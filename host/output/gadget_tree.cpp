@@ -14,13 +14,12 @@
 #include <array>
 #include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <utility>
 
 #include "host/core/config_error.h"
-#include "host/core/os/unique_fd.h"
+#include "host/core/parse.h"
 #include "host/output/hid_report.h"
 
 namespace tagwrench {
@@ -39,10 +38,7 @@ std::string hex(std::uint16_t number) { return fmt::format("0x{:04x}", number); 
 
 std::optional<std::uint16_t> parse_hex(std::string_view text) noexcept {
   if (text.starts_with("0x")) text.remove_prefix(2);
-  std::uint16_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, 16);
-  if (error != std::errc() || end != text.data() + text.size()) return {};
-  return number;
+  return parse_whole<std::uint16_t>(text, 16);
 }
 
 int errno_of(bool done) { return done ? 0 : errno; }
@@ -251,8 +247,7 @@ void GadgetTree::up(const GadgetSpec& spec) {
   }
 }
 
-/// In the order that configfs demands: from the leaves to the root. Goes on after a failure; the
-/// first one is returned.
+/// As configfs demands, from the leaves to the root. Goes on after a failure, returns the first.
 int GadgetTree::remove(const std::string& gadget) {
   int failed = 0;
   const auto note = [&failed](int error) {
@@ -394,17 +389,12 @@ UniqueFd lock_gadgets(const KernelPlaces& places) {
 std::optional<dev_t> parse_device_number(std::string_view text) noexcept {
   constexpr unsigned kMajors = 1U << 12;
   constexpr unsigned kMinors = 1U << 20;
-  const std::size_t colon = text.find(':');
-  if (colon == text.npos) return {};
-  const auto number = [](std::string_view digits, unsigned end, unsigned& out) {
-    const auto [at, error] = std::from_chars(digits.data(), digits.data() + digits.size(), out);
-    return error == std::errc() && at == digits.data() + digits.size() && out < end;
-  };
-  unsigned major_number = 0, minor_number = 0;
-  if (!number(text.substr(0, colon), kMajors, major_number) ||
-      !number(text.substr(colon + 1), kMinors, minor_number))
+  const std::size_t colon = std::min(text.find(':'), text.size());
+  const auto major_number = parse_whole<unsigned>(text.substr(0, colon));
+  const auto minor_number = parse_whole<unsigned>(text.substr(std::min(colon + 1, text.size())));
+  if (!major_number || !minor_number || *major_number >= kMajors || *minor_number >= kMinors)
     return {};
-  return makedev(major_number, minor_number);
+  return makedev(*major_number, *minor_number);
 }
 
 std::optional<std::string> gadget_node(const GadgetFiles& files, const KernelPlaces& places,

@@ -61,8 +61,7 @@ class GadgetFiles {
   /// Names, sorted; none if there is no such folder.
   std::vector<std::string> list(const std::string& path) const;
   bool exists(const std::string& path) const;
-  /// The first line, at most 255 printable characters: whoever wrote it, it can be shown. Empty if
-  /// it cannot be read.
+  /// The first line, at most 255 characters, all printable; empty if it cannot be read.
   std::string line(const std::string& path) const;
 };
 
@@ -103,8 +102,7 @@ class GadgetTree {
   /// Throws ConfigError, and then nothing of it is left.
   void up(const GadgetSpec& spec);
 
-  /// Takes it away, whole or half made; done if it is not there. Throws ConfigError if something
-  /// stays.
+  /// Takes it away, whole or half made; done if it is not there. Throws ConfigError if any stays.
   void down(std::string_view name);
 
  private:
@@ -118,7 +116,8 @@ class GadgetTree {
   std::string root_;
 };
 
-/// Throws ConfigError unless it can be the name of a sensor: 1 to 32 letters, digits, - and _.
+/// Throws ConfigError unless it can be the name of a sensor, a gadget's too: 1 to 32 letters,
+/// digits, - and _.
 void check_gadget_name(std::string_view name);
 
 /// "256f:c62e"

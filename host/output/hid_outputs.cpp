@@ -8,13 +8,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstddef>
 #include <cstring>
 #include <utility>
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
-#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {
@@ -277,13 +275,8 @@ SpacemouseOutput::~SpacemouseOutput() {
 }
 
 SendStatus SpacemouseOutput::move(const Sample& sample) noexcept {
-  Counts6 wanted{};
-  std::uint32_t pressed = 0;
-  if (carries_numbers(shown_status(sample))) {
-    pressed = sample.buttons;
-    wanted = to_counts(sample.deflection, kSpacemouseLimit_counts);
-    if (vendor_ != k3dconnexion) wanted = to_spnav_order(wanted);
-  }
+  auto [wanted, pressed] = shown_motion(sample, kSpacemouseLimit_counts);
+  if (vendor_ != k3dconnexion) wanted = to_spnav_order(wanted);
   const Counts6 counts = dithered(wanted, last_);
   const SendStatus status = device_.send(spacemouse_report(counts));
   if (status == SendStatus::ok) last_ = counts;
@@ -317,23 +310,6 @@ void SpacemouseOutput::add_to(std::vector<WatchdogDevice>& devices) const {
 
 WrenchHidOutput::WrenchHidOutput(const WrenchHidOptions& options, UniqueFd uhid)
     : device_(std::move(uhid), options, wrench_descriptor()) {}
-
-WrenchHidOutput::~WrenchHidOutput() { device_.send(neutral_wrench_report()); }
-
-SendStatus WrenchHidOutput::send(const Sample& sample) noexcept {
-  return device_.send(wrench_report(sample));
-}
-
-std::string_view WrenchHidOutput::service() noexcept {
-  // No output report is declared: what comes is answered and dropped.
-  while (device_.next_output()) {
-  }
-  return {};
-}
-
-void WrenchHidOutput::add_to(std::vector<WatchdogDevice>& devices) const {
-  devices.push_back(device_.watchdog_device({neutral_wrench_report()}));
-}
 
 JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noexcept {
   JoystickEvents events{};
@@ -379,12 +355,7 @@ JoystickOutput::~JoystickOutput() {
 }
 
 SendStatus JoystickOutput::move(const Sample& sample) noexcept {
-  Counts6 counts{};
-  std::uint32_t pressed = 0;
-  if (carries_numbers(shown_status(sample))) {
-    pressed = sample.buttons;
-    counts = to_counts(sample.deflection, kJoystickLimit_counts);
-  }
+  const auto [counts, pressed] = shown_motion(sample, kJoystickLimit_counts);
   const JoystickEvents events = joystick_events(counts, pressed);
   const auto write = [&] { return ::write(uinput_.get(), events.data(), sizeof events); };
   if (uninterrupted(write) >= 0) return SendStatus::ok;

@@ -40,8 +40,7 @@ struct HidOutputReport {
 class UhidDevice {
  public:
   static constexpr const char* kPath = "/dev/uhid";
-  /// The kernel starts a device in milliseconds once its driver is loaded; the rest is patience
-  /// with a slow machine.
+  /// With its driver loaded, the kernel takes milliseconds; the rest is for a slow machine.
   static constexpr std::chrono::milliseconds kStartTimeout{3000};
 
   /// Opens /dev/uhid. Throws ConfigError: it is not there, no permission.
@@ -60,8 +59,7 @@ class UhidDevice {
   /// Sends one input report, report id first, at most 64 bytes. Never blocks, never queues.
   SendStatus send(std::span<const std::uint8_t> report) noexcept;
 
-  /// Answers what the kernel asks and returns the next output report that a client has sent, if
-  /// there is one.
+  /// Answers what the kernel asks, and returns the next output report of a client, if any.
   std::optional<HidOutputReport> next_output() noexcept;
 
   /// Readable when next_output() has something to do.
@@ -90,12 +88,10 @@ class UhidDevice {
 /// "256f:c62e"
 std::string hex_id(std::uint16_t vendor, std::uint16_t product);
 
-/// What to say when the node at `path` (/dev/uhid, /dev/uinput) does not open: path, cause, remedy,
-/// in one line.
+/// One line about a node (/dev/uhid, /dev/uinput) that does not open: path, cause, remedy.
 std::string cannot_open_node(const std::string& path, const char* module, int error);
 
-// A virtual SpaceMouse: spacenavd, hidapi programs and browsers take it for a 3Dconnexion
-// SpaceMouse Wireless.
+// A virtual SpaceMouse: spacenavd, hidapi programs and browsers take it for 3Dconnexion's Wireless.
 
 /// SpaceMouse Wireless: one combined report, two buttons. 256f is 3Dconnexion's vendor id, which
 /// clients look for. With an own id the axes go out in spnav's order, because spacenavd passes them
@@ -140,8 +136,7 @@ class SpacemouseOutput : public Output {
 // A virtual HID sensor that carries calibrated force and torque: any HID parser recovers N and N m
 // from the report descriptor, see hid_report.h for the layout.
 
-/// 1209 is pid.codes, the vendor id for open hardware. A placeholder until this product id is
-/// registered there.
+/// 1209 is pid.codes, for open hardware; a placeholder until the product id is registered there.
 struct WrenchHidOptions : UhidIdentity {
   WrenchHidOptions() : UhidIdentity{"tagwrench wrench sensor", "tagwrench-0", 0x1209, 0x7a6e} {}
 };
@@ -151,14 +146,23 @@ class WrenchHidOutput : public Output {
  public:
   /// Throws ConfigError if /dev/uhid is not usable.
   explicit WrenchHidOutput(const WrenchHidOptions& options, UniqueFd uhid = UhidDevice::open());
-  ~WrenchHidOutput() override;
+  ~WrenchHidOutput() override { device_.send(neutral_wrench_report()); }
 
-  SendStatus send(const Sample& sample) noexcept override;
+  SendStatus send(const Sample& sample) noexcept override {
+    return device_.send(wrench_report(sample));
+  }
   std::string failure() const override { return device_.failure(); }
   int poll_fd() const noexcept override { return device_.fd(); }
-  std::string_view service() noexcept override;
+  std::string_view service() noexcept override {
+    // No output report is declared: what comes is answered and dropped.
+    while (device_.next_output()) {
+    }
+    return {};
+  }
 
-  void add_to(std::vector<WatchdogDevice>& devices) const;
+  void add_to(std::vector<WatchdogDevice>& devices) const {
+    devices.push_back(device_.watchdog_device({neutral_wrench_report()}));
+  }
 
  private:
   UhidDevice device_;
@@ -183,8 +187,7 @@ inline constexpr std::size_t kJoystickButtons = 8;
 using JoystickEvents = std::array<input_event, 6 + kJoystickButtons + 1>;
 JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noexcept;
 
-/// Sends Sample::deflection as +-32767, and the buttons. No dither: games read the state of an
-/// axis, not its events.
+/// Sends Sample::deflection as +-32767, and the buttons. No dither: games read states, not events.
 class JoystickOutput : public Output {
  public:
   /// Throws ConfigError if /dev/uinput is not usable.

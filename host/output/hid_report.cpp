@@ -10,8 +10,7 @@
 namespace tagwrench {
 namespace {
 
-// Real devices claim the physical range +-1400 at unit cm, exponent -4; the kernel turns it into
-// 250 counts/mm.
+// Real devices claim +-1400 at unit cm, exponent -4; the kernel turns it into 250 counts/mm.
 constexpr std::uint8_t kSpacemouseDescriptor[] = {
     0x05, 0x01,        // Usage Page (Generic Desktop)
     0x09, 0x08,        // Usage (Multi-axis Controller)
@@ -104,8 +103,7 @@ constexpr Unit kMicrosecond{0x1001, -6};
 
 class DescriptorBuilder {
  public:
-  /// An item whose data is a signed number, in the fewest bytes that hold it (HID has 0, 1, 2 and
-  /// 4).
+  /// An item whose data is a signed number, in the fewest bytes that hold it, 1, 2 or 4.
   void item(Item prefix, std::int32_t value) {
     const bool one = value >= -128 && value <= 127;
     const bool two = value >= -32768 && value <= 32767;
@@ -175,6 +173,11 @@ Counts6 to_counts(const Vector6& motion, int limit_counts) noexcept {
         static_cast<std::int16_t>(std::lround(std::clamp(motion[i], -1.0, 1.0) * limit_counts));
   }
   return counts;
+}
+
+ShownMotion shown_motion(const Sample& sample, int limit_counts) noexcept {
+  if (!carries_numbers(shown_status(sample))) return {};
+  return {to_counts(sample.deflection, limit_counts), sample.buttons};
 }
 
 std::span<const std::uint8_t> spacemouse_descriptor() noexcept { return kSpacemouseDescriptor; }

@@ -18,9 +18,15 @@ namespace tagwrench {
 /// X Y Z RX RY RZ in the counts of a device.
 using Counts6 = std::array<std::int16_t, 6>;
 
-/// Rounds -1..1 per axis to -limit..limit, clamps what is beyond; any number that is not finite
-/// makes all axes zero.
+/// Rounds -1..1 per axis to -limit..limit, clamps; a number that is not finite makes all axes zero.
 Counts6 to_counts(const Vector6& motion, int limit_counts) noexcept;
+
+/// What an input device shows of a sample: nothing of one whose status carries no numbers.
+struct ShownMotion {
+  Counts6 counts{};
+  std::uint32_t pressed = 0;  ///< bit 0 is the first button
+};
+ShownMotion shown_motion(const Sample& sample, int limit_counts) noexcept;
 
 // ---- SpaceMouse
 
@@ -81,8 +87,7 @@ inline constexpr std::size_t kWrenchReportSize = 64;
 using WrenchReport = std::array<std::uint8_t, kWrenchReportSize>;
 
 std::vector<std::uint8_t> wrench_descriptor();
-/// Rounds to the nearest count, clamps to the field. A wrench or sigma that is not finite is sent
-/// as zeros and `doubtful`.
+/// Rounded, clamped to the field. A wrench or sigma that is not finite: zeros and `doubtful`.
 WrenchReport wrench_report(const Sample& sample) noexcept;
 /// What the watchdog's watchdog sends: zeros, status `lost`.
 WrenchReport neutral_wrench_report() noexcept;

@@ -15,7 +15,6 @@
 #include "host/core/config_error.h"
 #include "host/core/os/termination.h"
 #include "host/core/os/uninterrupted.h"
-#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {
@@ -130,11 +129,6 @@ long TextSink::put(const char* data, std::size_t size) noexcept {
   return ::write(fd_.get(), data, size);
 }
 
-SendStatus TextSink::fail(int error) noexcept {
-  error_ = error;
-  return SendStatus::failed;
-}
-
 SendStatus TextSink::flush_rest() noexcept {
   while (rest_begin_ < rest_end_) {
     const long done = put(rest_.data() + rest_begin_, rest_end_ - rest_begin_);
@@ -197,10 +191,6 @@ std::int64_t latency_us(const Sample& sample) noexcept {
   const auto late = std::chrono::duration_cast<std::chrono::microseconds>(sample.output_time -
                                                                           sample.latency_origin);
   return std::max<std::int64_t>(late.count(), 0);
-}
-
-SendStatus JsonlOutput::send(const Sample& sample) noexcept {
-  return sink_.write(json_line(line_, sample));
 }
 
 // A header that does not go out now (the reader has not started) goes out before the first row; one

@@ -49,7 +49,10 @@ class TextSink {
   bool writable(int timeout_ms) noexcept;
   bool wait_writable() noexcept;
   long put(const char* data, std::size_t size) noexcept;
-  SendStatus fail(int error) noexcept;
+  SendStatus fail(int error) noexcept {
+    error_ = error;
+    return SendStatus::failed;
+  }
   SendStatus flush_rest() noexcept;
   void undo_partial_line(std::size_t written) noexcept;
 
@@ -63,21 +66,18 @@ class TextSink {
   std::size_t rest_end_ = 0;
 };
 
-// One sample as one line of text, formatted without heap. Numbers are the shortest that read back
-// to the same double.
+// One sample as one line, formatted without heap. Numbers are the shortest that read back the same.
 
 /// Room for 24 doubles of at most 24 characters, the integers and the names.
 using LineBuffer = std::array<char, 1536>;
 
-/// The CSV columns are the JSON keys, flattened; displacement and wrench are named as in truth.csv
-/// of the simulator.
+/// The JSON keys, flattened; displacement and wrench are named as in the simulator's truth.csv.
 inline constexpr std::string_view kCsvHeader =
     "seq,t_ns,status,dx_m,dy_m,dz_m,rx_rad,ry_rad,rz_rad,sigma_dx_m,sigma_dy_m,sigma_dz_m,sigma_rx_"
     "rad,sigma_ry_rad,sigma_rz_rad,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,sigma_fx_n,sigma_fy_n,sigma_fz_"
     "n,sigma_mx_nm,sigma_my_nm,sigma_mz_nm,dropped,latency_us\n";
 
-/// A status that carries no numbers has zeros in all of them. The view is into `buffer` and ends
-/// with a newline.
+/// A status without numbers has zeros for them. The view is into `buffer` and ends with a newline.
 std::string_view json_line(LineBuffer& buffer, const Sample& sample) noexcept;
 std::string_view csv_line(LineBuffer& buffer, const Sample& sample) noexcept;
 
@@ -89,7 +89,9 @@ class JsonlOutput : public Output {
  public:
   JsonlOutput(const std::string& path, bool lossless) : sink_(path, lossless) {}
 
-  SendStatus send(const Sample& sample) noexcept override;
+  SendStatus send(const Sample& sample) noexcept override {
+    return sink_.write(json_line(line_, sample));
+  }
   std::string failure() const override { return sink_.failure(); }
 
  private:

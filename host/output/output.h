@@ -28,8 +28,7 @@ class Output {
   Output() = default;
   Output(const Output&) = delete;
   Output& operator=(const Output&) = delete;
-  /// Leaves nothing behind: input devices send neutral before they go away, files end on a whole
-  /// line.
+  /// Leaves nothing behind: input devices send neutral before they go, files end on a whole line.
   virtual ~Output() = default;
 
   /// Every sample, once. One whose status does not carry numbers is a neutral output: zeros.
@@ -50,8 +49,7 @@ class Output {
   /// Buttons that this output knows of and that are pressed now, bit 0 is the first.
   virtual std::uint32_t pressed() const noexcept { return 0; }
 
-  /// Offers a line meant for people; true if this output has shown it. An empty one takes the last
-  /// one away.
+  /// Offers a line for people; true if this output has shown it. An empty one takes the last away.
   virtual bool notice(std::string_view) noexcept { return false; }
 };
 

@@ -1,15 +1,14 @@
 #include "host/output/spnav_daemon.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/epoll.h>
 #include <sys/file.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cerrno>
 #include <chrono>
@@ -17,7 +16,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <limits>
-#include <string>
 #include <utility>
 
 #include "host/core/config_error.h"
@@ -143,79 +141,6 @@ SpnavPeer peer_of(int socket) noexcept {
 }
 
 UniqueFd spare_descriptor() noexcept { return UniqueFd(::open("/dev/null", O_RDONLY | O_CLOEXEC)); }
-
-}  // namespace
-
-SpnavReceived receive_spnav(int link, std::span<std::uint8_t> buffer) noexcept {
-  const ssize_t got = ::recv(link, buffer.data(), buffer.size(), MSG_DONTWAIT);
-  if (got > 0) return {buffer.first(static_cast<std::size_t>(got)), true};
-  return {{}, got < 0 && (errno == EAGAIN || errno == EINTR)};
-}
-
-bool send_spnav_bytes(int link, std::span<const std::uint8_t> bytes) noexcept {
-  return ::send(link, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL) ==
-         static_cast<ssize_t>(bytes.size());
-}
-
-std::string spnav_socket_path(const std::string& given) {
-  const std::string path =
-      given.empty() ? default_path() : std::filesystem::absolute(given).lexically_normal().string();
-  if (bridge_path(path).size() >= sizeof sockaddr_un::sun_path) {
-    throw ConfigError("spnav socket {}: longer than {} bytes; choose a shorter path", path,
-                      sizeof sockaddr_un::sun_path - 1 - 7);
-  }
-  return path;
-}
-
-std::optional<SpnavSockets> listen_spnav(const std::string& path) {
-  const UniqueFd lock = lock_folder(path);
-  if (connect_spnav_bridge(path)) return {};
-  if (served(path)) {
-    throw ConfigError(
-        "spnav socket {}: another server has it, spacenavd perhaps; end it, or choose another "
-        "path, as in --output spnav:PATH",
-        path);
-  }
-  remove_left_over(path);
-  remove_left_over(bridge_path(path));
-  SpnavSockets sockets;
-  sockets.path = path;
-  sockets.bridge = listening(bridge_path(path), SOCK_SEQPACKET, 0600);
-  sockets.programs = listening(path, SOCK_STREAM, path == kSpnavSystemSocket ? 0666 : 0600);
-  sockets.programs_file = file_number(path);
-  sockets.bridge_file = file_number(bridge_path(path));
-  return sockets;
-}
-
-SpnavSockets inherited_spnav(const std::string& path, int programs, int bridge) {
-  SpnavSockets sockets;
-  sockets.path = path;
-  sockets.programs.reset(programs);
-  sockets.bridge.reset(bridge);
-  for (const int fd : {programs, bridge}) {
-    int is_listening = 0;
-    socklen_t size = sizeof is_listening;
-    if (::getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &is_listening, &size) != 0 || is_listening == 0)
-      throw ConfigError("spnav socket {}: {} is no listening socket", path, fd);
-    ::fcntl(fd, F_SETFD, FD_CLOEXEC);
-    ::fcntl(fd, F_SETFL, O_NONBLOCK);
-  }
-  sockets.programs_file = file_number(path);
-  sockets.bridge_file = file_number(bridge_path(path));
-  return sockets;
-}
-
-void SpnavSockets::remove() const noexcept {
-  if (file_number(path) == programs_file) ::unlink(path.c_str());
-  const std::string beside = bridge_path(path);
-  if (file_number(beside) == bridge_file) ::unlink(beside.c_str());
-}
-
-UniqueFd connect_spnav_bridge(const std::string& path) noexcept {
-  return connected(bridge_path(path), SOCK_SEQPACKET);
-}
-
-namespace {
 
 /// One program that is connected to the spnav socket. Nothing queues for it: an event that it has
 /// no room for is dropped, and when it has room again it gets the newest state. What it has been
@@ -571,6 +496,75 @@ class SpnavDaemon {
 };
 
 }  // namespace
+
+SpnavReceived receive_spnav(int link, std::span<std::uint8_t> buffer) noexcept {
+  const ssize_t got = ::recv(link, buffer.data(), buffer.size(), MSG_DONTWAIT);
+  if (got > 0) return {buffer.first(static_cast<std::size_t>(got)), true};
+  return {{}, got < 0 && (errno == EAGAIN || errno == EINTR)};
+}
+
+bool send_spnav_bytes(int link, std::span<const std::uint8_t> bytes) noexcept {
+  return ::send(link, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL) ==
+         static_cast<ssize_t>(bytes.size());
+}
+
+std::string spnav_socket_path(const std::string& given) {
+  const std::string path =
+      given.empty() ? default_path() : std::filesystem::absolute(given).lexically_normal().string();
+  if (bridge_path(path).size() >= sizeof sockaddr_un::sun_path) {
+    throw ConfigError("spnav socket {}: longer than {} bytes; choose a shorter path", path,
+                      sizeof sockaddr_un::sun_path - 1 - 7);
+  }
+  return path;
+}
+
+std::optional<SpnavSockets> listen_spnav(const std::string& path) {
+  const UniqueFd lock = lock_folder(path);
+  if (connect_spnav_bridge(path)) return {};
+  if (served(path)) {
+    throw ConfigError(
+        "spnav socket {}: another server has it, spacenavd perhaps; end it, or choose another "
+        "path, as in --output spnav:PATH",
+        path);
+  }
+  remove_left_over(path);
+  remove_left_over(bridge_path(path));
+  SpnavSockets sockets;
+  sockets.path = path;
+  sockets.bridge = listening(bridge_path(path), SOCK_SEQPACKET, 0600);
+  sockets.programs = listening(path, SOCK_STREAM, path == kSpnavSystemSocket ? 0666 : 0600);
+  sockets.programs_file = file_number(path);
+  sockets.bridge_file = file_number(bridge_path(path));
+  return sockets;
+}
+
+SpnavSockets inherited_spnav(const std::string& path, int programs, int bridge) {
+  SpnavSockets sockets;
+  sockets.path = path;
+  sockets.programs.reset(programs);
+  sockets.bridge.reset(bridge);
+  for (const int fd : {programs, bridge}) {
+    int is_listening = 0;
+    socklen_t size = sizeof is_listening;
+    if (::getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &is_listening, &size) != 0 || is_listening == 0)
+      throw ConfigError("spnav socket {}: {} is no listening socket", path, fd);
+    ::fcntl(fd, F_SETFD, FD_CLOEXEC);
+    ::fcntl(fd, F_SETFL, O_NONBLOCK);
+  }
+  sockets.programs_file = file_number(path);
+  sockets.bridge_file = file_number(bridge_path(path));
+  return sockets;
+}
+
+void SpnavSockets::remove() const noexcept {
+  if (file_number(path) == programs_file) ::unlink(path.c_str());
+  const std::string beside = bridge_path(path);
+  if (file_number(beside) == bridge_file) ::unlink(beside.c_str());
+}
+
+UniqueFd connect_spnav_bridge(const std::string& path) noexcept {
+  return connected(bridge_path(path), SOCK_SEQPACKET);
+}
 
 void run_spnav_daemon(SpnavSockets sockets, const SpnavDaemonOptions& options, int stop_fd) {
   SpnavDaemon(std::move(sockets), options, stop_fd).run();

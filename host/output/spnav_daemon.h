@@ -8,15 +8,12 @@
 // messages are of fixed size and start with what they are.
 #pragma once
 
-#include <sys/stat.h>
-
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <type_traits>
 
 #include "host/core/os/unique_fd.h"
@@ -83,8 +80,7 @@ std::optional<Message> spnav_message(std::span<const std::uint8_t> bytes) noexce
   return message;
 }
 
-/// What recv() on a link has brought: the bytes; empty and `open`: nothing yet; not `open`: the
-/// other side has gone.
+/// Of recv() on a link: the bytes; empty: nothing yet, or, not `open`, the other side has gone.
 struct SpnavReceived {
   std::span<const std::uint8_t> bytes;
   bool open = true;
@@ -107,8 +103,7 @@ inline constexpr const char* kSpnavSystemSocket = "/var/run/spnav.sock";
 /// libspnav's own place if no other server has it. Throws ConfigError: no place, path too long.
 std::string spnav_socket_path(const std::string& given);
 
-/// The two sockets of a daemon, listening. Their files are removed by remove(), if they are still
-/// ours.
+/// The two sockets of a daemon, listening. remove() removes their files, if they are still ours.
 struct SpnavSockets {
   std::string path;
   UniqueFd programs;

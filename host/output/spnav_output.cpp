@@ -5,7 +5,6 @@
 #include <sys/wait.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <exception>
@@ -14,7 +13,6 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/child_process.h"
-#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {
@@ -26,8 +24,7 @@ constexpr std::size_t kMaxPrograms = 128;
 constexpr int kAttempts = 3;
 constexpr milliseconds kStartTime{10'000};  // of a daemon on a busy machine
 constexpr Duration kBetweenAttempts = std::chrono::seconds(1);
-// As the pipeline has them: a move that is this late is missing, and a camera that is slower than
-// this is lost.
+// As the pipeline has them: a move that is so late is missing, a camera that is so slow is lost.
 constexpr Duration kGrace = milliseconds(60);
 constexpr Duration kMinInterval = milliseconds(8);
 constexpr Duration kSlowestInterval = milliseconds(250);
@@ -117,7 +114,13 @@ SendStatus SpnavOutput::move(const Sample& sample) noexcept {
     update.state.motion = spnav_counts(sample.deflection);
     update.state.buttons = sample.buttons & ((std::uint32_t{1} << kSpnavButtons) - 1);
   }
-  if (!link_) restart_daemon(now);
+  if (!link_ && now >= next_attempt_) {
+    next_attempt_ = now + kBetweenAttempts;
+    try {
+      reach_daemon();
+    } catch (const std::exception&) {  // what is in the way may go away
+    }
+  }
   if (!welcome_) return SendStatus::skipped;
   const SpnavState rest;
   if (update.state == rest && last_ == rest) return SendStatus::ok;
@@ -134,17 +137,6 @@ std::uint32_t SpnavOutput::valid_ms(TimePoint now) noexcept {
   std::array<Duration, 3> sorted = intervals_;
   std::sort(sorted.begin(), sorted.end());
   return static_cast<std::uint32_t>(std::chrono::ceil<milliseconds>(sorted[1] + kGrace).count());
-}
-
-/// At most once a second; what is in the way may go away.
-bool SpnavOutput::restart_daemon(TimePoint now) noexcept {
-  if (now < next_attempt_) return false;
-  next_attempt_ = now + kBetweenAttempts;
-  try {
-    return reach_daemon();
-  } catch (const std::exception&) {
-    return false;
-  }
 }
 
 std::string SpnavOutput::failure() const {
@@ -166,7 +158,13 @@ std::string_view SpnavOutput::service() noexcept {
   const SpnavReceived received = receive_spnav(link_.get(), buffer);
   if (!received.open) return lost_daemon();
   if (received.bytes.empty()) return {};
-  if (const auto greeting = spnav_message<SpnavGreeting>(received.bytes)) return take(*greeting);
+  if (const auto greeting = spnav_message<SpnavGreeting>(received.bytes)) {
+    welcome_ = greeting->refused == 0 && send_spnav(link_.get(), hello_of(options_));
+    if (greeting->refused == 0) return {};
+    other_bridge_ = greeting->other_bridge;
+    link_.reset();
+    return {};
+  }
   if (const auto program = spnav_message<SpnavProgram>(received.bytes)) return take(*program);
   lost_daemon();
   return write_line(
@@ -184,16 +182,6 @@ std::string_view SpnavOutput::lost_daemon() noexcept {
   return write_line(status_line_,
                     "spnav: the daemon of the socket has ended; starting another. Programs that "
                     "were connected find it when they are started again");
-}
-
-std::string_view SpnavOutput::take(const SpnavGreeting& greeting) noexcept {
-  if (greeting.refused != 0) {
-    other_bridge_ = greeting.other_bridge;
-    link_.reset();
-    return {};
-  }
-  welcome_ = send_spnav(link_.get(), hello_of(options_));
-  return {};
 }
 
 std::string_view SpnavOutput::take(const SpnavProgram& program) noexcept {

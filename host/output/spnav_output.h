@@ -56,9 +56,7 @@ class SpnavOutput : public Output {
   bool reach_daemon();
   void start_daemon(const SpnavSockets& sockets);
   void await_greeting();
-  bool restart_daemon(TimePoint now) noexcept;
   std::string_view lost_daemon() noexcept;
-  std::string_view take(const SpnavGreeting& greeting) noexcept;
   std::string_view take(const SpnavProgram& program) noexcept;
   std::uint32_t valid_ms(TimePoint now) noexcept;
 

@@ -104,7 +104,8 @@ std::span<const std::uint8_t> SpnavDialogue::answer(const SpnavDevice* device,
   const auto type = static_cast<std::uint32_t>(request_[0]);
   const std::uint32_t tag = type & 0xffff0000;
   if (tag != kTag && tag != 0) return reply(kFailed);  // libspnav tags all but strings
-  switch (const auto request = static_cast<std::int32_t>(type & 0xffff)) {
+  const auto request = static_cast<std::int32_t>(type & 0xffff);
+  switch (request) {
     case kSetName:
     case kSetSerialPort:
       return {};  // libspnav waits for no answer to a text, and would take it for an event
@@ -113,26 +114,21 @@ std::span<const std::uint8_t> SpnavDialogue::answer(const SpnavDevice* device,
     case kGetSensitivity: request_[1] = std::bit_cast<std::int32_t>(sensitivity_); return reply(0);
     case kSetEventMask: event_mask_ = static_cast<std::uint32_t>(request_[1]); return reply(0);
     case kGetEventMask: request_[1] = static_cast<std::int32_t>(event_mask_); return reply(0);
-    default:
-      // The rest are settings of spacenavd; here a profile has them.
-      return device != nullptr ? answer_device(request, *device, path) : reply(kFailed);
+    default: break;
   }
-}
-
-std::span<const std::uint8_t> SpnavDialogue::answer_device(int request, const SpnavDevice& device,
-                                                           std::string_view path) noexcept {
+  if (device == nullptr) return reply(kFailed);
   switch (request) {
     case kDeviceName:
-      return reply_text({device.name.data(), ::strnlen(device.name.data(), device.name.size())});
+      return reply_text({device->name.data(), ::strnlen(device->name.data(), device->name.size())});
     case kDevicePath: return reply_text(path);
     case kAxes: request_[1] = 6; break;
     case kButtons: request_[1] = kSpnavButtons; break;
     case kUsbId:
-      request_[1] = device.vendor;
-      request_[2] = device.product;
+      request_[1] = device->vendor;
+      request_[2] = device->product;
       break;
-    case kDeviceType: request_[1] = device_type(device); break;
-    default: return reply(kFailed);
+    case kDeviceType: request_[1] = device_type(*device); break;
+    default: return reply(kFailed);  // settings of spacenavd; here a profile has them
   }
   return reply(0);
 }
@@ -143,8 +139,7 @@ std::span<const std::uint8_t> SpnavDialogue::reply(std::int32_t status) noexcept
   return {reinterpret_cast<const std::uint8_t*>(answers_.data()), sizeof(SpnavRecord)};
 }
 
-/// 24 bytes a record; the last word counts those that are left, and marks all records but the
-/// first.
+/// 24 bytes a record; the last word counts those left, and marks all records but the first.
 std::span<const std::uint8_t> SpnavDialogue::reply_text(std::string_view text) noexcept {
   text = text.substr(0, kMaxAnswers * kTextInRecord);
   if (text.empty()) return reply(kFailed);

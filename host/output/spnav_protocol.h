@@ -79,7 +79,6 @@ class SpnavDialogue {
   using Bytes = std::span<const std::uint8_t>;
   Bytes take_word() noexcept;
   Bytes answer(const SpnavDevice* device, std::string_view path) noexcept;
-  Bytes answer_device(int request, const SpnavDevice& device, std::string_view path) noexcept;
   Bytes reply(std::int32_t status) noexcept;
   Bytes reply_text(std::string_view text) noexcept;
   bool set_sensitivity(float sensitivity) noexcept;

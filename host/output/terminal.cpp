@@ -11,7 +11,6 @@
 #include <iterator>
 
 #include "host/core/axis_names.h"
-#include "host/output/output.h"
 
 namespace tagwrench {
 namespace {
@@ -47,8 +46,7 @@ const char* color_of(Status status) {
   return kColors[static_cast<std::size_t>(status)];
 }
 
-/// Appends lines, cut to the width; control sequences count for no column. What does not fit in the
-/// buffer is left out.
+/// Appends lines, cut to the width without control sequences; what the buffer cannot hold is out.
 class View {
  public:
   View(Screen& screen, int width, int height) : screen_(screen), width_(width), height_(height) {}
@@ -78,8 +76,7 @@ class View {
     text({buffer.data(), std::min(done.size, buffer.size())});
   }
 
-  /// False: the next line would not fit on the screen. The last line has no newline, so that
-  /// nothing scrolls.
+  /// False: it would not fit on the screen. The last has no newline, so that nothing scrolls.
   bool next_line() {
     if (lines_ >= height_) return false;
     if (lines_ > 0) raw("\x1b[K\r\n");
@@ -275,7 +272,12 @@ SendStatus TerminalOutput::send(const Sample& sample) noexcept {
   const bool changed = sample.status != last_.status;  // shown at once: nothing may follow a loss
   last_ = sample;
   if (live_) return changed || now >= next_draw_ ? draw(sample, now) : SendStatus::ok;
-  return changed || sample.capture_time >= next_line_ ? print_line(sample) : SendStatus::ok;
+  if (!changed && sample.capture_time < next_line_) return SendStatus::ok;
+  const double t_s = std::chrono::duration<double>(sample.capture_time - *first_capture_).count();
+  const std::size_t length = format_plain_line(screen_, sample, figures_, t_s);
+  // Lines stay on the grid of half seconds; after a gap the grid starts anew.
+  next_line_ = std::max(next_line_ + kLinePeriod, sample.capture_time + kLinePeriod / 2);
+  return sink_.write({screen_.data(), length});
 }
 
 SendStatus TerminalOutput::draw(const Sample& sample, TimePoint now) noexcept {
@@ -285,8 +287,7 @@ SendStatus TerminalOutput::draw(const Sample& sample, TimePoint now) noexcept {
       ioctl(sink_.fd(), TIOCGWINSZ, &size) == 0 && size.ws_col > 0 && size.ws_row > 0;
   const int width = known ? size.ws_col : 80;
   const int height = known ? size.ws_row : 24;
-  // A new width folds the old lines anew, and nobody can say how many there are now: start on a
-  // clean screen.
+  // A new width folds the old lines anew, into nobody knows how many: start on a clean screen.
   if (lines_drawn_ == 0 || width != drawn_width_ || lines_drawn_ > height) {
     const SendStatus status = sink_.write(lines_drawn_ == 0 ? kHideCursor : kClear);
     if (status != SendStatus::ok) return status;
@@ -300,14 +301,6 @@ SendStatus TerminalOutput::draw(const Sample& sample, TimePoint now) noexcept {
   const SendStatus status = sink_.write({screen_.data(), length});
   if (status == SendStatus::ok) lines_drawn_ = lines;
   return status;
-}
-
-SendStatus TerminalOutput::print_line(const Sample& sample) noexcept {
-  const double t_s = std::chrono::duration<double>(sample.capture_time - *first_capture_).count();
-  const std::size_t length = format_plain_line(screen_, sample, figures_, t_s);
-  // Lines stay on the grid of half seconds; after a gap the grid starts anew.
-  next_line_ = std::max(next_line_ + kLinePeriod, sample.capture_time + kLinePeriod / 2);
-  return sink_.write({screen_.data(), length});
 }
 
 }  // namespace tagwrench

@@ -1,5 +1,4 @@
-// The live view for people: six bars with their units, the status in words, rate, latency and
-// losses.
+// The live view for people: six bars with units, the status in words, rate, latency and losses.
 #pragma once
 
 #include <unistd.h>
@@ -47,7 +46,6 @@ class TerminalOutput : public Output {
 
  private:
   SendStatus draw(const Sample& sample, TimePoint now) noexcept;
-  SendStatus print_line(const Sample& sample) noexcept;
   void account(const Sample& sample) noexcept;
 
   TerminalOptions options_;

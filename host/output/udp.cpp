@@ -82,13 +82,6 @@ UdpDatagram udp_datagram(const Vector6& deflection) noexcept {
 
 UdpOutput::UdpOutput(const std::string& place) : place_(place), socket_(connect_to(place)) {}
 
-UdpOutput::~UdpOutput() { put(UdpDatagram{}); }
-
-SendStatus UdpOutput::move(const Sample& sample) noexcept {
-  return put(carries_numbers(shown_status(sample)) ? udp_datagram(sample.deflection)
-                                                   : UdpDatagram{});
-}
-
 /// Nobody listening, a full socket and a network that is away for a while lose this datagram alone.
 SendStatus UdpOutput::put(const UdpDatagram& datagram) noexcept {
   if (error_ != 0) return SendStatus::failed;
@@ -106,11 +99,6 @@ std::string UdpOutput::failure() const {
   return fmt::format(
       "udp:{}: cannot be sent to: {}; check the network and its firewall, then start again", place_,
       std::strerror(error_));
-}
-
-void UdpOutput::add_to(std::vector<WatchdogDevice>& devices) const {
-  const UdpDatagram zeros{};
-  devices.push_back({socket_.get(), {{zeros.begin(), zeros.end()}}, {}});
 }
 
 }  // namespace tagwrench

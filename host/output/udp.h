@@ -8,7 +8,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -33,12 +32,18 @@ class UdpOutput : public Output {
   /// name is looked up now. Throws ConfigError.
   explicit UdpOutput(const std::string& place);
   /// Sends zeros.
-  ~UdpOutput() override;
+  ~UdpOutput() override { put(UdpDatagram{}); }
 
-  SendStatus move(const Sample& sample) noexcept override;
+  SendStatus move(const Sample& sample) noexcept override {
+    return put(carries_numbers(shown_status(sample)) ? udp_datagram(sample.deflection)
+                                                     : UdpDatagram{});
+  }
   std::string failure() const override;
 
-  void add_to(std::vector<WatchdogDevice>& devices) const;
+  void add_to(std::vector<WatchdogDevice>& devices) const {
+    const UdpDatagram zeros{};
+    devices.push_back({socket_.get(), {{zeros.begin(), zeros.end()}}, {}});
+  }
 
  private:
   SendStatus put(const UdpDatagram& datagram) noexcept;

@@ -14,13 +14,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <string>
 
 #include "host/core/config_error.h"
 #include "host/core/os/child_process.h"
+#include "host/core/os/uninterrupted.h"
 
 namespace tagwrench {
 
@@ -31,6 +31,29 @@ struct Watchdog::Shared {
 };
 
 namespace {
+
+// A message to systemd that is lost is not worth more.
+void tell_status(const char* before, std::string_view status) noexcept {
+  constexpr int kMax = 200;
+  sd_notifyf(0, "%sSTATUS=%.*s", before,
+             static_cast<int>(status.size() < kMax ? status.size() : kMax), status.data());
+}
+
+/// Rings twice in the time that systemd gives for a sign of life; see sd_watchdog_enabled(3).
+UniqueFd watchdog_timer() {
+  std::uint64_t limit_us = 0;
+  if (sd_watchdog_enabled(0, &limit_us) <= 0) return {};
+  UniqueFd timer(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
+  const auto half_us = static_cast<std::int64_t>(limit_us / 2);
+  itimerspec times{};
+  times.it_interval.tv_sec = half_us / 1'000'000;
+  times.it_interval.tv_nsec = half_us % 1'000'000 * 1000;
+  times.it_value = times.it_interval;
+  if (!timer || ::timerfd_settime(timer.get(), 0, &times, nullptr) != 0)
+    throw ConfigError(std::string("watchdog: no timer to be had: ") + std::strerror(errno) +
+                      "; end other programs, or set WatchdogSec=0 in the unit");
+  return timer;
+}
 
 constexpr std::int64_t kStandingDown = 0;
 constexpr std::int64_t kMissed = -1;  ///< neutral is written; wait for the bridge to come back
@@ -60,13 +83,7 @@ void write_neutral(const std::vector<WatchdogDevice>& devices) {
     for (const std::vector<std::uint8_t>& bytes : device.neutral) write_once(device.fd, bytes);
 }
 
-void leave_terminal() {
-  setsid();
-  prctl(PR_SET_NAME, "tw-watchdog");
-}
-
-/// Sleeps until `until_ns` (any negative: for ever) or a word from the bridge. False: the bridge is
-/// gone.
+/// Sleeps until `until_ns` (negative: for ever) or a word of the bridge. False: the bridge is gone.
 bool sleep_until(int link, std::int64_t until_ns) {
   pollfd waiting{link, POLLIN, 0};
   const std::int64_t left_ns = std::max<std::int64_t>(until_ns - now_ns(), 0);
@@ -87,8 +104,7 @@ void guard(int link, std::atomic<std::int64_t>& deadline_ns,
     if (!armed || now_ns() < deadline) {
       if (!sleep_until(link, armed ? deadline : -1)) return;
     } else if (deadline_ns.compare_exchange_strong(deadline, kMissed)) {
-      // Had the bridge moved the deadline meanwhile, it would be alive and the loop would look
-      // again.
+      // Had the bridge moved the deadline meanwhile, it would live, and the loop look again.
       write_neutral(devices);
     }
   }
@@ -117,8 +133,7 @@ Watchdog::Watchdog(const std::vector<WatchdogDevice>& devices) {
   for (const WatchdogDevice& device : devices) kept.push_back(device.fd);
   std::sort(kept.begin(), kept.end());
 
-  // The watchdog keeps all signals blocked: from its first instruction only the link (and SIGKILL)
-  // ends it.
+  // All signals stay blocked in the watchdog: from the first only the link (and SIGKILL) ends it.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -135,7 +150,8 @@ Watchdog::Watchdog(const std::vector<WatchdogDevice>& devices) {
     fail("cannot start the watchdog process");
   }
 
-  leave_terminal();
+  setsid();
+  prctl(PR_SET_NAME, "tw-watchdog");
   close_all_but(kept);  // the other end of the link among them
   guard(watchdog_end.get(), shared_->deadline_ns, devices);
   if (!shared_->dismissed.load()) {
@@ -149,8 +165,7 @@ Watchdog::~Watchdog() {
   if (watchdog_ <= 0) return;
   shared_->dismissed.store(true);
   link_.reset();
-  while (waitpid(watchdog_, nullptr, 0) < 0 && errno == EINTR) {
-  }
+  uninterrupted([this] { return waitpid(watchdog_, nullptr, 0); });
   munmap(shared_, sizeof(Shared));
 }
 
@@ -167,34 +182,6 @@ void Watchdog::expect_by(TimePoint deadline) noexcept {
 void Watchdog::stand_down() noexcept {
   if (watchdog_ > 0) shared_->deadline_ns.store(kStandingDown);
 }
-
-namespace {
-
-// A message to systemd that is lost is not worth more.
-void tell_status(const char* before, std::string_view status) noexcept {
-  constexpr int kMax = 200;
-  sd_notifyf(0, "%sSTATUS=%.*s", before,
-             static_cast<int>(status.size() < kMax ? status.size() : kMax), status.data());
-}
-
-/// Rings twice in the time in which systemd wants a sign of life, as sd_watchdog_enabled(3)
-/// advises.
-UniqueFd watchdog_timer() {
-  std::uint64_t limit_us = 0;
-  if (sd_watchdog_enabled(0, &limit_us) <= 0) return {};
-  UniqueFd timer(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
-  const auto half_us = static_cast<std::int64_t>(limit_us / 2);
-  itimerspec times{};
-  times.it_interval.tv_sec = half_us / 1'000'000;
-  times.it_interval.tv_nsec = half_us % 1'000'000 * 1000;
-  times.it_value = times.it_interval;
-  if (!timer || ::timerfd_settime(timer.get(), 0, &times, nullptr) != 0)
-    throw ConfigError(std::string("watchdog: no timer to be had: ") + std::strerror(errno) +
-                      "; end other programs, or set WatchdogSec=0 in the unit");
-  return timer;
-}
-
-}  // namespace
 
 std::unique_ptr<ServiceWatch> ServiceWatch::open() {
   if (std::getenv("NOTIFY_SOCKET") == nullptr) return nullptr;

@@ -25,8 +25,7 @@
 
 namespace tagwrench {
 
-/// A device that the watchdog can bring to rest by writing bytes. The fd is borrowed until the
-/// Watchdog exists.
+/// A device that is brought to rest by writing bytes. The fd is borrowed until the Watchdog exists.
 struct WatchdogDevice {
   int fd = -1;
   std::vector<std::vector<std::uint8_t>> neutral;  ///< a write each
@@ -42,8 +41,7 @@ struct WatchdogDevice {
 /// alone; its name is "tw-watchdog", so that a kill by the bridge's name spares it.
 class Watchdog {
  public:
-  /// Throws ConfigError if there are no processes or memory to be had. Without devices nothing is
-  /// started.
+  /// Without devices nothing is started. Throws ConfigError: no process or memory to be had.
   explicit Watchdog(const std::vector<WatchdogDevice>& devices);
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
@@ -54,8 +52,7 @@ class Watchdog {
   /// only after stand_down(), after a missed deadline, or if the deadline moves back.
   void expect_by(TimePoint deadline) noexcept;
 
-  /// Expects nothing. The watchdog sleeps without waking until the next expect_by() or the bridge's
-  /// end.
+  /// Expects nothing: the watchdog sleeps until the next expect_by() or the bridge's end.
   void stand_down() noexcept;
 
   /// The watchdog's process id, 0 if there is none.

@@ -1,13 +1,11 @@
 #include "host/app/board/board_loop.h"
 
-#include <fmt/format.h>
 #include <poll.h>
 
 #include <algorithm>
 #include <filesystem>
 
 #include "host/app/input.h"
-#include "host/board/cell_calibration.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
@@ -52,11 +50,6 @@ bool BoardLoop::turn(TimePoint until, int other_fd) {
   ::poll(fds.data(), fds.size(), static_cast<int>(std::min<std::int64_t>(left.count(), 60'000)));
   if (fds[1].revents != 0) return false;
   link_.service();
-  tell_news();
-  return true;
-}
-
-void BoardLoop::tell_news() {
   using Kind = link::BoardEvent::Kind;
   for (link::BoardEvent news; link_.next(news);) {
     const std::string line = text(news);
@@ -68,6 +61,7 @@ void BoardLoop::tell_news() {
     if (of_cell && news.other < cell_faults_.size()) cell_faults_[news.other] = fault;
     if (news.kind != Kind::connected && !(of_cell && cell_faults_quiet_)) log_info(line);
   }
+  return true;
 }
 
 bool BoardLoop::connect() {

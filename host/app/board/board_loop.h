@@ -41,8 +41,7 @@ class BoardLoop {
   /// The same, and until the clock is known well and a status has come, or that has taken too long.
   bool settle();
 
-  /// Waits for the link, another descriptor or `until`, and serves the link; false if a signal
-  /// came.
+  /// Waits for the link, another descriptor or `until`, and serves the link; false: a signal came.
   bool turn(TimePoint until, int other_fd = -1);
 
   link::BoardLink& link() { return link_; }
@@ -55,8 +54,6 @@ class BoardLoop {
   bool led_refused() const { return led_refused_; }
 
  private:
-  void tell_news();
-
   link::BoardLink link_;
   UniqueFd stop_;
   std::array<link::FaultCode, link::kMaxChannels> cell_faults_{};
@@ -71,8 +68,7 @@ std::string cells_path(const BoardSetup& options, const link::BoardSession& sess
 /// Throws ConfigError if a calibration file was named and there is none.
 void check_cells_file(const BoardSetup& options);
 
-/// What cells_path() holds; nothing is calibrated without it. Throws ConfigError if it cannot be
-/// used.
+/// What cells_path() holds; without it none is calibrated. Throws ConfigError: it cannot be used.
 link::CellCalibrations load_cells(const BoardSetup& options, const link::BoardSession& session);
 
 }  // namespace tagwrench

@@ -4,11 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <exception>
 
-#include "host/board/cell_calibration.h"
 #include "host/calibration/light/control.h"
 #include "host/core/log.h"
 #include "host/wrench/zero.h"
@@ -73,7 +70,7 @@ BoardOutput::BoardOutput(link::BoardLink& link, const link::CellCalibrations& ce
                          double cell_rate, double camera_latency, const std::string& path)
     : link_(link),
       cells_(cells),
-      latency_(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(camera_latency))),
+      latency_(in_seconds(camera_latency)),
       counts_{link::SampleHistory({.period = 1 / cell_rate}),
               link::SampleHistory({.period = 1 / cell_rate}),
               link::SampleHistory({.period = 1 / cell_rate}),
@@ -81,8 +78,6 @@ BoardOutput::BoardOutput(link::BoardLink& link, const link::CellCalibrations& ce
   said_.reserve(256);
   if (!path.empty()) sink_.emplace(path, /*lossless=*/false);
 }
-
-BoardOutput::~BoardOutput() { write_ripe(/*all=*/true); }
 
 SendStatus BoardOutput::send(const Sample& sample) noexcept {
   if (!sink_ && !comparison_) return SendStatus::ok;
@@ -94,8 +89,6 @@ SendStatus BoardOutput::send(const Sample& sample) noexcept {
   if (status == SendStatus::failed) status_ = status;  // for good
   return room || status == SendStatus::failed ? status : SendStatus::skipped;
 }
-
-std::string BoardOutput::failure() const { return sink_ ? sink_->failure() : std::string(); }
 
 std::string_view BoardOutput::service() noexcept {
   link_.service();
@@ -252,14 +245,6 @@ void BoardRecord::cell(const link::CellReading& reading) noexcept {
   writer_.reference(row);
 }
 
-void BoardRecord::button(const link::ButtonReading& reading) noexcept {
-  writer_.event(EventKind::button, reading.time.time, {}, reading.pressed ? 1 : 0, reading.button);
-}
-
-void BoardRecord::news(const link::BoardEvent& news) {
-  writer_.event(EventKind::board, std::chrono::steady_clock::now(), link::text(news));
-}
-
 void BoardRecord::state(const link::BoardSession& session) noexcept {
   const TimePoint now = std::chrono::steady_clock::now();
   if (session.has_status() && session.status().led_level_permille != level_permille_) {
@@ -354,22 +339,10 @@ void RunBoard::set_led(double level) noexcept {
   lamp.set_level(led_permille_);
 }
 
-void RunBoard::set_led_as_settled() noexcept { set_led(settled_permille_ / 1000); }
-
-bool RunBoard::tare(std::size_t channel) noexcept {
-  return output_ != nullptr && output_->tare(channel);
-}
-
-void RunBoard::record_to(record::RecordingWriter& writer) {
-  if (output_ != nullptr) output_->record_to(writer);
-}
-
 std::unique_ptr<RunBoard> open_board(const std::string& port, const std::string& cells_file) {
   if (port.empty()) return nullptr;
-  BoardSetup setup;
-  setup.port = port == "auto" ? "" : port;
-  setup.cells_file = cells_file;
-  return std::make_unique<RunBoard>(setup);
+  return std::make_unique<RunBoard>(
+      BoardSetup{.port = port == "auto" ? "" : port, .cells_file = cells_file});
 }
 
 }  // namespace tagwrench

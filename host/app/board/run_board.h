@@ -32,8 +32,13 @@ class BoardRecord {
       : writer_(writer), cells_(cells) {}
 
   void cell(const link::CellReading& reading) noexcept;
-  void button(const link::ButtonReading& reading) noexcept;
-  void news(const link::BoardEvent& news);
+  void button(const link::ButtonReading& reading) noexcept {
+    writer_.event(record::EventKind::button, reading.time.time, {}, reading.pressed ? 1 : 0,
+                  reading.button);
+  }
+  void news(const link::BoardEvent& news) {
+    writer_.event(record::EventKind::board, std::chrono::steady_clock::now(), link::text(news));
+  }
   /// LED when it changes, clock once a second.
   void state(const link::BoardSession& session) noexcept;
 
@@ -63,7 +68,7 @@ class BoardOutput final : public Output {
   /// from the host's, both are alike. Throws ConfigError if the file cannot be written.
   BoardOutput(link::BoardLink& link, const link::CellCalibrations& cells, double cell_rate,
               double camera_latency, const std::string& path);
-  ~BoardOutput() override;
+  ~BoardOutput() override { write_ripe(/*all=*/true); }
 
   /// Compares every sample with this cell from now on, and says once what is wrong of each kind.
   void compare(const ReferenceComparison& comparison) { comparison_ = comparison; }
@@ -71,7 +76,7 @@ class BoardOutput final : public Output {
 
   /// A row waits until the cells have spoken about its time, half a second at most.
   SendStatus send(const Sample& sample) noexcept override;
-  std::string failure() const override;
+  std::string failure() const override { return sink_ ? sink_->failure() : std::string(); }
   int poll_fd() const noexcept override { return link_.poll_fd(); }
   std::string_view service() noexcept override;
   std::uint32_t pressed() const noexcept override { return buttons_down_; }
@@ -131,8 +136,7 @@ class RunBoard final : public BoardControl {
   /// False if a signal ended the waiting.
   bool connected() const { return connected_; }
 
-  /// Lights the tags and sets exposure and gain, and says how. False if a signal came, or the
-  /// source ended.
+  /// Lights the tags, sets exposure and gain, says how. False: a signal, or the end of the source.
   bool settle_light(Input& input, const UniqueFd& stop);
 
   /// Serves the link from the run's loop; see BoardOutput. Must not outlive this.
@@ -142,14 +146,18 @@ class RunBoard final : public BoardControl {
   const ReferenceMonitor& monitor() const { return output_->monitor(); }
 
   /// What the board says goes there too, as long as that output is there. Borrowed.
-  void record_to(record::RecordingWriter& writer);
+  void record_to(record::RecordingWriter& writer) {
+    if (output_ != nullptr) output_->record_to(writer);
+  }
 
  private:
   // BoardControl, of that output.
   BoardReading reading() const noexcept override;
   void set_led(double level) noexcept override;
-  void set_led_as_settled() noexcept override;
-  bool tare(std::size_t channel) noexcept override;
+  void set_led_as_settled() noexcept override { set_led(settled_permille_ / 1000); }
+  bool tare(std::size_t channel) noexcept override {
+    return output_ != nullptr && output_->tare(channel);
+  }
 
   void compare(BoardOutput& output, const SensorConfig& sensor) const;
 
