@@ -2,7 +2,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <cmath>
 #include <ctime>
 #include <map>
 
@@ -102,9 +101,16 @@ SavedProfile write_profile(const std::string& name, const std::string& text,
 /// What is thrown is the answer.
 void WebBridge::handle(PageRequest request) {
   static const std::map<std::string_view, Answer> answers = {
-      {"zero", &WebBridge::zero},
-      {"profile", &WebBridge::choose_profile},
-      {"next_profile", &WebBridge::next_profile},
+      {"zero", [](WebBridge& b, const PageRequest& asked) { b.ask_control(asked, "zero"); }},
+      {"profile",
+       [](WebBridge& b, const PageRequest& asked) {
+         b.ask_control(asked, "profile " + line_of(asked, "name"),
+                       [&b](const ControlAnswer&) { b.read_profile(); });
+       }},
+      {"next_profile",
+       [](WebBridge& b, const PageRequest& asked) {
+         b.ask_control(asked, "next", [&b](const ControlAnswer&) { b.read_profile(); });
+       }},
       {"show", &WebBridge::show_profile},
       {"try", &WebBridge::try_profile},
       {"keep", &WebBridge::keep_profile},
@@ -112,13 +118,24 @@ void WebBridge::handle(PageRequest request) {
       {"save_profile", &WebBridge::save_profile},
       {"record_start", &WebBridge::start_recording},
       {"record_stop", &WebBridge::stop_recording},
-      {"recordings", &WebBridge::list_recordings},
+      {"recordings",
+       [](WebBridge& b, const PageRequest& asked) {
+         b.answer(asked, true, b.recordings_.path().string(), b.recordings_.list());
+       }},
       {"camera_set", &WebBridge::set_camera},
       {"led", &WebBridge::set_led},
       {"tare", &WebBridge::tare},
       {"job_start", &WebBridge::start_job},
-      {"job_key", &WebBridge::press_key},
-      {"job_close", &WebBridge::close_job},
+      {"job_key",
+       [](WebBridge& b, const PageRequest& asked) {
+         b.jobs_->press(line_of(asked, "key"));
+         b.answer(asked, true, "pressed");
+       }},
+      {"job_close",
+       [](WebBridge& b, const PageRequest& asked) {
+         b.jobs_->close();
+         b.answer(asked, true, "closed");
+       }},
       {"plans", &WebBridge::list_plans},
       {"retry", &WebBridge::retry},
   };
@@ -126,7 +143,7 @@ void WebBridge::handle(PageRequest request) {
   const auto found = answers.find(request.what);
   if (found == answers.end())
     throw RequestRefused("ask: this bridge does not know that request; reload the page");
-  (this->*found->second)(request);
+  found->second(*this, request);
 }
 
 /// `work` in the run's loop, with null where there is none; then `then` here, with its result.
@@ -158,17 +175,6 @@ void WebBridge::ask_control(const PageRequest& request, std::string text,
     answer(request, said.ok, said.text);
     if (then) then(std::move(said));
   });
-}
-
-void WebBridge::zero(const PageRequest& request) { ask_control(request, "zero"); }
-
-void WebBridge::choose_profile(const PageRequest& request) {
-  ask_control(request, "profile " + line_of(request, "name"),
-              [this](const ControlAnswer&) { read_profile(); });
-}
-
-void WebBridge::next_profile(const PageRequest& request) {
-  ask_control(request, "next", [this](const ControlAnswer&) { read_profile(); });
 }
 
 void WebBridge::show_profile(const PageRequest& request) {
@@ -299,10 +305,6 @@ void WebBridge::take_recording(std::function<void()> then) {
       [then](bool) { then(); });
 }
 
-void WebBridge::list_recordings(const PageRequest& request) {
-  answer(request, true, recordings_.path().string(), recordings_.list());
-}
-
 void WebBridge::set_camera(const PageRequest& request) {
   const auto id = static_cast<std::uint32_t>(number_of(request, "control", 0, 4294967295.0));
   const auto value =
@@ -368,16 +370,6 @@ void WebBridge::start_job(const PageRequest& request) {
     throw RequestRefused(fmt::format("{}: needs the camera; stop the recording first", verb));
   jobs_->start(std::move(command), camera_free_);
   answer(request, true, "begun");
-}
-
-void WebBridge::press_key(const PageRequest& request) {
-  jobs_->press(line_of(request, "key"));
-  answer(request, true, "pressed");
-}
-
-void WebBridge::close_job(const PageRequest& request) {
-  jobs_->close();
-  answer(request, true, "closed");
 }
 
 void WebBridge::list_plans(const PageRequest& request) {

@@ -7,16 +7,14 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "host/calibration/light/control.h"
+#include "host/core/os/uninterrupted.h"
 #include "host/tracker/picture_quality.h"
 
 namespace tagwrench {
@@ -25,11 +23,7 @@ namespace {
 constexpr std::size_t kMaxSettings = 64;
 
 bool ask_camera(int fd, unsigned long request, void* argument) {
-  int result = 0;
-  do {
-    result = ::ioctl(fd, request, argument);
-  } while (result < 0 && errno == EINTR);
-  return result == 0;
+  return uninterrupted([&] { return ::ioctl(fd, request, argument); }) == 0;
 }
 
 bool shown(const v4l2_queryctrl& control) {

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>

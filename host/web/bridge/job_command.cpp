@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <utility>
 
 #include "host/calibration/print/board_spec.h"
 #include "host/calibration/wrench/plan.h"
@@ -272,9 +270,6 @@ std::string certificate_folder(const JobPlace& place) {
   return folder.empty() ? "." : folder.string();
 }
 
-JobReport::JobReport(std::string verb, std::vector<std::string> keys)
-    : verb_(std::move(verb)), keys_(std::move(keys)) {}
-
 void JobReport::said(std::string_view line) {
   constexpr std::string_view kProgram = "tagwrench: ";
   constexpr std::string_view kTask = "> ";
@@ -282,10 +277,6 @@ void JobReport::said(std::string_view line) {
   const bool task = line.starts_with(kTask);
   if (task) line.remove_prefix(kTask.size());
   if (!line.empty()) add(task ? "task" : "note", std::string(line.substr(0, kMaxLine)));
-}
-
-void JobReport::printed(std::string_view text) {
-  printed_ += text.substr(0, kMaxText - std::min(kMaxText, printed_.size()));
 }
 
 std::optional<JobPicture> JobReport::event(std::string_view text) {
@@ -334,11 +325,6 @@ json JobReport::to_json() const {
           {"progress", progress_},
           {"keys", keys_},
           {"result", result_}};
-}
-
-void JobReport::add(std::string kind, std::string text) {
-  lines_.push_back({std::move(kind), std::move(text)});
-  if (lines_.size() > kMaxLines) lines_.pop_front();
 }
 
 std::optional<std::vector<std::uint8_t>> from_base64(std::string_view text) {

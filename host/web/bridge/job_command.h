@@ -3,6 +3,7 @@
 // lists, numbers in their range, never a path.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "host/source/frame_source.h"
@@ -54,8 +56,7 @@ std::vector<std::string> possible_jobs(const JobPlace& place);
 /// Folder of the certificate of this sensor.
 std::string certificate_folder(const JobPlace& place);
 
-// How a job goes, as pages are told: put together from what the verb says to people and to
-// programs.
+// How a job goes, as pages are told: of what the verb says to people and to programs.
 
 /// A picture that a job shows: what is seen in it, as a picture message has it, and a JPEG.
 struct JobPicture {
@@ -72,13 +73,16 @@ class JobReport {
   static constexpr std::size_t kMaxLine = 2000;
   static constexpr std::size_t kMaxText = 65'536;
 
-  explicit JobReport(std::string verb, std::vector<std::string> keys);
+  explicit JobReport(std::string verb, std::vector<std::string> keys)
+      : verb_(std::move(verb)), keys_(std::move(keys)) {}
 
   void note(std::string text) { add("note", std::move(text)); }
   /// A line of standard error.
   void said(std::string_view line);
   /// Some bytes of standard output.
-  void printed(std::string_view text);
+  void printed(std::string_view text) {
+    printed_ += text.substr(0, kMaxText - std::min(kMaxText, printed_.size()));
+  }
   /// A line of the events; a damaged or unknown one is nothing. Returns the picture, if it was one.
   std::optional<JobPicture> event(std::string_view line);
   /// `result`: beside what was printed.
@@ -89,7 +93,10 @@ class JobReport {
   nlohmann::json to_json() const;
 
  private:
-  void add(std::string kind, std::string text);
+  void add(std::string kind, std::string text) {
+    lines_.push_back({std::move(kind), std::move(text)});
+    if (lines_.size() > kMaxLines) lines_.pop_front();
+  }
 
   struct Line {
     std::string kind;

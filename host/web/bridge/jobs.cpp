@@ -8,7 +8,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <boost/asio/buffer.hpp>
 #include <cerrno>
@@ -114,7 +113,11 @@ std::shared_ptr<JobProcess> JobProcess::start(boost::asio::io_context& context,
                                               Listener listener) {
   const std::shared_ptr<JobProcess> job(new JobProcess(context, std::move(listener)));
   job->spawn(program, command);
-  job->listen();
+  for (Channel* channel : {&job->out_, &job->err_, &job->events_}) {
+    channel->stream.non_blocking(true);
+    job->read(*channel);
+  }
+  job->wait_for_end();
   return job;
 }
 
@@ -154,14 +157,6 @@ void JobProcess::spawn(const std::string& program, const JobCommand& command) {
     ::fcntl(in.write.get(), F_SETFL, O_NONBLOCK);
     keys_.assign(::fcntl(in.write.get(), F_DUPFD_CLOEXEC, kAboveOthers));
   }
-}
-
-void JobProcess::listen() {
-  for (Channel* channel : {&out_, &err_, &events_}) {
-    channel->stream.non_blocking(true);
-    read(*channel);
-  }
-  wait_for_end();
 }
 
 void JobProcess::read(Channel& channel) {
@@ -252,10 +247,6 @@ Jobs::Jobs(boost::asio::io_context& context, std::string program, Hooks hooks)
       hooks_(std::move(hooks)),
       telling_(context) {}
 
-Jobs::~Jobs() {
-  if (process_) process_->abandon();
-}
-
 void Jobs::start(JobCommand command, bool camera_is_free) {
   if (running())
     throw RequestRefused(fmt::format("{} runs already; stop it first", report_->verb()));
@@ -269,11 +260,6 @@ void Jobs::start(JobCommand command, bool camera_is_free) {
     hooks_.want_camera();
   hooks_.changed();
   log_soon();
-}
-
-void Jobs::camera_free() {
-  if (holds_camera()) return spawn();
-  hooks_.give_back_camera();  // stopped before it began
 }
 
 void Jobs::spawn() {

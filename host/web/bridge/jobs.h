@@ -8,8 +8,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <cstdint>
-#include <deque>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -69,7 +68,6 @@ class JobProcess : public std::enable_shared_from_this<JobProcess> {
 
   JobProcess(boost::asio::io_context& context, Listener listener);
   void spawn(const std::string& program, const JobCommand& command);
-  void listen();
   void read(Channel& channel);
   void take(Channel& channel, std::size_t count);
   void drain(Channel& channel);
@@ -100,7 +98,9 @@ class Jobs {
 
   /// `program`: ours.
   Jobs(boost::asio::io_context& context, std::string program, Hooks hooks);
-  ~Jobs();
+  ~Jobs() {
+    if (process_) process_->abandon();
+  }
   Jobs(const Jobs&) = delete;
   Jobs& operator=(const Jobs&) = delete;
 
@@ -110,7 +110,10 @@ class Jobs {
 
   /// `camera_is_free`: there is no run that has it. Throws RequestRefused: one runs already.
   void start(JobCommand command, bool camera_is_free);
-  void camera_free();
+  void camera_free() {
+    if (holds_camera()) return spawn();
+    hooks_.give_back_camera();  // stopped before it began
+  }
   /// "skip", "redo" or "stop". Throws RequestRefused.
   void press(const std::string& key);
   /// Forgets one that is over. Throws RequestRefused: it runs.

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <exception>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <vector>
@@ -31,6 +30,8 @@ bool is_recording_file(std::string_view file) {
   return file.ends_with(kEnd) &&
          (is_recording_name(file) || is_recording_name(file.substr(0, file.size() - kEnd.size())));
 }
+
+constexpr double kMaxLeft_s = 1e7;
 
 }  // namespace
 
@@ -105,20 +106,6 @@ nlohmann::json RecordingFolder::list() const {
          {"date", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(found.about.st_mtime))}});
   }
   return list;
-}
-
-namespace {
-
-constexpr double kMaxLeft_s = 1e7;
-
-}  // namespace
-
-RunRecording::RunRecording(const std::filesystem::path& file, const record::Head& head)
-    : FrameRecorder({.path = file}, head), file_(file), start_(std::chrono::steady_clock::now()) {}
-
-void RunRecording::frame(const LoggedFrame& all) noexcept {
-  dropped_.fetch_add(all.sample.dropped, std::memory_order_relaxed);
-  FrameRecorder::frame(all);
 }
 
 nlohmann::json RunRecording::progress() const {

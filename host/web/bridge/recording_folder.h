@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
@@ -41,16 +40,21 @@ bool is_recording_name(std::string_view name);
 /// Throws RequestRefused.
 void check_recording_name(std::string_view name);
 
-// A recording that a page began and a page ends, while the sensor runs. The file is that of
-// `tagwrench record`.
+// A recording that pages begin and end while the sensor runs; the file is that of `record`.
 
 class RunRecording final : public record::FrameRecorder {
  public:
   /// Makes the file. Throws ConfigError.
-  RunRecording(const std::filesystem::path& file, const record::Head& head);
+  RunRecording(const std::filesystem::path& file, const record::Head& head)
+      : FrameRecorder({.path = file}, head),
+        file_(file),
+        start_(std::chrono::steady_clock::now()) {}
 
   // The loop's thread.
-  void frame(const LoggedFrame& all) noexcept override;
+  void frame(const LoggedFrame& all) noexcept override {
+    dropped_.fetch_add(all.sample.dropped, std::memory_order_relaxed);
+    FrameRecorder::frame(all);
+  }
 
   // Any one thread.
   std::string name() const { return file_.filename().string(); }

@@ -35,8 +35,7 @@ Vector6 shown_range(const SensorConfig& sensor) {
   return range;
 }
 
-/// The message, with the folder of recordings. Throws ConfigError if the calibration cannot be
-/// read.
+/// The message. Throws ConfigError if the calibration cannot be read.
 json hello_of(const RunFacts& facts, const std::string& recordings) {
   const SensorConfig& sensor = facts.sensor;
   json calibrated = nullptr;
@@ -227,11 +226,6 @@ bool WebBridge::wait_after(const std::string& failure, Beside beside) {
   return wait_to_resume(beside);
 }
 
-void WebBridge::give_back_camera() {
-  camera_free_ = false;
-  raise_event(resume_);
-}
-
 void WebBridge::page_came(std::uint64_t page) {
   pages_.insert(page);
   if (!jobs_) return;  // about to end
@@ -252,10 +246,6 @@ void WebBridge::heard(std::string line, std::vector<std::string> programs) {
   if (!line.empty()) say(line);
   if (line.starts_with(kProfileNews)) read_profile();
   if (changed) send_state();
-}
-
-void WebBridge::say(const std::string& line) {
-  server_.send_all({{"type", "say"}, {"line", line}});
 }
 
 void WebBridge::show(const JobPicture& picture) {
@@ -345,10 +335,6 @@ void WebBridge::look_around() {
   if (camera_ && running_) controls_ = settings_json(camera_->all());
 }
 
-void WebBridge::send_state() {
-  if (jobs_ && server_.pages() > 0) server_.send_all(state());
-}
-
 std::string WebBridge::words(const SeenNow& seen, bool fresh) const {
   if (!failure_.empty()) return failure_;
   if (!running_ && jobs_->holds_camera()) return "the camera is lent to what is being done";
@@ -365,13 +351,6 @@ std::string WebBridge::words(const SeenNow& seen, bool fresh) const {
       return "seen, but what is seen does not fit: nothing is told until it does";
   }
   return {};
-}
-
-json WebBridge::image() const {
-  if (!figures_ || !figures_->figures().is_object()) return nullptr;
-  json image = figures_->figures();
-  image["residual_part"] = views_.seen.get().residual_fraction;
-  return image;
 }
 
 json WebBridge::state() const {
@@ -393,6 +372,11 @@ json WebBridge::state() const {
     }
     board = {{"led", reading.led}, {"exposure_us", reading.exposure_us}, {"cells", cells}};
   }
+  json image = nullptr;
+  if (running_ && figures_ && figures_->figures().is_object()) {
+    image = figures_->figures();
+    image["residual_part"] = seen.residual_fraction;
+  }
   json profile = profile_;
   if (profile.is_object()) profile["trial"] = trial_.has_value();
   return {{"type", "state"},
@@ -406,7 +390,7 @@ json WebBridge::state() const {
           {"setting_up", !running_ && failure_.empty()},
           {"status", running_ ? name(seen.status) : name(Status::lost)},
           {"words", words(seen, fresh_)},
-          {"image", running_ ? image() : json()},
+          {"image", image},
           {"profile", running_ ? profile : json()},
           {"zero_state", name(seen.zero_state)},
           {"clients", clients},

@@ -17,7 +17,6 @@
 #include <set>
 #include <span>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -81,7 +80,7 @@ class WebBridge final : private PageRequestHandler {
   bool wait_after(const std::string& failure, Beside beside);
 
  private:
-  using Answer = void (WebBridge::*)(const PageRequest&);
+  using Answer = std::function<void(WebBridge&, const PageRequest&)>;
   struct Trial {
     std::uint64_t page = 0;
     std::string name;
@@ -92,9 +91,6 @@ class WebBridge final : private PageRequestHandler {
   void handle(PageRequest request) override;
   void page_came(std::uint64_t page) override;
   void page_gone(std::uint64_t page) override;
-  void zero(const PageRequest& request);
-  void choose_profile(const PageRequest& request);
-  void next_profile(const PageRequest& request);
   void show_profile(const PageRequest& request);
   void try_profile(const PageRequest& request);
   void keep_profile(const PageRequest& request);
@@ -102,13 +98,10 @@ class WebBridge final : private PageRequestHandler {
   void save_profile(const PageRequest& request);
   void start_recording(const PageRequest& request);
   void stop_recording(const PageRequest& request);
-  void list_recordings(const PageRequest& request);
   void set_camera(const PageRequest& request);
   void set_led(const PageRequest& request);
   void tare(const PageRequest& request);
   void start_job(const PageRequest& request);
-  void press_key(const PageRequest& request);
-  void close_job(const PageRequest& request);
   void list_plans(const PageRequest& request);
   void retry(const PageRequest& request);
 
@@ -124,15 +117,19 @@ class WebBridge final : private PageRequestHandler {
   void take_recording(std::function<void()> then);
   void end_recording(std::function<void(RunRecording::Ending)> then);
   void heard(std::string line, std::vector<std::string> programs);
-  void say(const std::string& line);
+  void say(const std::string& line) { server_.send_all({{"type", "say"}, {"line", line}}); }
   void show(const JobPicture& picture);
   void tick();
-  void send_state();
+  void send_state() {
+    if (jobs_ && server_.pages() > 0) server_.send_all(state());
+  }
   nlohmann::json state() const;
-  nlohmann::json image() const;
   std::string words(const SeenNow& seen, bool fresh) const;
   void look_around();
-  void give_back_camera();
+  void give_back_camera() {
+    camera_free_ = false;
+    raise_event(resume_);
+  }
 
   /// Runs it in the server's thread, and waits.
   void in_server(std::function<void()> work);

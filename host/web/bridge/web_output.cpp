@@ -4,12 +4,8 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <exception>
-#include <string>
-#include <utility>
 
 #include "host/core/config_error.h"
 
@@ -63,20 +59,6 @@ void RunControl::request(Request request) {
   request(nullptr);
 }
 
-void RunControl::want_camera() noexcept { raise_event(camera_wanted_); }
-
-void RunControl::camera_given() noexcept { clear_event(camera_wanted_); }
-
-void RunControl::open() {
-  const std::lock_guard lock(mutex_);
-  open_ = true;
-}
-
-std::vector<RunControl::Request> RunControl::take() noexcept {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(requests_, {});
-}
-
 void RunControl::run_requests(WebOutput& output) noexcept {
   clear_event(requests_ready_);
   for (const Request& request : take()) request(&output);
@@ -88,13 +70,6 @@ void RunControl::close() noexcept {
     open_ = false;
   }
   for (const Request& request : take()) request(nullptr);
-}
-
-WebOutput::WebOutput(Parts parts) : parts_(std::move(parts)) {}
-
-std::string_view WebOutput::service() noexcept {
-  parts_.control->run_requests(*this);
-  return {};
 }
 
 /// Others show it too.
@@ -123,16 +98,6 @@ void WebOutput::missing(const Sample& sample) noexcept {
   look(nothing, sample);
   if (recording_ != nullptr) recording_->missing(sample);
   if (next_ != nullptr) next_->missing(sample);
-}
-
-void WebOutput::disconnected(std::string_view detail) noexcept {
-  if (recording_ != nullptr) recording_->disconnected(detail);
-  if (next_ != nullptr) next_->disconnected(detail);
-}
-
-void WebOutput::reconnected(std::string_view detail) noexcept {
-  if (recording_ != nullptr) recording_->reconnected(detail);
-  if (next_ != nullptr) next_->reconnected(detail);
 }
 
 /// The tracker says a trouble now and then; it holds until the target is held.

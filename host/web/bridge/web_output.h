@@ -53,6 +53,11 @@ class BoardControl {
   virtual bool tare(std::size_t channel) noexcept = 0;
 };
 
+/// An event that is counted; throws ConfigError if the system has no more descriptors.
+UniqueFd make_event();
+void raise_event(const UniqueFd& event) noexcept;
+void clear_event(const UniqueFd& event) noexcept;
+
 // Between the server's thread and the loop of a run: requests that must happen in the loop, and the
 // request that it give the camera away.
 
@@ -73,17 +78,23 @@ class RunControl {
   // Any thread.
   void request(Request request);
   /// Of the run that there is, or else of the next one.
-  void want_camera() noexcept;
+  void want_camera() noexcept { raise_event(camera_wanted_); }
   /// That request is fulfilled.
-  void camera_given() noexcept;
+  void camera_given() noexcept { clear_event(camera_wanted_); }
 
   // The loop's thread, and that which builds runs.
-  void open();
+  void open() {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+  }
   void run_requests(WebOutput& output) noexcept;
   void close() noexcept;
 
  private:
-  std::vector<Request> take() noexcept;
+  std::vector<Request> take() noexcept {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(requests_, {});
+  }
 
   UniqueFd camera_wanted_;
   UniqueFd requests_ready_;
@@ -92,11 +103,6 @@ class RunControl {
   bool open_ = false;
   std::vector<Request> requests_;
 };
-
-/// An event that is counted; throws ConfigError if the system has no more descriptors.
-UniqueFd make_event();
-void raise_event(const UniqueFd& event) noexcept;
-void clear_event(const UniqueFd& event) noexcept;
 
 // The newest value of something, from one thread that must not wait to another that may.
 
@@ -146,22 +152,31 @@ class WebOutput final : public Output, public FrameLog {
     BoardControl* board = nullptr;          ///< may be null
     const SpnavOutput* programs = nullptr;  ///< likewise
     /// A line for people, and the programs that read the spnav socket by then.
-    std::function<void(std::string line, std::vector<std::string> programs)> news;
+    std::function<void(std::string line, std::vector<std::string> programs)> news{};
   };
 
   /// Borrows all of them.
-  explicit WebOutput(Parts parts);
+  explicit WebOutput(Parts parts) : parts_(std::move(parts)) {}
 
   // Output
   int poll_fd() const noexcept override { return parts_.control->requests_fd(); }
-  std::string_view service() noexcept override;
+  std::string_view service() noexcept override {
+    parts_.control->run_requests(*this);
+    return {};
+  }
   bool notice(std::string_view line) noexcept override;
 
   // FrameLog
   void frame(const LoggedFrame& all) noexcept override;
   void missing(const Sample& sample) noexcept override;
-  void disconnected(std::string_view detail) noexcept override;
-  void reconnected(std::string_view detail) noexcept override;
+  void disconnected(std::string_view detail) noexcept override {
+    if (recording_ != nullptr) recording_->disconnected(detail);
+    if (next_ != nullptr) next_->disconnected(detail);
+  }
+  void reconnected(std::string_view detail) noexcept override {
+    if (recording_ != nullptr) recording_->reconnected(detail);
+    if (next_ != nullptr) next_->reconnected(detail);
+  }
 
   /// Who else is told of each frame; borrowed.
   void pass_on_to(FrameLog* next) noexcept { next_ = next; }

@@ -8,12 +8,10 @@
 #include <cstring>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <vector>
 
 #include "host/core/json/json_text.h"
 #include "host/output/line_outputs.h"
 #include "host/output/output.h"
-#include "host/source/decode.h"
 
 namespace tagwrench {
 namespace {
@@ -212,12 +210,6 @@ void LiveFeed::release(const LivePicture* picture) noexcept {
     if (&buffers_[i].picture == picture) buffers_[i].state.store(kFree, std::memory_order_release);
 }
 
-void LiveWindow::add(TimePoint output_time, std::int64_t latency_us) {
-  entries_.push_back({output_time, latency_us});
-  while (entries_.size() > kMax || output_time - entries_.front().output_time > kSpan)
-    entries_.pop_front();
-}
-
 LiveFigures LiveWindow::figures(TimePoint now) const {
   std::vector<std::int64_t> latencies;
   std::vector<double> intervals_us;
@@ -278,13 +270,6 @@ void SampleStream::pull() {
   }
 }
 
-void SampleStream::skip() {
-  next_ = feed_.written();
-  entries_.clear();
-  window_.clear();
-  made_ = nullptr;
-}
-
 Text SampleStream::message(std::uint64_t from) {
   if (from >= next_ || entries_.empty()) return nullptr;
   if (made_ != nullptr && made_from_ == from) return made_;
@@ -301,13 +286,6 @@ Text SampleStream::message(std::uint64_t from) {
   made_ = std::make_shared<const std::string>(std::move(text));
   made_from_ = from;
   return made_;
-}
-
-LiveFigures SampleStream::figures(TimePoint now) const {
-  LiveFigures out = window_.figures(now);
-  out.frames = frames_;
-  out.dropped = dropped_;
-  return out;
 }
 
 PictureMaker::PictureMaker() : compressor_(tjInitCompress()) {}

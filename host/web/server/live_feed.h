@@ -110,7 +110,11 @@ struct LiveFigures {
 
 class LiveWindow {
  public:
-  void add(TimePoint output_time, std::int64_t latency_us);
+  void add(TimePoint output_time, std::int64_t latency_us) {
+    entries_.push_back({output_time, latency_us});
+    while (entries_.size() > kMax || output_time - entries_.front().output_time > kSpan)
+      entries_.pop_front();
+  }
   LiveFigures figures(TimePoint now) const;
   void clear() { entries_.clear(); }
 
@@ -138,13 +142,22 @@ class SampleStream {
   /// Takes what is new.
   void pull();
   /// Forgets what has come: nobody has looked.
-  void skip();
+  void skip() {
+    next_ = feed_.written();
+    entries_.clear();
+    window_.clear();
+    made_ = nullptr;
+  }
 
   std::uint64_t end() const noexcept { return next_; }
-  /// All from this position on, but at most the last kMax; the others count as lost. Null: there
-  /// is nothing new.
+  /// From this position on, the last kMax at most; the others count as lost. Null: nothing new.
   Text message(std::uint64_t from);
-  LiveFigures figures(TimePoint now) const;
+  LiveFigures figures(TimePoint now) const {
+    LiveFigures out = window_.figures(now);
+    out.frames = frames_;
+    out.dropped = dropped_;
+    return out;
+  }
 
  private:
   const LiveFeed& feed_;
@@ -174,8 +187,7 @@ class PictureMaker {
 
   PictureMaker();
 
-  /// All of the picture, grey where it is not known; valid until the next call. Nothing: the bytes
-  /// are damaged.
+  /// The whole picture, grey where not known, until the next call. Nothing: the bytes are damaged.
   std::optional<ImageView> decode(const LivePicture& picture);
   /// Of the whole picture, made smaller if it is wider than kWidest; its coordinates in the header
   /// are the whole picture's. Null: it cannot be compressed.

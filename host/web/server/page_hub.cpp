@@ -57,17 +57,78 @@ Text Outbox::next_text() {
 /// One page: its WebSocket, what it is still to be sent, and what it may send.
 class PageHub::Page : public std::enable_shared_from_this<Page> {
  public:
-  Page(asio::ip::tcp::socket socket, HttpRequest request, std::uint64_t page, PageHub& hub);
+  Page(asio::ip::tcp::socket socket, HttpRequest request, std::uint64_t page, PageHub& hub)
+      : id(page), stream_(std::move(socket)), hub_(hub), request_(std::move(request)) {
+    error_code ignored;
+    stream_.next_layer().set_option(asio::ip::tcp::no_delay(true), ignored);
+    stream_.next_layer().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
+    stream_.read_message_max(kMaxRequest);
+    stream_.auto_fragment(false);
+    stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+      response.set(boost::beast::http::field::server, "tagwrench");
+      if (response.result() == boost::beast::http::status::switching_protocols)
+        response.set(boost::beast::http::field::sec_websocket_protocol,
+                     boost::beast::string_view(RequestGuard::kProtocol.data(),
+                                               RequestGuard::kProtocol.size()));
+    }));
+  }
 
-  void open();
+  void open() {
+    heard_ = pinged_ = page_clock();
+    stream_.control_callback([this](websocket::frame_type, boost::beast::string_view) {
+      heard_ = page_clock();
+      if (!rate_.count(heard_)) drop();
+    });
+    stream_.async_accept(request_, [self = shared_from_this()](const error_code& error) {
+      if (error || self->ended_) return self->end();
+      self->open_ = true;
+      self->heard_ = page_clock();
+      self->hub_.opened(*self);
+      self->read();
+      self->pump();
+    });
+  }
   /// Goes out in its turn, or the page is closed: it has not read for long.
-  void keep(Text text);
-  void replace(std::string_view type, Text text);
-  void show(Picture picture);
+  void keep(Text text) {
+    if (!is_open()) return;
+    if (!outbox_.keep(std::move(text)))
+      return close(websocket::close_code::try_again_later, "too slow");
+    pump();
+  }
+  void replace(std::string_view type, Text text) {
+    if (!is_open()) return;
+    outbox_.replace(type, std::move(text));
+    pump();
+  }
+  void show(Picture picture) {
+    if (!is_open() || !wants_pictures) return;
+    outbox_.replace_picture(std::move(picture));
+    pump();
+  }
   /// There may be new ones.
-  void samples_due();
-  void check(TimePoint now);
-  void close(std::uint16_t code, std::string_view reason);
+  void samples_due() {
+    samples_due_ = true;
+    pump();
+  }
+  void check(TimePoint now) {
+    const bool deaf = now - heard_ > hub_.patience_.silence;
+    const bool stuck = busy_ && now - busy_since_ > hub_.patience_.unread;
+    const bool stays = closing_ && now - pinged_ > kGoodBye;
+    if (deaf || stuck || stays) return drop();
+    if (!is_open() || now - pinged_ < hub_.patience_.ping) return;
+    pinged_ = now;
+    ping_due_ = true;
+    pump();
+  }
+  void close(std::uint16_t code, std::string_view reason) {
+    if (closing_ || ended_) return;
+    if (!open_) return drop();
+    closing_ = true;
+    pinged_ = page_clock();
+    const websocket::close_reason why(static_cast<websocket::close_code>(code),
+                                      boost::beast::string_view(reason.data(), reason.size()));
+    stream_.async_close(why, [self = shared_from_this()](const error_code&) { self->end(); });
+  }
   bool was_open() const noexcept { return open_; }
 
   const std::uint64_t id;
@@ -76,14 +137,70 @@ class PageHub::Page : public std::enable_shared_from_this<Page> {
 
  private:
   bool is_open() const noexcept { return open_ && !closing_; }
-  void read();
-  void take(const error_code& error);
-  void pump();
-  void write(std::shared_ptr<const void> owner, const void* bytes, std::size_t size, bool text);
-  void ping();
-  void finished(const error_code& error);
-  void drop() noexcept;
-  void end();
+  void read() {
+    stream_.async_read(incoming_,
+                       [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
+                         self->take(error);
+                       });
+  }
+  void take(const error_code& error) {
+    if (error == websocket::error::message_too_big) hub_.on_misbehaviour(Refusal::flood);
+    if (error) return end();
+    heard_ = page_clock();
+    if (!is_open()) return read();  // until its good-bye comes
+    if (!rate_.count(heard_)) {
+      hub_.on_misbehaviour(Refusal::flood);
+      close(websocket::close_code::policy_error, "more than 40 messages a second");
+    } else if (!stream_.got_text()) {
+      close(websocket::close_code::unknown_data, "text only");
+    } else {
+      const auto bytes = incoming_.cdata();
+      hub_.said(*this, {static_cast<const char*>(bytes.data()), bytes.size()});
+    }
+    incoming_.consume(incoming_.size());
+    read();
+  }
+  void pump() {
+    if (busy_ || !is_open()) return;
+    if (ping_due_) return ping();
+    if (auto text = outbox_.next_text()) return write(text, text->data(), text->size(), true);
+    if (std::exchange(samples_due_, false))
+      if (auto text = hub_.stream_.message(std::exchange(next_sample, hub_.stream_.end())))
+        return write(text, text->data(), text->size(), true);
+    if (auto picture = outbox_.next_picture())
+      write(picture, picture->data(), picture->size(), false);
+  }
+  void write(std::shared_ptr<const void> owner, const void* bytes, std::size_t size, bool text) {
+    busy_ = true;
+    busy_since_ = page_clock();
+    stream_.text(text);
+    stream_.async_write(
+        asio::buffer(bytes, size),
+        [self = shared_from_this(), owner = std::move(owner)](
+            const error_code& error, std::size_t /*sent*/) { self->finished(error); });
+  }
+  void ping() {
+    ping_due_ = false;
+    busy_ = true;
+    busy_since_ = page_clock();
+    stream_.async_ping(
+        {}, [self = shared_from_this()](const error_code& error) { self->finished(error); });
+  }
+  void finished(const error_code& error) {
+    busy_ = false;
+    if (error) return end();
+    pump();
+  }
+  void drop() noexcept {
+    error_code ignored;
+    stream_.next_layer().close(ignored);  // whatever waits for it ends with an error
+  }
+  void end() {
+    if (std::exchange(ended_, true)) return;
+    closing_ = true;
+    drop();
+    hub_.gone(id);
+  }
 
   websocket::stream<asio::ip::tcp::socket, false> stream_;
   PageHub& hub_;
@@ -101,157 +218,6 @@ class PageHub::Page : public std::enable_shared_from_this<Page> {
   TimePoint heard_{};
   TimePoint pinged_{};
 };
-
-PageHub::Page::Page(asio::ip::tcp::socket socket, HttpRequest request, std::uint64_t page,
-                    PageHub& hub)
-    : id(page), stream_(std::move(socket)), hub_(hub), request_(std::move(request)) {
-  error_code ignored;
-  stream_.next_layer().set_option(asio::ip::tcp::no_delay(true), ignored);
-  stream_.next_layer().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
-  stream_.read_message_max(kMaxRequest);
-  stream_.auto_fragment(false);
-  stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
-    response.set(boost::beast::http::field::server, "tagwrench");
-    if (response.result() == boost::beast::http::status::switching_protocols)
-      response.set(boost::beast::http::field::sec_websocket_protocol,
-                   boost::beast::string_view(RequestGuard::kProtocol.data(),
-                                             RequestGuard::kProtocol.size()));
-  }));
-}
-
-void PageHub::Page::open() {
-  heard_ = pinged_ = page_clock();
-  stream_.control_callback([this](websocket::frame_type, boost::beast::string_view) {
-    heard_ = page_clock();
-    if (!rate_.count(heard_)) drop();
-  });
-  stream_.async_accept(request_, [self = shared_from_this()](const error_code& error) {
-    if (error || self->ended_) return self->end();
-    self->open_ = true;
-    self->heard_ = page_clock();
-    self->hub_.opened(*self);
-    self->read();
-    self->pump();
-  });
-}
-
-void PageHub::Page::read() {
-  stream_.async_read(incoming_,
-                     [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
-                       self->take(error);
-                     });
-}
-
-void PageHub::Page::take(const error_code& error) {
-  if (error == websocket::error::message_too_big) hub_.on_misbehaviour(Refusal::flood);
-  if (error) return end();
-  heard_ = page_clock();
-  if (!is_open()) return read();  // until its good-bye comes
-  if (!rate_.count(heard_)) {
-    hub_.on_misbehaviour(Refusal::flood);
-    close(websocket::close_code::policy_error, "more than 40 messages a second");
-  } else if (!stream_.got_text()) {
-    close(websocket::close_code::unknown_data, "text only");
-  } else {
-    const auto bytes = incoming_.cdata();
-    hub_.said(*this, {static_cast<const char*>(bytes.data()), bytes.size()});
-  }
-  incoming_.consume(incoming_.size());
-  read();
-}
-
-void PageHub::Page::keep(Text text) {
-  if (!is_open()) return;
-  if (!outbox_.keep(std::move(text)))
-    return close(websocket::close_code::try_again_later, "too slow");
-  pump();
-}
-
-void PageHub::Page::replace(std::string_view type, Text text) {
-  if (!is_open()) return;
-  outbox_.replace(type, std::move(text));
-  pump();
-}
-
-void PageHub::Page::show(Picture picture) {
-  if (!is_open() || !wants_pictures) return;
-  outbox_.replace_picture(std::move(picture));
-  pump();
-}
-
-void PageHub::Page::samples_due() {
-  samples_due_ = true;
-  pump();
-}
-
-void PageHub::Page::check(TimePoint now) {
-  const bool deaf = now - heard_ > hub_.patience_.silence;
-  const bool stuck = busy_ && now - busy_since_ > hub_.patience_.unread;
-  const bool stays = closing_ && now - pinged_ > kGoodBye;
-  if (deaf || stuck || stays) return drop();
-  if (!is_open() || now - pinged_ < hub_.patience_.ping) return;
-  pinged_ = now;
-  ping_due_ = true;
-  pump();
-}
-
-void PageHub::Page::pump() {
-  if (busy_ || !is_open()) return;
-  if (ping_due_) return ping();
-  if (auto text = outbox_.next_text()) return write(text, text->data(), text->size(), true);
-  if (std::exchange(samples_due_, false))
-    if (auto text = hub_.stream_.message(std::exchange(next_sample, hub_.stream_.end())))
-      return write(text, text->data(), text->size(), true);
-  if (auto picture = outbox_.next_picture())
-    write(picture, picture->data(), picture->size(), false);
-}
-
-void PageHub::Page::write(std::shared_ptr<const void> owner, const void* bytes, std::size_t size,
-                          bool text) {
-  busy_ = true;
-  busy_since_ = page_clock();
-  stream_.text(text);
-  stream_.async_write(
-      asio::buffer(bytes, size),
-      [self = shared_from_this(), owner = std::move(owner)](
-          const error_code& error, std::size_t /*sent*/) { self->finished(error); });
-}
-
-void PageHub::Page::ping() {
-  ping_due_ = false;
-  busy_ = true;
-  busy_since_ = page_clock();
-  stream_.async_ping(
-      {}, [self = shared_from_this()](const error_code& error) { self->finished(error); });
-}
-
-void PageHub::Page::finished(const error_code& error) {
-  busy_ = false;
-  if (error) return end();
-  pump();
-}
-
-void PageHub::Page::close(std::uint16_t code, std::string_view reason) {
-  if (closing_ || ended_) return;
-  if (!open_) return drop();
-  closing_ = true;
-  pinged_ = page_clock();
-  const websocket::close_reason why(static_cast<websocket::close_code>(code),
-                                    boost::beast::string_view(reason.data(), reason.size()));
-  stream_.async_close(why, [self = shared_from_this()](const error_code&) { self->end(); });
-}
-
-void PageHub::Page::drop() noexcept {
-  error_code ignored;
-  stream_.next_layer().close(ignored);  // whatever waits for it ends with an error
-}
-
-void PageHub::Page::end() {
-  if (std::exchange(ended_, true)) return;
-  closing_ = true;
-  drop();
-  hub_.gone(id);
-}
 
 PageHub::PageHub(boost::asio::io_context& context, const WebPatience& patience)
     : timer_(context), patience_(patience) {}
@@ -301,7 +267,14 @@ void PageHub::said(Page& page, std::string_view text) {
   }
   if (!message.fault.empty())
     return answer(page.id, *message.id, false, std::string(message.fault));
-  if (message.what != "pictures") return pass_on(page, std::move(message));
+  if (message.what != "pictures") {
+    try {
+      return handler_->handle(
+          {page.id, *message.id, std::move(message.what), std::move(message.arguments)});
+    } catch (const std::exception& error) {
+      return answer(page.id, *message.id, false, error.what());
+    }
+  }
   const auto on = message.arguments.find("on");
   const bool valid = on != message.arguments.end() && on->is_boolean();
   if (valid) page.wants_pictures = on->get<bool>();
@@ -309,31 +282,19 @@ void PageHub::said(Page& page, std::string_view text) {
   answer(page.id, *message.id, valid, valid ? "" : "pictures: \"on\" is true or false");
 }
 
-void PageHub::pass_on(Page& page, PageMessage message) {
-  try {
-    handler_->handle({page.id, *message.id, std::move(message.what), std::move(message.arguments)});
-  } catch (const std::exception& error) {
-    answer(page.id, *message.id, false, error.what());
-  }
-}
-
 void PageHub::tick() {
   ticking_ = !pages_.empty();
   if (!ticking_) return;
   timer_.after(kTick, [this] { tick(); });
   stream_.pull();
-  take_picture();
+  if (const LivePicture* const picture = feed_.take_picture()) {
+    const std::optional<ImageView> whole = maker_.decode(*picture);
+    if (whole && watcher_) watcher_(*whole);
+    if (whole && pictures_wanted_)
+      if (auto message = maker_.message(*picture, *whole)) send_picture(message);
+    feed_.release(picture);
+  }
   each([](Page& page) { page.samples_due(); });
-}
-
-void PageHub::take_picture() {
-  const LivePicture* const picture = feed_.take_picture();
-  if (picture == nullptr) return;
-  const std::optional<ImageView> whole = maker_.decode(*picture);
-  if (whole && watcher_) watcher_(*whole);
-  if (whole && pictures_wanted_)
-    if (auto message = maker_.message(*picture, *whole)) send_picture(message);
-  feed_.release(picture);
 }
 
 void PageHub::want_pictures() {

@@ -15,7 +15,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "host/core/types.h"
 #include "host/web/server/live_feed.h"
@@ -41,8 +40,7 @@ class PageRequestHandler {
 };
 
 using HttpRequest = boost::beast::http::request<boost::beast::http::empty_body>;
-/// What a page is still to be sent, while it is busy with what it was sent before: bounded,
-/// whatever it does.
+/// What a page is still to be sent while it is busy with earlier things: bounded, whatever it does.
 class Outbox {
  public:
   static constexpr std::size_t kMaxKept = 64;
@@ -127,9 +125,7 @@ class PageHub {
   void said(Page& page, std::string_view text);
   void gone(std::uint64_t page);
   void tick();
-  void take_picture();
   void want_pictures();
-  void pass_on(Page& page, PageMessage message);
   static void deliver(Page& page, std::string_view type, const Text& text);
   template <typename Work>
   void each(Work work);

@@ -6,15 +6,16 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <charconv>
 
 #include "host/core/json/json_text.h"
+#include "host/core/parse.h"
 
 namespace tagwrench {
 namespace {
 
 constexpr std::size_t kMaxHost = 261;  // a name of 255, and a port
 constexpr std::size_t kMaxToken = 512;
+constexpr std::string_view kBlanks = " \t";  // of headers
 
 bool is_alphanumeric(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
@@ -46,23 +47,6 @@ std::string_view host_name(std::string_view host) {
   return is_port(host.substr(colon + 1)) ? host.substr(0, colon) : std::string_view{};
 }
 
-std::string_view trimmed_blanks(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-  return text;
-}
-
-/// Calls `visit` with each entry of a comma-separated list until it returns true.
-template <typename Visit>
-bool any_entry(std::string_view list, Visit visit) {
-  while (!list.empty()) {
-    const std::size_t comma = std::min(list.find(','), list.size());
-    if (visit(trimmed_blanks(list.substr(0, comma)))) return true;
-    list.remove_prefix(std::min(comma + 1, list.size()));
-  }
-  return false;
-}
-
 int base64url_value(char c) {
   if (c >= 'A' && c <= 'Z') return c - 'A';
   if (c >= 'a' && c <= 'z') return c - 'a' + 26;
@@ -83,10 +67,9 @@ std::optional<std::string> unescaped(std::string_view text) {
       continue;
     }
     const std::string_view digits = text.substr(i + 1, 2);
-    const char* const end = digits.data() + digits.size();
-    unsigned char byte = 0;
-    if (digits.size() < 2 || std::from_chars(digits.data(), end, byte, 16).ptr != end) return {};
-    out += static_cast<char>(byte);
+    const auto byte = parse_whole<unsigned char>(digits, 16);
+    if (digits.size() < 2 || !byte) return {};
+    out += static_cast<char>(*byte);
     i += 2;
   }
   return out;
@@ -168,22 +151,22 @@ bool is_token(std::string_view given, std::string_view token) noexcept {
 std::string_view bearer_token(std::string_view authorization) noexcept {
   constexpr std::string_view kScheme = "bearer ";
   if (!same_letters(authorization.substr(0, kScheme.size()), kScheme)) return {};
-  return trimmed_blanks(authorization.substr(kScheme.size()));
+  return trimmed(authorization.substr(kScheme.size()), kBlanks);
 }
 
 bool offers_protocol(std::string_view protocols, std::string_view wanted) noexcept {
-  return any_entry(protocols, [&](std::string_view entry) { return entry == wanted; });
+  const std::vector<std::string_view> all = split(protocols, ',');
+  return std::any_of(all.begin(), all.end(),
+                     [&](std::string_view entry) { return trimmed(entry, kBlanks) == wanted; });
 }
 
 std::optional<std::string> protocol_token(std::string_view protocols) {
-  std::optional<std::string> token;
-  any_entry(protocols, [&](std::string_view entry) {
-    if (entry.substr(0, RequestGuard::kTokenProtocol.size()) != RequestGuard::kTokenProtocol)
-      return false;
-    token = from_base64url(entry.substr(RequestGuard::kTokenProtocol.size()), kMaxToken);
-    return true;
-  });
-  return token;
+  for (std::string_view entry : split(protocols, ',')) {
+    entry = trimmed(entry, kBlanks);
+    if (entry.starts_with(RequestGuard::kTokenProtocol))
+      return from_base64url(entry.substr(RequestGuard::kTokenProtocol.size()), kMaxToken);
+  }
+  return {};
 }
 
 std::optional<std::string> from_base64url(std::string_view text, std::size_t most) {

@@ -1,14 +1,12 @@
 #include "host/web/server/web_options.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/random.h>
 #include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <optional>
 #include <string_view>
@@ -16,6 +14,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/unique_fd.h"
+#include "host/core/parse.h"
 
 namespace tagwrench {
 namespace {
@@ -83,16 +82,14 @@ WebOptions parse_web(const std::string& option, const std::string& place) {
   options.option = option;
   if (place.empty()) return options;
   const std::size_t colon = place.rfind(':');
-  const char* end = place.data() + place.size();
-  const char* digits = place.data() + std::min(colon, place.size() - 1) + 1;
-  const auto [parsed, error] = std::from_chars(digits, end, options.port);
+  const auto port = parse_whole<std::uint16_t>(std::string_view(place).substr(colon + 1));
   options.address = place.substr(0, std::min(colon, place.size()));
   if (options.address.size() >= 2 && options.address.front() == '[' &&
       options.address.back() == ']')
     options.address = options.address.substr(1, options.address.size() - 2);
-  if (colon == std::string::npos || options.address.empty() || parsed != end ||
-      error != std::errc())
+  if (colon == std::string::npos || options.address.empty() || !port)
     throw ConfigError("{}:{}: is no ADDRESS:PORT; use web, or web:127.0.0.1:8137", option, place);
+  options.port = *port;
   return options;
 }
 

@@ -108,26 +108,132 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(tcp::socket socket, WebServer& server) : socket_(std::move(socket)), server_(server) {}
 
-  void serve();
+  void serve() {
+    deadline_ = std::chrono::steady_clock::now() + server_.patience_;
+    parser_.emplace();
+    parser_->header_limit(kMaxHeader);
+    http::async_read(socket_, incoming_, *parser_,
+                     [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
+                       self->handle(error);
+                     });
+  }
   /// One answer to whatever it asks, and good-bye.
-  void turn_away(Refusal refusal);
-  void check(TimePoint now);
-  void drop() noexcept;
+  void turn_away(Refusal refusal) {
+    turned_away_ = true;
+    respond(plain_answer(refusal_status(refusal), refusal_text(refusal), refusal), true);
+  }
+  void check(TimePoint now) {
+    if (now > deadline_) drop();
+  }
+  void drop() noexcept {
+    error_code ignored;
+    socket_.close(ignored);  // whatever waits for it ends with an error
+  }
   bool is_turned_away() const noexcept { return turned_away_; }
 
  private:
   using Parser = http::request_parser<http::empty_body>;
 
-  void handle(const error_code& error);
-  void handle_request();
-  void failed(const error_code& error);
-  void respond(WebAnswer answer, bool with_body);
-  void send(std::size_t size);
-  void send_file();
-  void sent(const error_code& error);
-  void linger();
-  void discard();
-  void end();
+  void handle(const error_code& error) {
+    if (ended_ || error == http::error::end_of_stream || error == asio::error::operation_aborted)
+      return end();
+    if (error) return failed(error);
+    handle_request();
+  }
+  void handle_request() {
+    const WebRequest request = request_of(parser_->get());
+    keep_ = parser_->get().keep_alive();
+    if (request.target != "/ws") {
+      WebAnswer answer = server_.site_.answer(request);
+      if (answer.refusal != Refusal::none)
+        server_.refused(answer.refusal, telling_part(answer.refusal, request));
+      return respond(std::move(answer), request.method != "HEAD");
+    }
+    keep_ = false;
+    Refusal refusal = server_.site_.guard().socket(request);
+    if (refusal == Refusal::none && server_.hub_.pages() >= PageHub::kMaxPages)
+      refusal = Refusal::crowd;
+    if (refusal != Refusal::none) {
+      server_.refused(refusal, telling_part(refusal, request));
+      return respond(plain_answer(refusal_status(refusal), refusal_text(refusal)), true);
+    }
+    if (!request.upgrade) return respond(plain_answer(426, "Only a WebSocket is here."), true);
+    server_.hub_.add(std::move(socket_), parser_->release());
+    end();
+  }
+  void failed(const error_code& error) {
+    if (error.category() != http::make_error_code(http::error::end_of_stream).category())
+      return end();
+    const bool long_header =
+        error == http::error::header_limit || error == http::error::buffer_overflow;
+    const bool body = error == http::error::unexpected_body || error == http::error::body_limit;
+    keep_ = false;
+    if (long_header)
+      respond(plain_answer(431, "At most 8 kB of headers.", Refusal::flood), true);
+    else if (body)
+      respond(plain_answer(413, "Requests have no body here.", Refusal::flood), true);
+    else
+      respond(plain_answer(400, refusal_text(Refusal::nonsense), Refusal::nonsense), true);
+  }
+  void respond(WebAnswer answer, bool with_body) {
+    const bool from_file = static_cast<bool>(answer.file.fd);
+    const std::uint64_t length = from_file ? answer.file.size : answer.text.size();
+    std::string head =
+        fmt::format("HTTP/1.1 {} {}\r\n{}Connection: {}\r\n", answer.status,
+                    status_text(answer.status), answer.fields, keep_ ? "keep-alive" : "close");
+    if (answer.status != 304) head += fmt::format("Content-Length: {}\r\n", length);
+    head += "\r\n";
+    outgoing_.assign(head.begin(), head.end());
+    if (with_body && !from_file)
+      outgoing_.insert(outgoing_.end(), answer.text.begin(), answer.text.end());
+    file_ = std::move(answer.file);
+    file_left_ = with_body && from_file ? file_.size : 0;
+    send(outgoing_.size());
+  }
+  void send(std::size_t size) {
+    deadline_ = std::chrono::steady_clock::now() + server_.patience_;
+    asio::async_write(socket_, asio::buffer(outgoing_.data(), size),
+                      [self = shared_from_this()](const error_code& error, std::size_t /*sent*/) {
+                        self->sent(error);
+                      });
+  }
+  /// A file that has grown shorter meanwhile ends the connection: its length is promised.
+  void send_file() {
+    outgoing_.resize(kPiece);
+    const std::size_t wanted = std::min<std::uint64_t>(file_left_, kPiece);
+    const ssize_t got = ::read(file_.fd.get(), outgoing_.data(), wanted);
+    if (got <= 0) return end();
+    file_left_ -= static_cast<std::uint64_t>(got);
+    send(static_cast<std::size_t>(got));
+  }
+  void sent(const error_code& error) {
+    if (error || ended_) return end();
+    if (file_left_ > 0) return send_file();
+    file_ = {};
+    outgoing_ = {};
+    if (keep_) return serve();
+    linger();
+  }
+  /// Closed at once, what it is still sending would make the kernel throw away the answer.
+  void linger() {
+    deadline_ = std::chrono::steady_clock::now() + kLinger;
+    error_code ignored;
+    socket_.shutdown(tcp::socket::shutdown_send, ignored);
+    outgoing_.resize(kPiece);
+    discard();
+  }
+  void discard() {
+    socket_.async_read_some(
+        asio::buffer(outgoing_),
+        [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
+          error ? self->end() : self->discard();
+        });
+  }
+  void end() {
+    if (std::exchange(ended_, true)) return;
+    drop();
+    server_.connections_.erase(this);
+  }
 
   tcp::socket socket_;
   WebServer& server_;
@@ -141,140 +247,6 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
   bool ended_ = false;
   TimePoint deadline_{};
 };
-
-void WebServer::Connection::serve() {
-  deadline_ = std::chrono::steady_clock::now() + server_.patience_;
-  parser_.emplace();
-  parser_->header_limit(kMaxHeader);
-  http::async_read(socket_, incoming_, *parser_,
-                   [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
-                     self->handle(error);
-                   });
-}
-
-void WebServer::Connection::turn_away(Refusal refusal) {
-  turned_away_ = true;
-  respond(plain_answer(refusal_status(refusal), refusal_text(refusal), refusal), true);
-}
-
-void WebServer::Connection::handle(const error_code& error) {
-  if (ended_ || error == http::error::end_of_stream || error == asio::error::operation_aborted)
-    return end();
-  if (error) return failed(error);
-  handle_request();
-}
-
-void WebServer::Connection::failed(const error_code& error) {
-  if (error.category() != http::make_error_code(http::error::end_of_stream).category())
-    return end();
-  const bool long_header =
-      error == http::error::header_limit || error == http::error::buffer_overflow;
-  const bool body = error == http::error::unexpected_body || error == http::error::body_limit;
-  keep_ = false;
-  if (long_header)
-    respond(plain_answer(431, "At most 8 kB of headers.", Refusal::flood), true);
-  else if (body)
-    respond(plain_answer(413, "Requests have no body here.", Refusal::flood), true);
-  else
-    respond(plain_answer(400, refusal_text(Refusal::nonsense), Refusal::nonsense), true);
-}
-
-void WebServer::Connection::handle_request() {
-  const WebRequest request = request_of(parser_->get());
-  keep_ = parser_->get().keep_alive();
-  if (request.target != "/ws") {
-    WebAnswer answer = server_.site_.answer(request);
-    if (answer.refusal != Refusal::none)
-      server_.refused(answer.refusal, telling_part(answer.refusal, request));
-    return respond(std::move(answer), request.method != "HEAD");
-  }
-  keep_ = false;
-  Refusal refusal = server_.site_.guard().socket(request);
-  if (refusal == Refusal::none && server_.hub_.pages() >= PageHub::kMaxPages)
-    refusal = Refusal::crowd;
-  if (refusal != Refusal::none) {
-    server_.refused(refusal, telling_part(refusal, request));
-    return respond(plain_answer(refusal_status(refusal), refusal_text(refusal)), true);
-  }
-  if (!request.upgrade) return respond(plain_answer(426, "Only a WebSocket is here."), true);
-  server_.hub_.add(std::move(socket_), parser_->release());
-  end();
-}
-
-void WebServer::Connection::respond(WebAnswer answer, bool with_body) {
-  const bool from_file = static_cast<bool>(answer.file.fd);
-  const std::uint64_t length = from_file ? answer.file.size : answer.text.size();
-  std::string head =
-      fmt::format("HTTP/1.1 {} {}\r\n{}Connection: {}\r\n", answer.status,
-                  status_text(answer.status), answer.fields, keep_ ? "keep-alive" : "close");
-  if (answer.status != 304) head += fmt::format("Content-Length: {}\r\n", length);
-  head += "\r\n";
-  outgoing_.assign(head.begin(), head.end());
-  if (with_body && !from_file)
-    outgoing_.insert(outgoing_.end(), answer.text.begin(), answer.text.end());
-  file_ = std::move(answer.file);
-  file_left_ = with_body && from_file ? file_.size : 0;
-  send(outgoing_.size());
-}
-
-void WebServer::Connection::send(std::size_t size) {
-  deadline_ = std::chrono::steady_clock::now() + server_.patience_;
-  asio::async_write(socket_, asio::buffer(outgoing_.data(), size),
-                    [self = shared_from_this()](const error_code& error, std::size_t /*sent*/) {
-                      self->sent(error);
-                    });
-}
-
-/// A file that has grown shorter meanwhile ends the connection: its length is promised.
-void WebServer::Connection::send_file() {
-  outgoing_.resize(kPiece);
-  const std::size_t wanted = std::min<std::uint64_t>(file_left_, kPiece);
-  const ssize_t got = ::read(file_.fd.get(), outgoing_.data(), wanted);
-  if (got <= 0) return end();
-  file_left_ -= static_cast<std::uint64_t>(got);
-  send(static_cast<std::size_t>(got));
-}
-
-void WebServer::Connection::sent(const error_code& error) {
-  if (error || ended_) return end();
-  if (file_left_ > 0) return send_file();
-  file_ = {};
-  outgoing_ = {};
-  if (keep_) return serve();
-  linger();
-}
-
-/// Closed at once, what it is still sending would make the kernel throw away the answer.
-void WebServer::Connection::linger() {
-  deadline_ = std::chrono::steady_clock::now() + kLinger;
-  error_code ignored;
-  socket_.shutdown(tcp::socket::shutdown_send, ignored);
-  outgoing_.resize(kPiece);
-  discard();
-}
-
-void WebServer::Connection::discard() {
-  socket_.async_read_some(
-      asio::buffer(outgoing_),
-      [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
-        error ? self->end() : self->discard();
-      });
-}
-
-void WebServer::Connection::check(TimePoint now) {
-  if (now > deadline_) drop();
-}
-
-void WebServer::Connection::drop() noexcept {
-  error_code ignored;
-  socket_.close(ignored);  // whatever waits for it ends with an error
-}
-
-void WebServer::Connection::end() {
-  if (std::exchange(ended_, true)) return;
-  drop();
-  server_.connections_.erase(this);
-}
 
 WebServer::WebServer(const WebOptions& options)
     : token_(options.token),
@@ -290,7 +262,15 @@ WebServer::WebServer(const WebOptions& options)
 
 void WebServer::stop() {
   if (!thread_.joinable()) return;
-  asio::post(context_, [this] { farewell(); });
+  asio::post(context_, [this] {
+    error_code ignored;
+    acceptor_.close(ignored);
+    retry_.cancel();
+    for (const auto& [key, connection] : connections_) connection->drop();
+    hub_.close_all();
+    until_ = std::chrono::steady_clock::now() + kFarewell;  // pages say good-bye, too
+    leave();
+  });
   thread_.join();
 }
 
@@ -357,17 +337,6 @@ void WebServer::check() {
   checks_.after(kCheckEvery, [this] { check(); });
 }
 
-/// Pages get a moment to say good-bye, too.
-void WebServer::farewell() {
-  error_code ignored;
-  acceptor_.close(ignored);
-  retry_.cancel();
-  for (const auto& [key, connection] : connections_) connection->drop();
-  hub_.close_all();
-  until_ = std::chrono::steady_clock::now() + kFarewell;
-  leave();
-}
-
 void WebServer::leave() {
   if (hub_.pages() == 0 || std::chrono::steady_clock::now() > until_) return context_.stop();
   checks_.after(std::chrono::milliseconds(10), [this] { leave(); });
@@ -376,10 +345,6 @@ void WebServer::leave() {
 std::string WebServer::url() const {
   const bool any = endpoint_.address().is_unspecified();
   return "http://" + (any ? "HOST:" + std::to_string(port()) : endpoint_text(endpoint_)) + '/';
-}
-
-std::string WebServer::url_with_token() const {
-  return token_.empty() ? url() : url() + "#token=" + token_;
 }
 
 }  // namespace tagwrench

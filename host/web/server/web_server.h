@@ -30,8 +30,7 @@ class WebServer {
  public:
   static constexpr std::size_t kMaxConnections = 64;
 
-  /// Binds and listens, in no thread yet. Throws ConfigError: the address cannot be used, or needs
-  /// a token.
+  /// Binds and listens, in no thread yet. Throws ConfigError: a bad address, or one without token.
   explicit WebServer(const WebOptions& options);
   /// As stop().
   ~WebServer() { stop(); }
@@ -41,8 +40,7 @@ class WebServer {
   /// Starts the thread. No signal is ever delivered to it. Without this, nothing is served. The
   /// handler is borrowed until stop().
   void start(PageRequestHandler& handler);
-  /// Says good-bye to all pages (1001), and waits for the thread: the handler is not called any
-  /// more.
+  /// Says good-bye to all pages (1001), waits for the thread; no call of the handler after that.
   void stop();
 
   /// What the frame loop writes and this server reads; lives as long as the server.
@@ -50,9 +48,8 @@ class WebServer {
   std::uint16_t port() const noexcept { return endpoint_.port(); }
   /// Without the token: fit for logs.
   std::string url() const;
-  /// To be opened in a browser: the token, if there is one, in the fragment, which no browser
-  /// sends.
-  std::string url_with_token() const;
+  /// To be opened in a browser: a token goes in the fragment, which no browser sends.
+  std::string url_with_token() const { return token_.empty() ? url() : url() + "#token=" + token_; }
   /// For descriptors and timers of those who answer. Its handlers run in the server's thread.
   boost::asio::io_context& context() noexcept { return context_; }
 
@@ -73,16 +70,13 @@ class WebServer {
   void send_all(const nlohmann::json& message) { hub_.send_all(message); }
   /// To one page, as above.
   void send(std::uint64_t page, const nlohmann::json& message) { hub_.send(page, message); }
-  /// A picture that the feed did not bring (picture_message()), to those pages that asked for
-  /// pictures.
+  /// A picture that the feed did not bring (picture_message()), to pages that asked for pictures.
   void send_picture(const Picture& message) { hub_.send_picture(message); }
-  /// What every page gets first. Sent to all at once, too. Before there is one, a page hears
-  /// nothing but answers.
+  /// What every page gets first; sent to all now, too. Before it a page hears answers alone.
   void set_hello(const nlohmann::json& hello) { hub_.set_hello(hello); }
   std::size_t pages() const noexcept { return hub_.pages(); }
 
-  /// Rate, latency and so on of the last second, as read from the feed; zeros while no page is
-  /// open.
+  /// Of the last second, as read from the feed; zeros while no page is open.
   LiveFigures figures() const { return hub_.figures(); }
 
   /// Is shown each picture that is taken from the feed, whole, at least twice a second while a page
@@ -109,7 +103,6 @@ class WebServer {
   void take(boost::asio::ip::tcp::socket socket);
   void refused(Refusal refusal, std::string_view detail);
   void check();
-  void farewell();
   void leave();
 
   boost::asio::io_context context_{1};

@@ -118,24 +118,135 @@ class Session {
     std::map<std::string, Bytes> measured;     ///< by name
   };
   /// Throws ConfigError.
-  static SensorConfig read(const std::string& yaml, const std::string& name, const Files& files);
+  static SensorConfig read(const std::string& yaml, const std::string& name, const Files& files) {
+    const fs::path beside = fs::path(name).parent_path();
+    const MemoryFile calibration(beside, named(yaml, "wrench", "calibration"),
+                                 bytes_of(files.calibration));
+    const MemoryFile appearance(beside, named(yaml, "rest", "appearance"), files.appearance);
+    if (files.measured.empty()) return parse_sensor(yaml, name);
+    const fs::path folder = measured_folder(name);
+    std::list<MemoryFile> measured;
+    for (const auto& [file, bytes] : files.measured)
+      if (std::find(kMeasuredFiles.begin(), kMeasuredFiles.end(), file) != kMeasuredFiles.end())
+        measured.emplace_back(folder, file, bytes);
+    return parse_sensor(yaml, name, WrenchCalibration::use, folder);
+  }
 
-  Session(const SensorConfig& sensor, std::string name);
+  Session(const SensorConfig& sensor, std::string name)
+      : sensor_(sensor),
+        name_(std::move(name)),
+        tracker_(sensor.camera, sensor.target, sensor.rest),
+        rest_given_(tracker_.reference().known),
+        wrench_(sensor.wrench),
+        zero_(zero_options(sensor, wrench_.tool(), true)) {}
 
-  const PageSample& track(const Frame& frame) noexcept;
+  /// The life of a frame, as in the pipeline.
+  const PageSample& track(const Frame& frame) noexcept {
+    const Track track = tracker_.track(frame);
+    Sample sample;
+    sample.sequence = frame.sequence;
+    sample.capture_time = sample.latency_origin = frame.capture_time;
+    wrench_.estimate(track, sample);
+    zero_.follow(sample, wrench_.noise(track));
+    fill(track, sample);
+    note(track);
+    return sample_;
+  }
   void ask_zero() noexcept { zero_.ask(); }
 
   /// What the tracker noticed last, in words; empty when all is well.
   const std::string& diagnostic() const noexcept { return diagnostic_; }
   /// What there is to know about the sensor, as JSON.
-  std::string description() const;
+  std::string description() const {
+    json ids = json::array();
+    for (const Tag& tag : sensor_.target.tags) ids.push_back(tag.id);
+    const Vector6 range = range_through(wrench_.tool(), sensor_.wrench.range);
+    const CameraModel& camera = sensor_.camera;
+    return dump_json(
+        json{{"camera",
+              {{"width", camera.width_px},
+               {"height", camera.height_px},
+               {"mirrored", camera.mirrored},
+               {"readout_ms", camera.readout * 1e3}}},
+             {"family", name(sensor_.target.family)},
+             {"tag_ids", ids},
+             {"tag_size_mm", sensor_.target.tag_size * 1e3},
+             {"rest_frames", sensor_.rest.frames},
+             {"rest_given", rest_given_},
+             {"appearance", sensor_.rest.appearance.has_value()},
+             {"calibration", sensor_.calibration.empty() ? "" : sensor_.wrench_from.file},
+             {"in_force", in_force(sensor_)},
+             {"range_n", known_range(range, 0)},
+             {"range_nm", known_range(range, 3)}});
+  }
   /// What was learned at rest, as files of measured/: a JSON object of names and texts. Empty where
   /// nothing had to be learned; "null" while it is not known. `date`: YYYY-MM-DD.
-  std::string learned(const std::string& date) const;
+  std::string learned(const std::string& date) const {
+    const KnownReference& rest = tracker_.reference();
+    if (!rest.known) return "null";
+    json files = json::object();
+    if (rest_given_) return dump_json(files);
+    SensorConfig now = sensor_;
+    for (std::size_t t = 0; t < now.target.tags.size(); ++t) {
+      now.target.tags[t].platform_T_tag = rest.platform_T_tag[t];
+      now.target.tags[t].sigma.setZero();  // of another measurement, if there was one
+    }
+    now.rest.camera_T_platform = rest.camera_T_platform;
+    now.rest.appearance.reset();
+    const MeasuredStamp stamp{date, "tagwrench in a browser", fs::path(name_).filename().string()};
+    files[kMeasuredTarget] = target_yaml({stamp, now.target, rest.camera_T_platform,
+                                          sha256_of(now.camera), std::nullopt, std::nullopt});
+    if (!now.zero.set.isZero()) {  // found at another rest: overruled
+      files[kMeasuredZero] = zero_yaml({stamp, Vector6::Zero(),
+                                        sha256_of(identity_of(now.camera, now.target, now.rest)),
+                                        sha256_of(now.wrench)});
+    }
+    return dump_json(files);
+  }
 
  private:
-  void note(const Track& track) noexcept;
-  void fill(const Track& track, const Sample& sample) noexcept;
+  /// As the pipeline says it: what was wrong is not, once the target is held.
+  void note(const Track& track) noexcept {
+    if (const std::string_view line = zero_text(zero_.take_answer()); !line.empty()) {
+      diagnostic_ = line;
+      sample_.news = 1;
+    }
+    if (track.status == Status::ok && trouble_shown_) {
+      trouble_shown_ = false;
+      diagnostic_.clear();
+      sample_.news = 1;
+    }
+    const bool trouble = is_trouble(track.diagnostic);
+    if (track.diagnostic == Diagnostic::none || (track.diagnostic == last_diagnostic_ && !trouble))
+      return;
+    last_diagnostic_ = track.diagnostic;
+    diagnostic_ = diagnostic_text(track.diagnostic, track.details);
+    trouble_shown_ = trouble_shown_ || (trouble && track.status != Status::ok);
+    sample_.news = 1;
+  }
+  void fill(const Track& track, const Sample& sample) noexcept {
+    sample_ = {};
+    sample_.status = static_cast<double>(sample.status);
+    copy(sample.displacement, sample_.displacement);
+    copy(sample.displacement_sigma, sample_.displacement_sigma);
+    copy(sample.wrench, sample_.wrench);
+    copy(sample.wrench_sigma, sample_.wrench_sigma);
+    copy(sample.zero, sample_.zero);
+    sample_.zero_state = static_cast<double>(sample.zero_state);
+    sample_.tags_held = track.tags_held;
+    sample_.residual_px = track.residual_px;
+    sample_.residual_fraction = track.residual_fraction;
+    sample_.blur_px2 = track.blur_px2;
+    const Region& wanted = track.wanted;
+    sample_.wanted = {static_cast<double>(wanted.x), static_cast<double>(wanted.y),
+                      static_cast<double>(wanted.width), static_cast<double>(wanted.height)};
+    sample_.needs_whole_frame = track.needs_whole_frame ? 1 : 0;
+    sample_.tags = track.corner_count;
+    for (std::size_t t = 0; t < track.corner_count; ++t) {
+      sample_.tag[t][0] = track.corners[t].id;
+      std::copy(track.corners[t].px.begin(), track.corners[t].px.end(), sample_.tag[t].begin() + 1);
+    }
+  }
 
   SensorConfig sensor_;
   std::string name_;
@@ -148,131 +259,6 @@ class Session {
   Diagnostic last_diagnostic_ = Diagnostic::none;
   bool trouble_shown_ = false;
 };
-
-SensorConfig Session::read(const std::string& yaml, const std::string& name, const Files& files) {
-  const fs::path beside = fs::path(name).parent_path();
-  const MemoryFile calibration(beside, named(yaml, "wrench", "calibration"),
-                               bytes_of(files.calibration));
-  const MemoryFile appearance(beside, named(yaml, "rest", "appearance"), files.appearance);
-  if (files.measured.empty()) return parse_sensor(yaml, name);
-  const fs::path folder = measured_folder(name);
-  std::list<MemoryFile> measured;
-  for (const auto& [file, bytes] : files.measured)
-    if (std::find(kMeasuredFiles.begin(), kMeasuredFiles.end(), file) != kMeasuredFiles.end())
-      measured.emplace_back(folder, file, bytes);
-  return parse_sensor(yaml, name, WrenchCalibration::use, folder);
-}
-
-Session::Session(const SensorConfig& sensor, std::string name)
-    : sensor_(sensor),
-      name_(std::move(name)),
-      tracker_(sensor.camera, sensor.target, sensor.rest),
-      rest_given_(tracker_.reference().known),
-      wrench_(sensor.wrench),
-      zero_(zero_options(sensor, wrench_.tool(), true)) {}
-
-/// The life of a frame, as in the pipeline.
-const PageSample& Session::track(const Frame& frame) noexcept {
-  const Track track = tracker_.track(frame);
-  Sample sample;
-  sample.sequence = frame.sequence;
-  sample.capture_time = sample.latency_origin = frame.capture_time;
-  wrench_.estimate(track, sample);
-  zero_.follow(sample, wrench_.noise(track));
-  fill(track, sample);
-  note(track);
-  return sample_;
-}
-
-void Session::fill(const Track& track, const Sample& sample) noexcept {
-  sample_ = {};
-  sample_.status = static_cast<double>(sample.status);
-  copy(sample.displacement, sample_.displacement);
-  copy(sample.displacement_sigma, sample_.displacement_sigma);
-  copy(sample.wrench, sample_.wrench);
-  copy(sample.wrench_sigma, sample_.wrench_sigma);
-  copy(sample.zero, sample_.zero);
-  sample_.zero_state = static_cast<double>(sample.zero_state);
-  sample_.tags_held = track.tags_held;
-  sample_.residual_px = track.residual_px;
-  sample_.residual_fraction = track.residual_fraction;
-  sample_.blur_px2 = track.blur_px2;
-  const Region& wanted = track.wanted;
-  sample_.wanted = {static_cast<double>(wanted.x), static_cast<double>(wanted.y),
-                    static_cast<double>(wanted.width), static_cast<double>(wanted.height)};
-  sample_.needs_whole_frame = track.needs_whole_frame ? 1 : 0;
-  sample_.tags = track.corner_count;
-  for (std::size_t t = 0; t < track.corner_count; ++t) {
-    sample_.tag[t][0] = track.corners[t].id;
-    std::copy(track.corners[t].px.begin(), track.corners[t].px.end(), sample_.tag[t].begin() + 1);
-  }
-}
-
-/// As the pipeline says it: what was wrong is not, once the target is held.
-void Session::note(const Track& track) noexcept {
-  if (const std::string_view line = zero_text(zero_.take_answer()); !line.empty()) {
-    diagnostic_ = line;
-    sample_.news = 1;
-  }
-  if (track.status == Status::ok && trouble_shown_) {
-    trouble_shown_ = false;
-    diagnostic_.clear();
-    sample_.news = 1;
-  }
-  const bool trouble = is_trouble(track.diagnostic);
-  if (track.diagnostic == Diagnostic::none || (track.diagnostic == last_diagnostic_ && !trouble))
-    return;
-  last_diagnostic_ = track.diagnostic;
-  diagnostic_ = diagnostic_text(track.diagnostic, track.details);
-  trouble_shown_ = trouble_shown_ || (trouble && track.status != Status::ok);
-  sample_.news = 1;
-}
-
-std::string Session::description() const {
-  json ids = json::array();
-  for (const Tag& tag : sensor_.target.tags) ids.push_back(tag.id);
-  const Vector6 range = range_through(wrench_.tool(), sensor_.wrench.range);
-  const CameraModel& camera = sensor_.camera;
-  return dump_json(
-      json{{"camera",
-            {{"width", camera.width_px},
-             {"height", camera.height_px},
-             {"mirrored", camera.mirrored},
-             {"readout_ms", camera.readout * 1e3}}},
-           {"family", name(sensor_.target.family)},
-           {"tag_ids", ids},
-           {"tag_size_mm", sensor_.target.tag_size * 1e3},
-           {"rest_frames", sensor_.rest.frames},
-           {"rest_given", rest_given_},
-           {"appearance", sensor_.rest.appearance.has_value()},
-           {"calibration", sensor_.calibration.empty() ? "" : sensor_.wrench_from.file},
-           {"in_force", in_force(sensor_)},
-           {"range_n", known_range(range, 0)},
-           {"range_nm", known_range(range, 3)}});
-}
-
-std::string Session::learned(const std::string& date) const {
-  const KnownReference& rest = tracker_.reference();
-  if (!rest.known) return "null";
-  json files = json::object();
-  if (rest_given_) return dump_json(files);
-  SensorConfig now = sensor_;
-  for (std::size_t t = 0; t < now.target.tags.size(); ++t) {
-    now.target.tags[t].platform_T_tag = rest.platform_T_tag[t];
-    now.target.tags[t].sigma.setZero();  // of another measurement, if there was one
-  }
-  now.rest.camera_T_platform = rest.camera_T_platform;
-  now.rest.appearance.reset();
-  const MeasuredStamp stamp{date, "tagwrench in a browser", fs::path(name_).filename().string()};
-  files[kMeasuredTarget] = target_yaml({stamp, now.target, rest.camera_T_platform,
-                                        sha256_of(now.camera), std::nullopt, std::nullopt});
-  if (!now.zero.set.isZero()) {  // found at another rest: overruled
-    files[kMeasuredZero] =
-        zero_yaml({stamp, Vector6::Zero(), sha256_of(identity_of(now.camera, now.target, now.rest)),
-                   sha256_of(now.wrench)});
-  }
-  return dump_json(files);
-}
 
 struct PageCore {
   std::unique_ptr<Session> session;
