@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -248,8 +249,7 @@ std::vector<Fact> procedure_facts(const Calibration& calibration) {
   add(facts, "Plan", record.plan);
   add(facts, "Reference", record.reference);
   add(facts, "Model", model_text(calibration));
-  // With an instrument each reading counts, with masses the mean of each hold, which has less
-  // noise.
+  // Of an instrument each reading counts, of masses the mean of each hold, which has less noise.
   if (record.axis)
     add(facts, record.lag ? "RMSE in its fit" : "Each hold's mean, RMSE", rmse_text(*record.axis));
   add(facts, "Software", record.software);

@@ -1,15 +1,12 @@
-// `tagwrench calibrate camera`: pictures of a board in, measured/camera.yaml beside a sensor.yaml
-// out.
+// `tagwrench calibrate camera`: pictures of a board in, measured/camera.yaml of a sensor out.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <system_error>
-#include <utility>
 #include <vector>
 
 #include "host/app/input.h"
@@ -350,8 +347,7 @@ std::unique_ptr<ViewCollector> collect(const CalibrateCameraOptions& options,
   return look_at_camera(options, board, record, stop);
 }
 
-/// Throws ConfigError if it cannot start, or if the views are too poor; then nothing has been
-/// written.
+/// Throws ConfigError if it cannot start or the views are too poor; then nothing has been written.
 int calibrate_camera(const CalibrateCameraOptions& options) {
   const BoardSpec board = parse_board(options.board);
   const Record record = open_record(options);

@@ -2,8 +2,6 @@
 // rest, then moved about, in; where the tags sit and what they look like, in the folder measured/
 // beside sensor.yaml, out.
 
-#include <fmt/format.h>
-
 #include <chrono>
 #include <filesystem>
 #include <limits>
@@ -12,7 +10,6 @@
 #include "host/calibration/target/recorder.h"
 #include "host/commands/commands.h"
 #include "host/commands/measuring.h"
-#include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
 #include "host/sensor/measured_files.h"

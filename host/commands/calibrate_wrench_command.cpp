@@ -1,10 +1,8 @@
-// `tagwrench calibrate wrench`: known loads, one after the other, in; measured/wrench.json and its
-// data out.
+// `tagwrench calibrate wrench`: known loads, one by one, in; measured/wrench.json and its data out.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <optional>

@@ -1,11 +1,9 @@
 // `tagwrench camera-timing`: a camera, a lamp or a screen before it, and a report.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <functional>
 #include <memory>
-#include <vector>
 
 #include "host/app/board/board_loop.h"
 #include "host/app/input.h"

@@ -16,8 +16,7 @@ void take_lens(const CameraModel& camera, study::SeenPicture& picture);
 void count_pixels(const Eigen::Vector2d& image_px, double tag_size, double border,
                   study::Instrument& instrument);
 
-/// What will be printed, as `tagwrench design` looks at it. Blur, noise, contrast and counts stay
-/// as they were.
+/// What will be printed, as the design sees it; blur, noise, contrast and counts stay as they were.
 void take_hardware(const hardware::Parameters& parameters, study::Instrument& instrument);
 
 /// The ready-made plan six_orientations as text, its four points and its weight those of this

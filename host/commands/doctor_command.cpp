@@ -1,5 +1,4 @@
-// `tagwrench doctor`: what works here; with --focus how sharp the tags are while somebody turns the
-// lens.
+// `tagwrench doctor`: what works here; with --focus how sharp the tags are as the lens is turned.
 #include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>

@@ -34,17 +34,16 @@ void rest(const GadgetFiles& files, const KernelPlaces& places, const GadgetTree
                       *gadget.face);
 }
 
-GadgetSpec spec_of(const std::string& name, const std::string& face, const std::string& id,
-                   bool self_powered) {
+GadgetSpec spec_of(const GadgetCommandOptions& o) {
   GadgetSpec spec;
-  spec.name = name;
-  spec.face = face_of(face).value_or(GadgetFace::spacemouse);
+  spec.name = o.name;
+  spec.face = face_of(o.face).value_or(GadgetFace::spacemouse);
   spec.id = face_id(spec.face);
-  spec.self_powered = self_powered;
-  if (id.empty()) return spec;
-  const std::optional<UsbId> given = parse_usb_id(id);
+  spec.self_powered = o.self_powered;
+  if (o.id.empty()) return spec;
+  const std::optional<UsbId> given = parse_usb_id(o.id);
   if (!given)
-    throw ConfigError("--id {}: not vendor:product in hexadecimal; write it as in 256f:c62e", id);
+    throw ConfigError("--id {}: not vendor:product in hexadecimal; write it as in 256f:c62e", o.id);
   spec.id = *given;
   return spec;
 }
@@ -71,7 +70,7 @@ std::string run_command_of(const std::string& name) {
 int bring_up(const GadgetCommandOptions& o) {
   GadgetFiles files;
   GadgetTree tree(files, o.places.gadgets());
-  GadgetSpec spec = spec_of(o.name, o.face, o.id, o.self_powered);
+  GadgetSpec spec = spec_of(o);
   check_gadget_name(o.name);
   const std::string ours = std::string(kGadgetPrefix) + o.name;
   choose_controller(controllers(files, o.places, tree.all()), o.udc, ours);

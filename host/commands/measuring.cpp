@@ -1,6 +1,10 @@
 #include "host/commands/measuring.h"
 
 #include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <openssl/evp.h>
+#include <turbojpeg.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,19 +12,13 @@
 #include <cmath>
 #include <ctime>
 #include <memory>
-#include <system_error>
-
-#include <fmt/chrono.h>
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <openssl/evp.h>
-#include <turbojpeg.h>
+#include <system_error>
 
 #include "host/core/config_error.h"
 #include "host/core/json/json_text.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
-#include "host/sensor/measured_files.h"
 #include "host/sensor/sensor_config.h"
 
 namespace tagwrench {

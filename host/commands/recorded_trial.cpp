@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
 #include <fstream>
 
 #include "host/app/recording.h"
-#include "host/calibration/analysis/trial_csv.h"
 #include "host/core/config_error.h"
 #include "host/core/count_text.h"
 #include "host/recording/reader.h"

@@ -49,9 +49,9 @@ class StaticMeasurement {
   bool moves() const { return moved_; }
   AtRest result() const;
   /// Standard deviations of one frame's wrench, mean, N and N m.
-  Vector6 wrench_sigma() const;
+  Vector6 wrench_sigma() const { return (sum_.variance / std::max(1, sum_.held)).cwiseSqrt(); }
   /// Mean, of all tags together, m and rad.
-  Vector6 displacement() const;
+  Vector6 displacement() const { return sum_.displacement / std::max(1, sum_.held); }
   /// How much of the stillness that it wants is there, 0..1.
   double part() const {
     return std::min(1.0, seconds() / std::chrono::duration<double>(wanted_).count());
@@ -81,7 +81,12 @@ class StaticMeasurement {
     double residual_fraction = 0;
   };
 
-  void restart();
+  void restart() {
+    since_.reset();
+    counted_ = {};
+    sum_ = {};
+    for (Alone& tag : alone_) tag.sum = {};
+  }
   bool changed(const Sample& sample) const;
   void note_picture(const Frame& frame);
 

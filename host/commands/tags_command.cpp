@@ -1,5 +1,4 @@
 // `tagwrench tags`: sheets of tags and boards to print.
-#include <fmt/format.h>
 
 #include <cmath>
 #include <optional>

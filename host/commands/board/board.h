@@ -32,13 +32,10 @@ struct BoardOptions : BoardSetup {
   bool dry_run = false;
 };
 
-int board_info(const BoardOptions& options);
 int board_watch(const BoardOptions& options);
 int board_log(const BoardOptions& options);
 int board_optoforce(const BoardOptions& options);
-int board_led(const BoardOptions& options);
 int board_tare(const BoardOptions& options);
 int board_calibrate_cell(const BoardOptions& options);
-int board_flash(const BoardOptions& options);
 
 }  // namespace tagwrench

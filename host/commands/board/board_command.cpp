@@ -9,14 +9,16 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "host/app/board/board_loop.h"
 #include "host/board/cell_calibration.h"
@@ -27,6 +29,8 @@
 #include "host/core/config_error.h"
 #include "host/core/json/json_text.h"
 #include "host/core/log.h"
+#include "host/core/os/uninterrupted.h"
+#include "host/core/parse.h"
 #include "host/output/line_outputs.h"
 
 extern char** environ;
@@ -267,12 +271,10 @@ HexRecord hex_record(std::string_view line) {
   unsigned sum = 0;
   std::array<unsigned, 4> head{};
   for (std::size_t i = 0; i < line.size() / 2; ++i) {
-    unsigned byte = 0;
-    const char* digits = line.data() + 1 + 2 * i;
-    const auto [end, error] = std::from_chars(digits, digits + 2, byte, 16);
-    if (error != std::errc{} || end != digits + 2) return HexRecord::wrong;
-    if (i < head.size()) head[i] = byte;
-    sum += byte;
+    const auto byte = parse_whole<unsigned>(line.substr(1 + 2 * i, 2), 16);
+    if (!byte) return HexRecord::wrong;
+    if (i < head.size()) head[i] = *byte;
+    sum += *byte;
   }
   if (sum % 256 != 0 || line.size() != 11 + 2 * head[0]) return HexRecord::wrong;
   return head[3] == 1 ? HexRecord::end : HexRecord::data;
@@ -340,9 +342,74 @@ int run_program(std::vector<std::string> arguments) {
     throw ConfigError("board flash: avrdude cannot be started: {}; try again",
                       std::strerror(failed));
   int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
+  uninterrupted([&] { return ::waitpid(child, &status, 0); });
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
+}
+
+int board_info(const BoardOptions& options) {
+  BoardLoop loop(options.port, session_options(options));
+  if (!loop.settle()) return 0;
+  print_data(options.json ? as_json(loop.session(), loop.link().port())
+                          : for_people(loop.session(), loop.link().port()));
+  return 0;
+}
+
+int board_led(const BoardOptions& options) {
+  Light light = light_of(options);
+  BoardLoop loop(options.port, session_options(options));
+  if (!loop.settle()) return 0;
+  if (loop.session().has_capabilities()) check_limits(light.led, loop.session().capabilities());
+  if (light.led.period_us > 0) light.led.start_us = start_of(light, loop.session().clock());
+  loop.session().set_led(light.led);
+  loop.link().send();
+
+  const bool stays = light.led.mode != link::LedMode::off;
+  bool told = false;
+  const TimePoint begin = std::chrono::steady_clock::now();
+  while (loop.turn(begin + (stays ? std::chrono::hours(24 * 365) : milliseconds(300)))) {
+    if (loop.led_refused()) return 2;
+    if (!stays && std::chrono::steady_clock::now() - begin > milliseconds(300)) return 0;
+    if (stays && !told && loop.session().led_accepted()) {
+      told = true;
+      log_info("the light stays until Ctrl-C");
+    }
+  }
+  loop.session().set_led(link::Led{});
+  loop.link().send();
+  return 0;
+}
+
+int board_flash(const BoardOptions& options) {
+  const std::string image = options.image.empty() ? find_image() : options.image;
+  check_image(image);
+  const std::string port = flash_port(options);
+  const std::vector<std::string> arguments = avrdude_arguments(options, port, image);
+  if (options.dry_run) {
+    print_data(fmt::format("{}\n", fmt::join(arguments, " ")));
+    return 0;
+  }
+  { const link::SerialPort free(port, link::kBaud); }  // or it says what is the matter
+  log_info("running {}", fmt::join(arguments, " "));
+  if (const int status = run_program(arguments); status != 0) {
+    log_info(
+        "board flash: avrdude failed ({}); is it a {} with an ATmega328P? A Nano with the old boot "
+        "loader is --board nano-old",
+        status, options.model);
+    return 1;
+  }
+  BoardLoop loop(port, session_options(options));
+  if (!loop.connect()) return 0;
+  const link::Hello& hello = loop.session().hello();
+  if (options.image.empty() && std::string(hello.firmware) != TAGWRENCH_VERSION) {
+    log_info(
+        "board flash: the board says firmware {} after {} was written; check the image and try "
+        "again",
+        hello.firmware, TAGWRENCH_VERSION);
+    return 1;
+  }
+  log_info("the board answers: {}, firmware {}, protocol {}.{}", hello.board, hello.firmware,
+           hello.protocol_major, hello.protocol_minor);
+  return 0;
 }
 
 }  // namespace
@@ -419,72 +486,6 @@ void board_command(command_line::Command program) {
   optoforce.add_option("--filter", o.force_filter, "Hz: 500, 150, 50, 15, 5, 1.5 or 0 for none");
   optoforce.add_flag("--zero", o.force_zero, "what it shows now is zero");
   add_lines(optoforce, o, "one line of JSON per sample");
-}
-
-int board_info(const BoardOptions& options) {
-  BoardLoop loop(options.port, session_options(options));
-  if (!loop.settle()) return 0;
-  print_data(options.json ? as_json(loop.session(), loop.link().port())
-                          : for_people(loop.session(), loop.link().port()));
-  return 0;
-}
-
-int board_led(const BoardOptions& options) {
-  Light light = light_of(options);
-  BoardLoop loop(options.port, session_options(options));
-  if (!loop.settle()) return 0;
-  if (loop.session().has_capabilities()) check_limits(light.led, loop.session().capabilities());
-  if (light.led.period_us > 0) light.led.start_us = start_of(light, loop.session().clock());
-  loop.session().set_led(light.led);
-  loop.link().send();
-
-  const bool stays = light.led.mode != link::LedMode::off;
-  bool told = false;
-  const TimePoint begin = std::chrono::steady_clock::now();
-  while (loop.turn(begin + (stays ? std::chrono::hours(24 * 365) : milliseconds(300)))) {
-    if (loop.led_refused()) return 2;
-    if (!stays && std::chrono::steady_clock::now() - begin > milliseconds(300)) return 0;
-    if (stays && !told && loop.session().led_accepted()) {
-      told = true;
-      log_info("the light stays until Ctrl-C");
-    }
-  }
-  loop.session().set_led(link::Led{});
-  loop.link().send();
-  return 0;
-}
-
-int board_flash(const BoardOptions& options) {
-  const std::string image = options.image.empty() ? find_image() : options.image;
-  check_image(image);
-  const std::string port = flash_port(options);
-  const std::vector<std::string> arguments = avrdude_arguments(options, port, image);
-  if (options.dry_run) {
-    print_data(fmt::format("{}\n", fmt::join(arguments, " ")));
-    return 0;
-  }
-  { const link::SerialPort free(port, link::kBaud); }  // or it says what is the matter
-  log_info("running {}", fmt::join(arguments, " "));
-  if (const int status = run_program(arguments); status != 0) {
-    log_info(
-        "board flash: avrdude failed ({}); is it a {} with an ATmega328P? A Nano with the old boot "
-        "loader is --board nano-old",
-        status, options.model);
-    return 1;
-  }
-  BoardLoop loop(port, session_options(options));
-  if (!loop.connect()) return 0;
-  const link::Hello& hello = loop.session().hello();
-  if (options.image.empty() && std::string(hello.firmware) != TAGWRENCH_VERSION) {
-    log_info(
-        "board flash: the board says firmware {} after {} was written; check the image and try "
-        "again",
-        hello.firmware, TAGWRENCH_VERSION);
-    return 1;
-  }
-  log_info("the board answers: {}, firmware {}, protocol {}.{}", hello.board, hello.firmware,
-           hello.protocol_major, hello.protocol_minor);
-  return 0;
 }
 
 }  // namespace tagwrench

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <optional>
@@ -60,8 +59,7 @@ void drop_samples(link::BoardSession& session) {
   }
 }
 
-/// Until all cells of the mask have converted (true), or a signal came (false). Throws ConfigError
-/// for one that does not.
+/// Until all cells of the mask have converted; false: a signal. Throws ConfigError for a mute one.
 bool wait_for_cells(BoardLoop& loop, unsigned mask) {
   const TimePoint end = clock_now() + kFirstConversion;
   for (;;) {

@@ -13,9 +13,7 @@
 
 #include "host/app/board/board_loop.h"
 #include "host/board/optoforce.h"
-#include "host/commands/board/board.h"
 #include "host/core/config_error.h"
-#include "host/source/simulator/bench.h"
 
 namespace tagwrench {
 namespace {
@@ -30,7 +28,7 @@ class BoardCell final : public Reference {
  public:
   BoardCell(const ReferenceInstrumentOptions& options, int channel,
             const sim::Bench* bench = nullptr, TimePoint start = {})
-      : options_(board_options(options)),
+      : options_{.port = options.board == "auto" ? "" : options.board, .cells_file = options.cells},
         loop_(options_.port, session_options(options_), "--board"),
         channel_(static_cast<std::size_t>(channel)) {
     check_cells_file(options_);
@@ -77,14 +75,7 @@ class BoardCell final : public Reference {
   std::string trouble() override { return {}; }  // the loop says its own
 
  private:
-  static BoardOptions board_options(const ReferenceInstrumentOptions& options) {
-    BoardOptions out;
-    out.port = options.board == "auto" ? "" : options.board;
-    out.cells_file = options.cells;
-    return out;
-  }
-
-  BoardOptions options_;
+  BoardSetup options_;
   BoardLoop loop_;
   std::size_t channel_;
   link::CellCalibration cell_;
@@ -145,8 +136,7 @@ class Simulated final : public Reference {
     if (!instrument_.next(said)) return false;
     reading = {};
     reading.axes = said.axes;
-    reading.time =
-        start_ + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(said.time));
+    reading.time = start_ + in_seconds(said.time);
     reading.value = said.value;
     reading.sigma = said.sigma;
     reading.saturated = said.saturated;

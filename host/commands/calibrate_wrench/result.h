@@ -1,5 +1,4 @@
-// What a calibration leaves: its progress while it is stopped, the files of the fit, and a table
-// for people.
+// What a calibration leaves: progress while it is stopped, files of the fit, a table for people.
 #pragma once
 
 #include <algorithm>
@@ -39,8 +38,7 @@ struct ProgressOf {
 void save_progress(const std::filesystem::path& path, const ProgressOf& of,
                    const Progress& progress);
 
-/// Throws ConfigError if it cannot be read, is not such a file, or belongs to another plan or
-/// another sensor.
+/// Throws ConfigError: it cannot be read, is no such file, or belongs to another plan or sensor.
 Progress load_progress(const std::filesystem::path& path, const ProgressOf& of,
                        const WrenchPlan& plan);
 

@@ -11,8 +11,6 @@
 #include <cmath>
 #include <utility>
 
-#include "host/calibration/wrench/guide.h"
-#include "host/commands/calibrate_wrench/result.h"
 #include "host/commands/calibrate_wrench/simulated_person.h"
 #include "host/core/command_line/command_line.h"
 #include "host/core/config_error.h"

@@ -3,6 +3,7 @@
 // the frames of such a recording through the tracker, the same stretches of them.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -78,8 +79,7 @@ struct AcceptedStep {
   std::int64_t id = 0;     ///< of the acceptance: later readings were not known by then
 };
 
-/// In the order in which they were accepted. Throws ConfigError: there are none, or they do not fit
-/// the plan.
+/// In the order of acceptance. Throws ConfigError: there are none, or they do not fit the plan.
 std::vector<AcceptedStep> accepted_steps(record::RecordingReader& recording,
                                          const WrenchPlan& plan);
 
