@@ -29,7 +29,7 @@
 #include "host/motion/profile_config.h"
 #include "host/output/spnav_daemon.h"
 #include "host/output/watchdog.h"
-#include "host/source/simulator/folder_export.h"
+#include "host/source/simulator/simulator_source.h"
 #include "host/tools/packaging/man_page.h"
 #include "host/tools/reading/reader.h"
 

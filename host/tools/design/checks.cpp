@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "host/tools/design/geometry.h"
-#include "host/tracker/squares.h"
+#include "host/tracker/acquire.h"
 
 namespace tagwrench::hardware {
 namespace {

@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "host/core/algebra/decompositions.h"
+#include "host/tracker/acquire.h"
 #include "host/tracker/rotation.h"
-#include "host/tracker/squares.h"
 
 namespace tagwrench::hardware {
 namespace {
