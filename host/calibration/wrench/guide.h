@@ -140,7 +140,7 @@ class WrenchGuide {
   std::optional<double> steady_since_;    ///< s, of the hold that is watched
 };
 
-/// "Fx 92 %  Fy 90 % ..." as a bar of five per axis.
+/// "Fx ##### Fy ##... ...": five marks per axis, # for the share of covered() that is reached.
 std::string coverage_bar(const WrenchCoverage& coverage);
 
 }  // namespace tagwrench

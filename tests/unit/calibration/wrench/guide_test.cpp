@@ -273,5 +273,18 @@ TEST(WrenchGuide, WhatWasLostFromSightIsNotSteady) {
   EXPECT_TRUE(guide.records().empty());
 }
 
+TEST(CoverageBar, HasFiveMarksPerAxisAndFillsThemByWhatIsMeasured) {
+  WrenchCoverage coverage(paper_range());
+  EXPECT_EQ(coverage_bar(coverage), "Fx ..... Fy ..... Fz ..... Mx ..... My ..... Mz .....");
+  KnownLoad load;  // full load along x, known well: sigma about 0.02 of it, 93 % of the prior's 0.3
+  load.wrench[0] = paper_range()[0];
+  coverage.add(load);
+  // Along z so poorly that a sigma of 0.18 is left: 40 %. 1/0.18^2 - 1/0.3^2 = 1/0.0506.
+  load.wrench = Vector6::Unit(2) * paper_range()[2];
+  load.covariance(2, 2) = 6 * 0.0506 * paper_range()[2] * paper_range()[2];  // N^2; a mean of six
+  coverage.add(load);
+  EXPECT_EQ(coverage_bar(coverage), "Fx ##### Fy ..... Fz ##... Mx ..... My ..... Mz .....");
+}
+
 }  // namespace
 }  // namespace tagwrench::test
