@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "host/app/input.h"
+#include "host/calibration/camera/collect.h"
 #include "host/calibration/camera/fit.h"
 #include "host/calibration/print/board_spec.h"
 #include "host/commands/commands.h"

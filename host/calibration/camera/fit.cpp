@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <numeric>
 #include <opencv2/calib3d.hpp>
@@ -214,14 +213,6 @@ CameraFit result(const Solution& s, const std::vector<Points>& all,
   return fit;
 }
 
-constexpr int kMinCorners = 6;                         // in a region
-constexpr double kTilt = 20 * std::numbers::pi / 180;  // asked for, each way
-constexpr double kDistanceRatio = 1.2;                 // farthest to nearest
-constexpr std::array<const char*, 9> kRegions = {"top left",    "top",    "top right",
-                                                 "left",        "middle", "right",
-                                                 "bottom left", "bottom", "bottom right"};
-constexpr std::array<const char*, 4> kEdges = {"left", "right", "top", "bottom"};
-
 constexpr int kMinRegions = 6;         // of nine
 constexpr double kMinSpan = 0.6;       // of width and height
 constexpr double kMinTilt = 12;        // degrees
@@ -248,13 +239,6 @@ bool monotonic(const CameraModel& camera) {
   }
   return true;
 }
-
-constexpr double kAlike = 0.015;  // of the image's width: mean motion of the corners
-constexpr double kStill = 0.001;  // of the image's width, between two frames
-constexpr int kStillFrames = 2;   // in a row
-constexpr std::size_t kMaxUndetected = 5;
-constexpr std::size_t kMaxViews = 500;  // held; memory must end
-constexpr std::size_t kMinShared = 6;
 
 }  // namespace
 
@@ -299,51 +283,6 @@ std::vector<BoardPose> rough_poses(const std::vector<CameraView>& views, int wid
     out.assign(views.size(), BoardPose{});
   }
   return out;
-}
-
-void Coverage::add(const std::vector<BoardCorner>& corners, const BoardPose& pose) {
-  for (const BoardCorner& corner : corners) {
-    const int column = std::clamp(static_cast<int>(3 * (corner.pixel.x() + 0.5) / width_), 0, 2);
-    const int row = std::clamp(static_cast<int>(3 * (corner.pixel.y() + 0.5) / height_), 0, 2);
-    ++corners_[3 * row + column];
-    corners_box_.extend(corner.pixel);
-  }
-  // Where the normal leans to x, the plane comes nearer there.
-  const Eigen::Vector3d& n = pose.normal;
-  const double x = std::atan2(n.x(), n.z()), y = std::atan2(n.y(), n.z());
-  tilted_[0] |= x <= -kTilt;
-  tilted_[1] |= x >= kTilt;
-  tilted_[2] |= y <= -kTilt;
-  tilted_[3] |= y >= kTilt;
-  largest_tilt_ = std::max(largest_tilt_, std::acos(std::clamp(n.z(), -1.0, 1.0)));
-  nearest_ = nearest_ == 0 ? pose.distance : std::min(nearest_, pose.distance);
-  farthest_ = std::max(farthest_, pose.distance);
-}
-
-std::vector<std::string> Coverage::missing_regions() const {
-  std::vector<std::string> out;
-  for (std::size_t i = 0; i < corners_.size(); ++i)
-    if (corners_[i] < kMinCorners) out.emplace_back(kRegions[i]);
-  return out;
-}
-
-std::vector<std::string> Coverage::missing() const {
-  std::vector<std::string> out;
-  if (const std::vector<std::string> regions = missing_regions(); !regions.empty())
-    out.push_back("the board at the " + listed(regions) + " of the picture");
-  std::vector<std::string> edges;
-  for (std::size_t i = 0; i < tilted_.size(); ++i)
-    if (!tilted_[i]) edges.emplace_back(kEdges[i]);
-  if (!edges.empty())
-    out.push_back("its " + listed(edges) + " edge tilted 20 degrees or more toward the lens");
-  if (farthest_ < kDistanceRatio * nearest_)
-    out.emplace_back("the board a fifth nearer or farther, as far as it stays sharp");
-  return out;
-}
-
-double Coverage::span() const {
-  if (corners_box_.isEmpty()) return 0;
-  return corners_box_.sizes().cwiseQuotient(Eigen::Vector2d(width_, height_)).minCoeff();
 }
 
 void check_views(const std::vector<CameraView>& views, const Coverage& coverage) {
@@ -401,122 +340,6 @@ void check_fit(const CameraFit& fit, const Coverage& coverage) {
     throw ConfigError(
         "the distortion found folds the image's corners over: show the board in the corners of the "
         "image too");
-  }
-}
-
-double difference_px(const std::vector<BoardCorner>& a, const std::vector<BoardCorner>& b) {
-  double sum = 0;
-  std::size_t shared = 0;
-  for (const BoardCorner& p : a) {
-    for (const BoardCorner& q : b) {
-      if ((p.board - q.board).squaredNorm() > 0.01) continue;
-      sum += (p.pixel - q.pixel).norm();
-      ++shared;
-    }
-  }
-  if (shared < std::min({kMinShared, a.size(), b.size()}) || shared == 0)
-    return std::numeric_limits<double>::max();
-  return sum / static_cast<double>(shared);
-}
-
-ViewCollector::ViewCollector(const BoardSpec& board, const CameraModel& camera, bool live)
-    : board_(board), camera_(camera), live_(live), finder_(board, camera.mirrored) {}
-
-void ViewCollector::keep(const ImageView& image) {
-  if (undetected_.size() >= kMaxUndetected) return;
-  std::vector<std::uint8_t>& copy = undetected_.emplace_back();
-  for (int y = 0; y < image.height; ++y) {
-    const std::uint8_t* row = image.pixels + static_cast<std::ptrdiff_t>(y) * image.stride;
-    copy.insert(copy.end(), row, row + image.width);
-  }
-}
-
-ViewResult ViewCollector::look(const ImageView& image, const std::string& name) {
-  const bool mirrored_before = finder_.mirrored();
-  BoardSighting sighting = finder_.find(image);
-  if (finder_.mirrored() != mirrored_before) previous_.clear();
-  last_look_ = sighting.look;
-  ++looks_[sighting.look];
-  ++looked_;
-  if (sighting.look == BoardView::no_board || sighting.look == BoardView::other_board) keep(image);
-  if (sighting.look != BoardView::board) return ViewResult::no;
-  if (live_) {
-    const bool still = difference_px(previous_, sighting.corners) < kStill * camera_.width_px;
-    still_frames_ = still ? still_frames_ + 1 : 0;
-    previous_ = sighting.corners;
-    if (still_frames_ < kStillFrames) return ViewResult::moving;
-  }
-  const auto alike = [&](const CameraView& view) {
-    return difference_px(view.corners, sighting.corners) < kAlike * camera_.width_px;
-  };
-  if (std::any_of(views_.begin(), views_.end(), alike)) {
-    ++alike_;
-    return ViewResult::alike;
-  }
-  if (views_.size() < kMaxViews)
-    views_.push_back({name, std::move(sighting.corners), sighting.corner_view.blur_px});
-  return ViewResult::yes;
-}
-
-Coverage ViewCollector::coverage() const {
-  const std::vector<BoardPose> poses =
-      rough_poses(views_, camera_.width_px, camera_.height_px, camera_.fx_px);
-  Coverage coverage(camera_.width_px, camera_.height_px);
-  for (std::size_t i = 0; i < views_.size(); ++i) coverage.add(views_[i].corners, poses[i]);
-  return coverage;
-}
-
-void ViewCollector::thin_out(int most) {
-  const auto count = static_cast<std::size_t>(std::max(1, most));
-  if (views_.size() <= count) return;
-  // Farthest point first: the next view is the one least like any that is in.
-  std::vector<double> to_chosen(views_.size(), std::numeric_limits<double>::max());
-  std::vector<bool> chosen(views_.size(), false);
-  std::size_t next = 0;
-  for (std::size_t n = 0; n < count; ++n) {
-    chosen[next] = true;
-    for (std::size_t i = 0; i < views_.size(); ++i)
-      to_chosen[i] = std::min(to_chosen[i], difference_px(views_[i].corners, views_[next].corners));
-    next = 0;
-    for (std::size_t i = 0; i < views_.size(); ++i)
-      if (!chosen[i] && (chosen[next] || to_chosen[i] > to_chosen[next])) next = i;
-  }
-  std::vector<CameraView> left;
-  for (std::size_t i = 0; i < views_.size(); ++i)
-    if (chosen[i]) left.push_back(std::move(views_[i]));
-  views_ = std::move(left);
-}
-
-void ViewCollector::check() const {
-  const std::string asked = describe(board_);
-  const auto found = looks_.find(BoardView::board);
-  const int count = found == looks_.end() ? 0 : found->second;
-  // Part of a checkerboard may pass for a smaller one here and there.
-  if (static_cast<int>(views_.size()) < kMinCameraViews) {
-    std::vector<ImageView> images;
-    for (const auto& pixels : undetected_)
-      images.push_back({pixels.data(), camera_.width_px, camera_.height_px, camera_.width_px});
-    if (const std::string guess = guess_board(images, board_); !guess.empty()) {
-      throw ConfigError(
-          "--board {}: found in {} of {} images; the board in the others looks like {}: correct "
-          "--board, or show all of it",
-          asked, count, looked_, guess);
-    }
-  }
-  if (count == 0) {
-    std::vector<std::string> seen;
-    for (const auto& [look, images] : looks_)
-      if (look != BoardView::board) seen.push_back(fmt::format("{} {}", images, words(look)));
-    throw ConfigError(
-        "--board {}: no usable view of it ({}); light it evenly, hold it sharp and whole in view, "
-        "and check --board",
-        asked, looked_ == 0 ? "no image" : "images: " + listed(seen));
-  }
-  if (views_.size() < 3 && alike_ > 0) {
-    throw ConfigError(
-        "all {} images with the board show it in the same pose: move it about and tilt it between "
-        "views",
-        count);
   }
 }
 

@@ -1,18 +1,16 @@
 // Room calibration/camera: pictures of a printed board -> the lens.
 // In:  corners of the board, px of the camera's picture; the board's squares, m.
 // Out: CameraModel: focal lengths and centre in px, OpenCV's distortion, with standard deviations.
-// Then: board.h (finds the board).
+// Then: board.h (finds the board), collect.h (takes the views), coverage.h (what they show).
 // Uses OpenCV inside.
 #pragma once
 
-#include <Eigen/Geometry>
 #include <array>
-#include <cstdint>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "host/calibration/camera/board.h"
+#include "host/calibration/camera/coverage.h"
 #include "host/tracker/camera_model.h"
 
 namespace tagwrench {
@@ -25,13 +23,6 @@ struct CameraView {
   std::string name;  ///< of the image, for people
   std::vector<BoardCorner> corners;
   double blur_px = 0;
-};
-
-/// Where the board was in one view, as far as the camera is known.
-struct BoardPose {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< of the board, away from the lens, camera
-                                                      ///< axes
-  double distance = 1;                                ///< of its middle, in squares
 };
 
 /// A view in the light of the fit.
@@ -47,34 +38,6 @@ struct CameraFit {
   double rms_px = 0;              ///< of all corners of the views used
   int used = 0;
   std::vector<FittedView> views;  ///< in the order of the input
-};
-
-/// Which parts of a camera calibration's evidence are there, and which are missing: regions of the
-/// image, tilts of the board, distances.
-class Coverage {
- public:
-  Coverage(int width_px, int height_px) : width_(width_px), height_(height_px) {}
-
-  /// One view's corners, and its pose.
-  void add(const std::vector<BoardCorner>& corners, const BoardPose& pose);
-
-  /// Of the 3 x 3 regions of the image those that hold corners.
-  int regions() const { return 9 - static_cast<int>(missing_regions().size()); }
-  /// What to show next, for people; empty when nothing is missing.
-  std::vector<std::string> missing() const;
-  /// The regions alone: "top left", "bottom".
-  std::vector<std::string> missing_regions() const;
-  /// Largest angle between the board's normal and the optical axis, rad.
-  double largest_tilt() const { return largest_tilt_; }
-  /// Part of the image's width and height that corners span, the smaller of both.
-  double span() const;
-
- private:
-  int width_, height_;
-  std::array<int, 9> corners_{};  ///< per region, reading order
-  std::array<bool, 4> tilted_{};  ///< left, right, top, bottom edge nearer to the lens
-  double largest_tilt_ = 0, nearest_ = 0, farthest_ = 0;
-  Eigen::AlignedBox2d corners_box_;  ///< px
 };
 
 /// Least squares on the reprojection error (OpenCV's calibrateCamera, after Zhang, "A flexible new
@@ -93,59 +56,5 @@ std::vector<BoardPose> rough_poses(const std::vector<CameraView>& views, int wid
 /// before (views) or after (fit) it is tried.
 void check_views(const std::vector<CameraView>& views, const Coverage& coverage);
 void check_fit(const CameraFit& fit, const Coverage& coverage);
-
-// Takes views of the board by itself: when it is held still, sharp, and differs from those before.
-
-enum class ViewResult : std::uint8_t {
-  yes,
-  moving,  ///< live only
-  alike,   ///< as an earlier view
-  no,      ///< see the look
-};
-
-class ViewCollector {
- public:
-  /// `camera`: as sensor.yaml knows it so far. `live`: the frames are moments of one movement, and
-  /// the board must rest for a view; else each image stands for itself.
-  ViewCollector(const BoardSpec& board, const CameraModel& camera, bool live);
-
-  /// `name` of the image, for people.
-  ViewResult look(const ImageView& image, const std::string& name);
-
-  const std::vector<CameraView>& views() const { return views_; }
-  /// Of the image shown last.
-  BoardView last_look() const { return last_look_; }
-  bool mirrored() const { return finder_.mirrored(); }
-  /// Of the last live image in which the board was found, flipped back if mirrored.
-  const std::vector<BoardCorner>& last_corners() const { return previous_; }
-  /// As given.
-  const CameraModel& camera() const { return camera_; }
-  /// Poses through what is known of the lens by now.
-  Coverage coverage() const;
-
-  /// Leaves at most so many, those that differ most from each other.
-  void thin_out(int most);
-
-  /// Throws ConfigError with the reason where no view, another board, or only one pose was found.
-  void check() const;
-
- private:
-  void keep(const ImageView& image);
-
-  BoardSpec board_;
-  CameraModel camera_;
-  bool live_;
-  BoardFinder finder_;
-  std::vector<CameraView> views_;
-  std::vector<BoardCorner> previous_;
-  int still_frames_ = 0;
-  BoardView last_look_ = BoardView::no_board;
-  std::map<BoardView, int> looks_;
-  int looked_ = 0, alike_ = 0;
-  std::vector<std::vector<std::uint8_t>> undetected_;  ///< images in which the board was not found
-};
-
-/// Mean distance of the corners that both show (px); a large number if they share too few.
-double difference_px(const std::vector<BoardCorner>& a, const std::vector<BoardCorner>& b);
 
 }  // namespace tagwrench

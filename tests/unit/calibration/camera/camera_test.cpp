@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "host/calibration/camera/collect.h"
 #include "host/calibration/camera/fit.h"
 #include "host/core/config_error.h"
 #include "host/core/count_text.h"
