@@ -96,30 +96,46 @@ std::vector<std::string> picture_names(const std::string& dir) {
   return names;
 }
 
-ImageSize size_of(const std::string& path, std::vector<char>& scratch) {
+/// Empty: the header cannot be read.
+std::optional<ImageSize> size_of(const std::string& path, std::vector<char>& scratch) {
   std::ifstream file(path, std::ios::binary);
   scratch.resize(kHeaderBytes);
   file.read(scratch.data(), static_cast<std::streamsize>(scratch.size()));
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(scratch.data());
-  const auto size = image_size({bytes, static_cast<std::size_t>(file.gcount())});
-  if (!size) {
-    throw ConfigError("{}: is not a readable PNG, PGM or JPEG file; remove it or record it again",
-                      path);
-  }
-  return *size;
+  return image_size({bytes, static_cast<std::size_t>(file.gcount())});
 }
 
-ImageSize common_size(const std::vector<std::string>& paths) {
-  std::vector<char> scratch;
-  const ImageSize first = size_of(paths.front(), scratch);
-  for (const std::string& path : paths) {
-    const ImageSize size = size_of(path, scratch);
-    if (size == first) continue;
+ImageSize size_of_all(const std::vector<OddPicture>& pictures) {
+  const OddPicture& first = pictures.front();
+  for (const OddPicture& picture : pictures) {
+    if (!picture.size) {
+      throw ConfigError("{}: is not a readable PNG, PGM or JPEG file; remove it or record it again",
+                        picture.path);
+    }
+    if (picture.size == first.size) continue;
     throw ConfigError(
-        "{}: is {}x{}, but {} is {}x{}; a folder must hold pictures of one camera and size", path,
-        size.width, size.height, paths.front(), first.width, first.height);
+        "{}: is {}x{}, but {} is {}x{}; a folder must hold pictures of one camera and size",
+        picture.path, picture.size->width, picture.size->height, first.path, first.size->width,
+        first.size->height);
   }
-  return first;
+  return *first.size;
+}
+
+/// The first of them where several sizes are as frequent.
+ImageSize size_of_most(const std::vector<OddPicture>& pictures, const std::string& dir) {
+  std::optional<ImageSize> best;
+  std::ptrdiff_t most = 0;
+  for (const OddPicture& picture : pictures) {
+    const auto alike =
+        std::count_if(pictures.begin(), pictures.end(),
+                      [&](const OddPicture& other) { return other.size == picture.size; });
+    if (!picture.size || alike <= most) continue;
+    most = alike;
+    best = picture.size;
+  }
+  if (!best)
+    throw ConfigError("images:{}: none of its pictures can be read; record them again", dir);
+  return *best;
 }
 
 std::vector<Duration> frame_times(const std::string& dir, const std::vector<std::string>& names) {
@@ -170,11 +186,24 @@ std::vector<Duration> parse_frame_times(std::string_view text, const std::string
   return times;
 }
 
-ImagesSource::ImagesSource(const std::string& dir, bool fast) {
+ImagesSource::ImagesSource(const std::string& dir, bool fast, OddPictures odd) {
   const std::vector<std::string> names = picture_names(dir);
-  for (const std::string& name : names) paths_.push_back((fs::path(dir) / name).string());
-  const ImageSize size = common_size(paths_);
-  times_ = frame_times(dir, names);
+  std::vector<OddPicture> all;
+  std::vector<char> scratch;
+  for (const std::string& name : names) {
+    const std::string path = (fs::path(dir) / name).string();
+    all.push_back({path, size_of(path, scratch)});
+  }
+  const ImageSize size = odd == OddPictures::refuse ? size_of_all(all) : size_of_most(all, dir);
+  const std::vector<Duration> times = frame_times(dir, names);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].size != size) {
+      odd_.push_back(all[i]);
+      continue;
+    }
+    paths_.push_back(all[i].path);
+    times_.push_back(times[i]);
+  }
   format_.width = size.width;
   format_.height = size.height;
   decoder_ = std::make_unique<RawDecoder>(size.width, size.height);

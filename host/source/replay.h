@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -29,12 +30,22 @@ namespace tagwrench {
 std::vector<Duration> parse_frame_times(std::string_view text, const std::string& source,
                                         std::span<const std::string> files);
 
+/// What a folder does with a picture whose header cannot be read, or of another size.
+enum class OddPictures : std::uint8_t {
+  refuse,
+  set_aside,  ///< the size is that of most of them
+};
+
+struct OddPicture {
+  std::string path;
+  std::optional<ImageSize> size;  ///< none: its header cannot be read
+};
+
 class ImagesSource final : public FrameSource {
  public:
   /// Times come from DIR/frames.csv where there is one, else 25 frames a second. Throws
-  /// ConfigError: no folder, no pictures, an unreadable header, sizes that differ, a bad
-  /// frames.csv.
-  ImagesSource(const std::string& dir, bool fast);
+  /// ConfigError: no folder, no pictures, odd ones that are refused, a bad frames.csv.
+  ImagesSource(const std::string& dir, bool fast, OddPictures odd = OddPictures::refuse);
 
   const SourceFormat& format() const noexcept override { return format_; }
   int poll_fd() const noexcept override { return timer_ ? timer_.get() : -1; }
@@ -45,6 +56,7 @@ class ImagesSource final : public FrameSource {
   RawFrame raw() const noexcept override { return raw_; }
 
   std::size_t count() const noexcept { return paths_.size(); }
+  const std::vector<OddPicture>& set_aside() const noexcept { return odd_; }
   /// The file that a Frame came from, by its sequence.
   const std::string& path_of(std::uint64_t sequence) const { return paths_.at(sequence); }
 
@@ -58,6 +70,7 @@ class ImagesSource final : public FrameSource {
   bool load(const std::string& path, Frame& frame) noexcept;
 
   std::vector<std::string> paths_;
+  std::vector<OddPicture> odd_;
   std::vector<Duration> times_;
   SourceFormat format_;
   UniqueFd timer_;

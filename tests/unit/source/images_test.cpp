@@ -190,6 +190,28 @@ TEST_F(Images, MixedSizesAreRefusedWithBothNames) {
   EXPECT_TRUE(names(refused(), {"a.png", "16x12", "z.pgm", "16x13"}));
 }
 
+TEST_F(Images, OddOnesAreSetAsideWhereThatIsAskedFor) {
+  picture("a.png", 10, 16, 13);
+  picture("b.png", 20);
+  picture("c.png", 30);
+  write("d.png", "this is text");
+  ImagesSource source(dir(), true, OddPictures::set_aside);
+  EXPECT_EQ(source.count(), 2u);
+  EXPECT_EQ(fs::path(source.path_of(0)).filename(), "b.png");
+  EXPECT_EQ(source.format().height, 12);
+  ASSERT_EQ(source.set_aside().size(), 2u);
+  EXPECT_EQ(source.set_aside()[0].size, (ImageSize{16, 13}));
+  EXPECT_EQ(fs::path(source.set_aside()[1].path).filename(), "d.png");
+  EXPECT_FALSE(source.set_aside()[1].size);
+}
+
+TEST_F(Images, AFolderOfOddOnesAloneIsRefused) {
+  write("d.png", "this is text");
+  const std::string said =
+      refusal([&] { ImagesSource source(dir(), true, OddPictures::set_aside); });
+  EXPECT_TRUE(names(said, {dir().c_str(), "none of its pictures can be read"}));
+}
+
 TEST_F(Images, AnUnreadablePictureIsRefused) {
   picture("a.png", 10);
   write("b.png", "this is text");
