@@ -84,9 +84,9 @@ BoardView judge(const cv::Mat& image) {
 
 BoardView judge(const RefinedCorners& refined, std::size_t fewest) {
   const CornerView& look = refined.look;
-  if (refined.corners.size() < fewest) return BoardView::part;
+  if (refined.corners.size() < fewest)
+    return look.clipped_fraction > kClippedCorners ? BoardView::saturated : BoardView::part;
   if (look.contrast < kLowContrast) return BoardView::dark;
-  if (look.clipped_fraction > kClippedCorners) return BoardView::saturated;
   if (look.blur_px > std::min(kMaxBlur_px, kBlurFraction * look.spacing_px))
     return BoardView::blurred;
   return BoardView::board;
@@ -241,8 +241,11 @@ struct BoardFinder::Detector {
   std::optional<BoardSighting> checkerboard(const cv::Mat& image) const {
     const cv::Size inner(spec.columns - 1, spec.rows - 1);
     std::vector<cv::Point2f> found;
+    // Each finds boards that the other misses; which of them it was does not move the corners.
     if (!cv::findChessboardCornersSB(image, inner, found,
-                                     cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY))
+                                     cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY) &&
+        !cv::findChessboardCorners(image, inner, found,
+                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ADAPTIVE_THRESH))
       return std::nullopt;
     return sighting(image, on_grid(found, inner.width, 1));
   }

@@ -24,7 +24,7 @@ struct CornerView {
   double blur_px = 0;           ///< median standard deviation of the edges' spread
   double spacing_px = 0;        ///< median distance between neighbours
   double contrast = 0;          ///< median of white minus black, grey levels
-  double clipped_fraction = 0;  ///< part of the corners whose white is at the top of the grey scale
+  double clipped_fraction = 0;  ///< part of all corners, whose white is at the grey scale's top
 };
 
 struct RefinedCorners {
@@ -43,20 +43,23 @@ struct SquareFill {
 ///   m + g . d + a (E(u) E(v) - 2 P(u - gap) P(v - gap) - 2 P(-u - gap) P(-v - gap))
 /// with u, v the distances (px) from the two edges that cross there, E(u) = erf(u / (sqrt(2) s)),
 /// P = (1 + E) / 2; the last two terms are the markers' nearest corners, where there are markers.
-/// Blur, contrast and shading are fitted along, so they do not move the corner. A corner is left
-/// out when it lies within its blur of the border, has no neighbours to tell the edges' directions,
-/// stands off its neighbours' grid, or does not look like a crossing.
+/// Blur, contrast and shading are fitted along, so they do not move the corner. Where white is cut
+/// off at the top of the grey scale, pixels tell only that the model must be there too (a censored
+/// fit: Tobin, "Estimation of relationships for limited dependent variables", Econometrica 26,
+/// 1958): the dark side of every edge still places it. A corner is left out when it lies within its
+/// blur of the border, has no neighbours to tell the edges' directions, stands off its neighbours'
+/// grid, or does not look like a crossing.
 RefinedCorners refine_corners(const ImageView& image, const std::vector<BoardCorner>& rough,
                               const SquareFill& fill);
 
 /// What became of one image.
 enum class BoardView : std::uint8_t {
-  board,        ///< found, sharp and well lit
+  board,        ///< found, sharp enough, and its corners could be placed
   no_board,     ///< nothing like it
   other_board,  ///< markers, but not where this board has them
   part,         ///< too few of its corners
   dark,
-  saturated,
+  saturated,  ///< and therefore its corners cannot be placed
   blurred,
 };
 

@@ -148,6 +148,13 @@ std::vector<Pixel> window(const ImageView& image, const Eigen::Vector2d& centre,
   return pixels;
 }
 
+/// Half of a window is white, and less of it where there are markers.
+bool white_is_cut_off(const std::vector<Pixel>& pixels) {
+  const auto top = std::count_if(pixels.begin(), pixels.end(),
+                                 [](const Pixel& pixel) { return pixel.level >= kWhiteTop; });
+  return static_cast<double>(top) > 0.1 * static_cast<double>(pixels.size());
+}
+
 struct Fit {
   Parameters p;
   double rms = 0;
@@ -161,7 +168,8 @@ std::optional<Fit> fit_corner(const std::vector<Pixel>& pixels, const Eigen::Vec
     FitSums<9> sums;
     for (const Pixel& pixel : pixels) {
       const Model m = model(at, pixel.at, print);
-      sums.add(m.jacobian, pixel.level - m.value);
+      const bool cut_off = m.value >= kWhiteTop && pixel.level >= kWhiteTop;
+      if (!cut_off) sums.add(m.jacobian, pixel.level - m.value);
     }
     return sums;
   };
@@ -190,7 +198,7 @@ Print print_at(const BoardCorner& corner, const LocalGrid& grid, const SquareFil
 
 struct Crossing {
   Eigen::Vector2d pixel;
-  double blur_px, contrast, white;
+  double blur_px, contrast;
 };
 
 std::optional<Crossing> crossing_near(const ImageView& image, const Eigen::Vector2d& start,
@@ -204,7 +212,6 @@ std::optional<Crossing> crossing_near(const ImageView& image, const Eigen::Vecto
   out.pixel = fit->p.head<2>();
   out.blur_px = std::exp(fit->p[4]);
   out.contrast = 2 * std::abs(fit->p[5]);
-  out.white = fit->p[6] + 0.5 * out.contrast;
   const bool plausible = (out.pixel - grid.centre).norm() <= grid.tolerance_px &&
                          inside(image, out.pixel, 3 * out.blur_px) &&
                          out.blur_px < grid.spacing_px() && fit->rms <= kWorstFit * out.contrast;
@@ -217,12 +224,14 @@ RefinedCorners refine_corners(const ImageView& image, const std::vector<BoardCor
                               const SquareFill& fill) {
   RefinedCorners out;
   std::vector<double> blur, spacing, contrast;
-  int clipped = 0;
+  int looked = 0, clipped = 0;
   for (std::size_t i = 0; i < rough.size(); ++i) {
     const std::optional<LocalGrid> grid = local_grid(rough, i);
     if (!grid) continue;
     // A rough corner may have been caught by a marker; then its neighbours know better.
     const Print print = print_at(rough[i], *grid, fill);
+    ++looked;
+    if (white_is_cut_off(window(image, grid->centre, *grid, fill))) ++clipped;
     std::optional<Crossing> crossing = crossing_near(image, rough[i].pixel, *grid, fill, print);
     if (!crossing) crossing = crossing_near(image, grid->centre, *grid, fill, print);
     if (!crossing) continue;
@@ -230,10 +239,9 @@ RefinedCorners refine_corners(const ImageView& image, const std::vector<BoardCor
     blur.push_back(crossing->blur_px);
     spacing.push_back(grid->spacing_px());
     contrast.push_back(crossing->contrast);
-    if (crossing->white >= kWhiteTop) ++clipped;
   }
   out.look = {median(blur), median(spacing), median(contrast),
-              out.corners.empty() ? 0 : clipped / static_cast<double>(out.corners.size())};
+              looked == 0 ? 0 : clipped / static_cast<double>(looked)};
   return out;
 }
 

@@ -267,8 +267,8 @@ TEST(CalibrateCamera, SaysWhyNoViewIsUsable) {
   expect_mentions(refusal(kCharuco, pictures(kCharuco, 3, kTilt, dark)),
                   {"no usable view", "dark"});
   Conditions bright;
-  bright.black = 120;
-  bright.white = 320;
+  bright.black = 250;
+  bright.white = 700;
   expect_mentions(refusal(kCharuco, pictures(kCharuco, 3, kTilt, bright)),
                   {"no usable view", "overexposed"});
   Conditions soft;
@@ -296,34 +296,6 @@ TEST(ViewCollector, ThinsOutTheViewsThatAreMostAlike) {
   collector->thin_out(9);
   EXPECT_EQ(collector->views().size(), 9u);
   EXPECT_EQ(collector->coverage().regions(), 9);
-}
-
-TEST(BoardCorners, AreFoundToAFewHundredthsOfAPixel) {
-  const Lens lens;
-  for (const double blur : {0.7, 1.4, 2.0}) {
-    Conditions conditions;
-    conditions.blur_px = blur;
-    BoardFinder finder(parse_board(kCharuco), false);
-    const Placement p = good_placements(lens, 5, kTilt)[4];
-    const cv::Mat image = renderer(kCharuco).render(p, 7, conditions);
-    const BoardSighting sighting = finder.find(view_of(image));
-    ASSERT_EQ(sighting.look, BoardView::board);
-    ASSERT_GE(sighting.corners.size(), 20u);
-    cv::Matx33d r;
-    cv::Rodrigues(p.rotation, r);
-    double sum = 0;
-    for (const BoardCorner& corner : sighting.corners) {
-      const cv::Vec3d at =
-          r * cv::Vec3d(corner.board.x() - 4.5, corner.board.y() - 3, 0) + p.middle;
-      const cv::Point2d is = lens.project(at[0] / at[2], at[1] / at[2]);
-      sum += std::pow(corner.pixel.x() - is.x, 2) + std::pow(corner.pixel.y() - is.y, 2);
-    }
-    EXPECT_LT(std::sqrt(sum / static_cast<double>(sighting.corners.size())),
-              0.025 * std::max(1.0, blur));
-    EXPECT_NEAR(sighting.corner_view.blur_px, std::hypot(blur, 0.3),
-                0.15);  // px; a pixel adds 0.29
-    EXPECT_NEAR(sighting.corner_view.contrast, conditions.white - conditions.black, 10);
-  }
 }
 
 TEST(Coverage, NamesWhatIsMissing) {
