@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -33,6 +34,7 @@ constexpr int kViewsFromCamera = 20;
 constexpr int kViewsFromFolders = 60;
 constexpr Duration kSayEvery = std::chrono::seconds(2);
 constexpr double kGuessedFocal = 1.25;  // of the image's width
+constexpr double kMuchCutOff = 0.5;     // part of a view's corners
 
 struct CalibrateCameraOptions {
   std::string source;                ///< SRC: a camera or a folder
@@ -128,7 +130,7 @@ std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& opt
   std::vector<std::unique_ptr<ImagesSource>> sources;
   std::size_t all = 0;
   for (const std::string& folder : folders) {
-    sources.push_back(std::make_unique<ImagesSource>(folder, true));
+    sources.push_back(std::make_unique<ImagesSource>(folder, true, OddPictures::set_aside));
     all += sources.back()->count();
     const SourceFormat& first = sources.front()->format();
     const SourceFormat& format = sources.back()->format();
@@ -140,21 +142,36 @@ std::unique_ptr<ViewCollector> look_at_folders(const CalibrateCameraOptions& opt
   }
   auto collector =
       std::make_unique<ViewCollector>(board, camera_for(record, sources.front()->format()), false);
+  // Names are enough within one folder.
+  const auto called = [&](const std::string& path) {
+    return folders.size() > 1 ? path : fs::path(path).filename().string();
+  };
   std::size_t seen = 0;
   TimePoint said = Clock::now();
   for (const auto& source : sources) {
-    for (Frame frame;;) {
+    for (std::uint64_t index = 0;; ++index) {
       if (termination_requested()) return nullptr;
+      Frame frame;
       const ReadStatus status = source->read(frame);
       if (status == ReadStatus::end) break;
       ++seen;
+      const std::string name = called(source->path_of(index));
       if (status == ReadStatus::frame)
-        collector->look(frame.image, source->path_of(frame.sequence));
+        collector->look(frame.image, name);
+      else
+        collector->set_aside({name, Fate::unreadable, {}});
       if (Clock::now() - said < kSayEvery) continue;
       said = Clock::now();
       log_info("{} of {} pictures, {} views", seen, all, collector->views().size());
     }
-    if (const std::string bad = source->unusable(); !bad.empty()) log_info(bad);
+    for (const OddPicture& odd : source->set_aside()) {
+      if (odd.size) {
+        collector->set_aside({called(odd.path), Fate::other_size,
+                              fmt::format("{}x{}", odd.size->width, odd.size->height)});
+      } else {
+        collector->set_aside({called(odd.path), Fate::unreadable, {}});
+      }
+    }
   }
   log_info("{} pictures, {} different views of the board", seen, collector->views().size());
   collector->thin_out(options.views.value_or(kViewsFromFolders));
@@ -297,17 +314,41 @@ std::string stale(const Record& record) {
   return listed(parts);
 }
 
-void report(const CameraFit& fit, const std::vector<CameraView>& views, const Coverage& coverage,
-            const Record& record) {
+/// "1.2 px in the middle of the picture, 8.1 px at its top right, where the board never was".
+std::string reach(const CameraFit& fit, const Coverage& coverage) {
+  const auto& px = fit.uncertainty.regions_px;
+  const auto worst = static_cast<std::size_t>(std::max_element(px.begin(), px.end()) - px.begin());
+  const std::string name = kRegionNames[worst];
+  const std::vector<std::string> missing = coverage.missing_regions();
+  const bool never = std::find(missing.begin(), missing.end(), name) != missing.end();
+  return fmt::format("{:.2g} px in the middle of the picture, {:.2g} px at its {}{}", px[4],
+                     px[worst], name, never ? ", where the board never was" : "");
+}
+
+/// What became of every picture, and what of it the fit knows, if there is one.
+void tell_pictures(Pictures pictures, const std::vector<CameraView>& views, const CameraFit* fit,
+                   Events& events) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    std::string detail = fit == nullptr ? "" : fmt::format("{:.2f} px", fit->views[i].rms_px);
+    if (views[i].look.clipped_fraction > kMuchCutOff)
+      detail += detail.empty() ? "white cut off" : ", white cut off";
+    const bool used = fit != nullptr && fit->views[i].used;
+    pictures.became(views[i].name,
+                    fit == nullptr ? Fate::view
+                    : used         ? Fate::used
+                                   : Fate::contradicts,
+                    detail);
+  }
+  for (const std::string& line : pictures.lines()) {
+    log_info(line);
+    events.line("note", line);
+  }
+}
+
+void report(const CameraFit& fit, const Coverage& coverage, const Record& record) {
   const CameraModel& now = fit.camera;
   const CameraModel& old = record.sensor.camera;
-  const auto& s = fit.sigma;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    if (!fit.views[i].used) {
-      log_info("dropped {}: reprojection error {:.3f} px stands out from the others'",
-               views[i].name, fit.views[i].rms_px);
-    }
-  }
+  const auto& s = fit.uncertainty.sigma;
   log_info("fx {:.2f} +- {:.2f}, fy {:.2f} +- {:.2f}, cx {:.2f} +- {:.2f}, cy {:.2f} +- {:.2f} px",
            now.fx_px, s[0], now.fy_px, s[1], now.cx_px, s[2], now.cy_px, s[3]);
   const auto& [k1, k2, p1, p2, k3] = now.distortion;
@@ -318,9 +359,16 @@ void report(const CameraFit& fit, const std::vector<CameraView>& views, const Co
       k3 == 0 ? " (fixed: it does not help)" : fmt::format(" +- {:.4f}", s[8]));
   log_info(
       "reprojection error {:.3f} px RMS over {} views, {} dropped; corners in {} of 9 regions, "
-      "tilts to {:.0f} degrees",
-      fit.rms_px, fit.used, views.size() - static_cast<std::size_t>(fit.used), coverage.regions(),
-      coverage.largest_tilt() * 57.29578);
+      "tilts to {:.0f} degrees; the board is bowed by {:.1f} % of half its length",
+      fit.rms_px, fit.used, fit.views.size() - static_cast<std::size_t>(fit.used),
+      coverage.regions(), coverage.largest_tilt() * 57.29578, 100 * fit.bow);
+  log_info("a direction is known to {}", reach(fit, coverage));
+  if (!fit.uncertainty.views_agree()) {
+    log_info(
+        "the views contradict each other by {:.1f} times their corners' noise, and count for less; "
+        "better: a flat, stiff board held still, and a locked focus",
+        std::sqrt(fit.uncertainty.contradiction));
+  }
   if (const std::vector<std::string> missing = coverage.missing(); !missing.empty())
     log_info("it would be better still with " + listed(missing));
   if (!record.known()) return;
@@ -355,24 +403,31 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   const UniqueFd stop = termination_fd();
   std::unique_ptr<ViewCollector> collector = collect(options, board, record, stop);
   if (!collector) return stopped_unwritten();
-  collector->check();
+  Events events(options.events);
+  const std::vector<CameraView>& views = collector->views();
+  const int width = collector->camera().width_px;
+  const int height = collector->camera().height_px;
+  Coverage coverage(width, height);
+  std::optional<CameraFit> fit;
+  try {
+    collector->check();
+    fit = fit_camera(views, width, height);
+    for (std::size_t i = 0; i < views.size(); ++i)
+      if (fit->views[i].used) coverage.add(views[i].corners, fit->views[i].pose);
+    check_fit(*fit, coverage);
+  } catch (const ConfigError&) {
+    tell_pictures(collector->pictures(), views, fit ? &*fit : nullptr, events);
+    throw;
+  }
+  tell_pictures(collector->pictures(), views, &*fit, events);
+  fit->camera.mirrored = collector->mirrored();
   if (collector->mirrored() != record.sensor.camera.mirrored) {
     log_info("the camera's image is {}: writing mirrored: {}",
              collector->mirrored() ? "mirrored" : "not mirrored", collector->mirrored());
   }
-  const std::vector<CameraView>& views = collector->views();
-  check_views(views, collector->coverage());
-  const int width = collector->camera().width_px;
-  const int height = collector->camera().height_px;
-  CameraFit fit = fit_camera(views, width, height);
-  fit.camera.mirrored = collector->mirrored();
-  Coverage coverage(width, height);
-  for (std::size_t i = 0; i < views.size(); ++i)
-    if (fit.views[i].used) coverage.add(views[i].corners, fit.views[i].pose);
-  check_fit(fit, coverage);
   if (termination_requested()) return stopped_unwritten();
-  write(record, fit);
-  report(fit, views, coverage, record);
+  write(record, *fit);
+  report(*fit, coverage, record);
   const fs::path folder = measured_folder(record.file());
   log_info("written: {}{}", record.known() ? "" : record.fresh + " and ",
            (folder / kMeasuredCamera).string());

@@ -84,7 +84,8 @@ TEST_F(CalibrateCameraCommand, WritesCameraInfoThatRunUsesAndLeavesSensorYaml) {
   for (const char* part : {"image_width: 640", "distortion_model: plumb_bob", "mirrored: false",
                            "date: \"2", "views: ", "rms_px: 0.", "sensor: \"sensor.yaml\""})
     EXPECT_NE(now.find(part), std::string::npos) << now;
-  for (const char* part : {"fx ", "+-", "reprojection error", "before: fx 900", "written: "})
+  for (const char* part : {"fx ", "+-", "reprojection error", "before: fx 900", "written: ",
+                           "14 pictures used: 100.png (0.0", "a direction is known to 0."})
     EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
   const auto run = [&] {
     return run_bridge({"run", "--source", "sim", "--sensor", file, "--output", "jsonl:-",
@@ -126,7 +127,8 @@ TEST_F(CalibrateCameraCommand, LeavesTheFileAloneWhenItRefuses) {
   std::filesystem::create_directory(temporary_ / "few");
   for (const char* name : {"100.png", "101.png", "102.png", "103.png"})
     std::filesystem::copy(pictures() / name, temporary_ / "few" / name);
-  expect_refused(calibrate({"--images", temporary_ / "few", "--sensor", file}), {"only 4"});
+  expect_refused(calibrate({"--images", temporary_ / "few", "--sensor", file}),
+                 {"4 pictures usable: 100.png to 103.png\n", "only 4"});
   expect_refused(calibrate({"--source", "sim", "--sensor", file}), {"sim", "no board"});
   expect_refused(calibrate({"--sensor", file}), {"--source", "--images"});
   expect_refused(calibrate({"--images", pictures()}), {"--sensor", "--out"});
@@ -148,6 +150,22 @@ TEST_F(CalibrateCameraCommand, LeavesTheFileAloneWhenItRefuses) {
       {"beside.yaml: the folder measured/ beside it is that of", "another folder"});
   EXPECT_EQ(read_file(file), kSensor);
   EXPECT_FALSE(std::filesystem::exists(temporary_ / "measured"));
+}
+
+TEST_F(CalibrateCameraCommand, NamesAndLeavesOutPicturesThatAreNoneOfTheBoard) {
+  const std::filesystem::path folder = temporary_ / "mixed";
+  std::filesystem::copy(pictures(), folder);
+  cv::imwrite((folder / "099.png").string(), cv::Mat::zeros(240, 320, CV_8UC1));
+  cv::imwrite((folder / "grey.png").string(), cv::Mat(480, 640, CV_8UC1, cv::Scalar(128)));
+  write_file(folder / "text.png", "no picture");
+  const std::string whole = read_file(folder / "105.png");
+  write_file(folder / "cut.png", whole.substr(0, whole.size() / 2));
+  const Outcome o = calibrate({"--images", folder, "--sensor", sensor_file()});
+  ASSERT_EQ(o.status, 0) << o.err;
+  for (const char* part :
+       {"1 picture of another size: 099.png (320x240)\n", "1 picture without the board: grey.png\n",
+        "2 pictures damaged: cut.png, text.png\n", "14 pictures used: 100.png ("})
+    EXPECT_NE(o.err.find(part), std::string::npos) << "no '" << part << "' in: " << o.err;
 }
 
 TEST_F(CalibrateCameraCommand, RefusesPicturesOfAnotherSize) {

@@ -19,6 +19,19 @@ constexpr std::size_t kMaxUndetected = 5;
 constexpr std::size_t kMaxViews = 500;  // held; memory must end
 constexpr std::size_t kMinShared = 6;
 
+Fate fate_of(BoardView look) {
+  switch (look) {
+    case BoardView::board: return Fate::view;
+    case BoardView::no_board: return Fate::no_board;
+    case BoardView::other_board: return Fate::other_board;
+    case BoardView::part: return Fate::part;
+    case BoardView::dark: return Fate::dark;
+    case BoardView::saturated: return Fate::saturated;
+    case BoardView::blurred: return Fate::blurred;
+  }
+  return Fate::no_board;
+}
+
 }  // namespace
 
 double difference_px(const std::vector<BoardCorner>& a, const std::vector<BoardCorner>& b) {
@@ -53,25 +66,34 @@ ViewResult ViewCollector::look(const ImageView& image, const std::string& name) 
   BoardSighting sighting = finder_.find(image);
   if (finder_.mirrored() != mirrored_before) previous_.clear();
   last_look_ = sighting.look;
-  ++looks_[sighting.look];
-  ++looked_;
+  const auto lost = [&](Fate fate, std::string detail) {
+    pictures_.add({live_ ? std::string() : name, fate, std::move(detail)});
+  };
   if (sighting.look == BoardView::no_board || sighting.look == BoardView::other_board) keep(image);
-  if (sighting.look != BoardView::board) return ViewResult::no;
+  if (sighting.look != BoardView::board) {
+    lost(fate_of(sighting.look), {});
+    return ViewResult::no;
+  }
   if (live_) {
     const bool still = difference_px(previous_, sighting.corners) < kStill * camera_.width_px;
     still_frames_ = still ? still_frames_ + 1 : 0;
     previous_ = sighting.corners;
-    if (still_frames_ < kStillFrames) return ViewResult::moving;
+    if (still_frames_ < kStillFrames) {
+      lost(Fate::moving, {});
+      return ViewResult::moving;
+    }
   }
-  const auto alike = [&](const CameraView& view) {
-    return difference_px(view.corners, sighting.corners) < kAlike * camera_.width_px;
-  };
-  if (std::any_of(views_.begin(), views_.end(), alike)) {
-    ++alike_;
+  for (const CameraView& view : views_) {
+    if (difference_px(view.corners, sighting.corners) >= kAlike * camera_.width_px) continue;
+    lost(Fate::alike, "as " + view.name);
     return ViewResult::alike;
   }
-  if (views_.size() < kMaxViews)
-    views_.push_back({name, std::move(sighting.corners), sighting.corner_view.blur_px});
+  if (views_.size() >= kMaxViews) {
+    lost(Fate::spare, {});
+    return ViewResult::yes;
+  }
+  pictures_.add({name, Fate::view, {}});
+  views_.push_back({name, std::move(sighting.corners), sighting.corner_view});
   return ViewResult::yes;
 }
 
@@ -99,17 +121,21 @@ void ViewCollector::thin_out(int most) {
       if (!chosen[i] && (chosen[next] || to_chosen[i] > to_chosen[next])) next = i;
   }
   std::vector<CameraView> left;
-  for (std::size_t i = 0; i < views_.size(); ++i)
-    if (chosen[i]) left.push_back(std::move(views_[i]));
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    if (chosen[i])
+      left.push_back(std::move(views_[i]));
+    else
+      pictures_.became(views_[i].name, Fate::spare, {});
+  }
   views_ = std::move(left);
 }
 
 void ViewCollector::check() const {
   const std::string asked = describe(board_);
-  const auto found = looks_.find(BoardView::board);
-  const int count = found == looks_.end() ? 0 : found->second;
+  const int views = pictures_.count(Fate::view), alike = pictures_.count(Fate::alike);
+  const int all = pictures_.all();
   // Part of a checkerboard may pass for a smaller one here and there.
-  if (static_cast<int>(views_.size()) < kMinCameraViews) {
+  if (views < kMinCameraViews) {
     std::vector<ImageView> images;
     for (const auto& pixels : undetected_)
       images.push_back({pixels.data(), camera_.width_px, camera_.height_px, camera_.width_px});
@@ -117,23 +143,24 @@ void ViewCollector::check() const {
       throw ConfigError(
           "--board {}: found in {} of {} images; the board in the others looks like {}: correct "
           "--board, or show all of it",
-          asked, count, looked_, guess);
+          asked, views + alike, all, guess);
     }
   }
-  if (count == 0) {
-    std::vector<std::string> seen;
-    for (const auto& [look, images] : looks_)
-      if (look != BoardView::board) seen.push_back(fmt::format("{} {}", images, words(look)));
-    throw ConfigError(
-        "--board {}: no usable view of it ({}); light it evenly, hold it sharp and whole in view, "
-        "and check --board",
-        asked, looked_ == 0 ? "no image" : "images: " + listed(seen));
+  const std::string loss = pictures_.main_loss();
+  if (views == 0) {
+    throw ConfigError("--board {}: no usable view of it; {}", asked,
+                      all == 0 ? "no image came: give --source or --images that has some" : loss);
   }
-  if (views_.size() < 3 && alike_ > 0) {
+  if (views < 3 && alike > 0) {
     throw ConfigError(
         "all {} images with the board show it in the same pose: move it about and tilt it between "
         "views",
-        count);
+        views + alike);
+  }
+  if (views < kMinCameraViews) {
+    throw ConfigError("only {} different usable views, {} are needed and 20 are good; {}", views,
+                      kMinCameraViews,
+                      loss.empty() ? "show the board at more places, distances and tilts" : loss);
   }
 }
 

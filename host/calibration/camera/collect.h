@@ -2,12 +2,13 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/calibration/camera/board.h"
 #include "host/calibration/camera/fit.h"
+#include "host/calibration/camera/pictures.h"
 
 namespace tagwrench {
 
@@ -27,7 +28,12 @@ class ViewCollector {
   /// `name` of the image, for people.
   ViewResult look(const ImageView& image, const std::string& name);
 
+  /// What could not be looked at.
+  void set_aside(Picture picture) { pictures_.add(std::move(picture)); }
+
   const std::vector<CameraView>& views() const { return views_; }
+  /// All that was looked at or set aside; frames of a camera are counted, views of it named.
+  const Pictures& pictures() const { return pictures_; }
   /// Of the image shown last.
   BoardView last_look() const { return last_look_; }
   bool mirrored() const { return finder_.mirrored(); }
@@ -41,7 +47,8 @@ class ViewCollector {
   /// Leaves at most so many, those that differ most from each other.
   void thin_out(int most);
 
-  /// Throws ConfigError with the reason where no view, another board, or only one pose was found.
+  /// Throws ConfigError with the reason where no view, another board, only one pose, or too few
+  /// views were found.
   void check() const;
 
  private:
@@ -55,8 +62,7 @@ class ViewCollector {
   std::vector<BoardCorner> previous_;
   int still_frames_ = 0;
   BoardView last_look_ = BoardView::no_board;
-  std::map<BoardView, int> looks_;
-  int looked_ = 0, alike_ = 0;
+  Pictures pictures_;
   std::vector<std::vector<std::uint8_t>> undetected_;  ///< images in which the board was not found
 };
 

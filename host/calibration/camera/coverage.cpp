@@ -12,9 +12,6 @@ namespace {
 constexpr int kMinCorners = 6;                         // in a region
 constexpr double kTilt = 20 * std::numbers::pi / 180;  // asked for, each way
 constexpr double kDistanceRatio = 1.2;                 // farthest to nearest
-constexpr std::array<const char*, 9> kRegions = {"top left",    "top",    "top right",
-                                                 "left",        "middle", "right",
-                                                 "bottom left", "bottom", "bottom right"};
 constexpr std::array<const char*, 4> kEdges = {"left", "right", "top", "bottom"};
 
 }  // namespace
@@ -41,7 +38,7 @@ void Coverage::add(const std::vector<BoardCorner>& corners, const BoardPose& pos
 std::vector<std::string> Coverage::missing_regions() const {
   std::vector<std::string> out;
   for (std::size_t i = 0; i < corners_.size(); ++i)
-    if (corners_[i] < kMinCorners) out.emplace_back(kRegions[i]);
+    if (corners_[i] < kMinCorners) out.emplace_back(kRegionNames[i]);
   return out;
 }
 

@@ -10,6 +10,11 @@
 
 namespace tagwrench {
 
+/// Of the 3 x 3 regions of an image, in reading order.
+constexpr std::array<const char*, 9> kRegionNames = {"top left",    "top",    "top right",
+                                                     "left",        "middle", "right",
+                                                     "bottom left", "bottom", "bottom right"};
+
 /// Where the board was in one view, as far as the camera is known.
 struct BoardPose {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< of the board, away from the lens, camera

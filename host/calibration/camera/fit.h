@@ -5,11 +5,11 @@
 // Uses OpenCV inside.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
 #include "host/calibration/camera/board.h"
+#include "host/calibration/camera/bundle.h"
 #include "host/calibration/camera/coverage.h"
 #include "host/tracker/camera_model.h"
 
@@ -22,7 +22,7 @@ constexpr int kMaxCameraViews = 80;
 struct CameraView {
   std::string name;  ///< of the image, for people
   std::vector<BoardCorner> corners;
-  double blur_px = 0;
+  CornerView look;
 };
 
 /// A view in the light of the fit.
@@ -34,17 +34,18 @@ struct FittedView {
 
 struct CameraFit {
   CameraModel camera;
-  std::array<double, 9> sigma{};  ///< one standard deviation: fx fy cx cy, k1 k2 p1 p2 k3
-  double rms_px = 0;              ///< of all corners of the views used
+  LensUncertainty uncertainty;
+  double bow = 0;     ///< of the board: its edge beside its middle, over half its length
+  double rms_px = 0;  ///< of all corners of the views used
   int used = 0;
   std::vector<FittedView> views;  ///< in the order of the input
 };
 
-/// Least squares on the reprojection error (OpenCV's calibrateCamera, after Zhang, "A flexible new
-/// technique for camera calibration", PAMI 22, 2000), with fx fy cx cy k1 k2 p1 p2 free. k3 is free
-/// only if that lowers the error of views that were held out of the fit. Views whose error stands
-/// out from the others' (median and median absolute deviation) are dropped, worst first. Throws
-/// ConfigError when more than a third would be dropped, or no camera fits.
+/// Least squares on the reprojection error (begun with OpenCV's calibrateCamera, after Zhang, "A
+/// flexible new technique for camera calibration", PAMI 22, 2000), with fx fy cx cy k1 k2 p1 p2 and
+/// the board's bow free. k3 is free only if that lowers the error of views that were held out of
+/// the fit. Views whose error stands out from the others' (median and median absolute deviation)
+/// are dropped, worst first, until more than a third are. Throws ConfigError when no camera fits.
 CameraFit fit_camera(const std::vector<CameraView>& views, int width_px, int height_px);
 
 /// Board poses through a rough camera: `f_px` and no distortion at first; once there are enough
@@ -52,9 +53,8 @@ CameraFit fit_camera(const std::vector<CameraView>& views, int width_px, int hei
 std::vector<BoardPose> rough_poses(const std::vector<CameraView>& views, int width_px,
                                    int height_px, double f_px);
 
-/// Throws ConfigError with the reason and the remedy where the views cannot carry a calibration,
-/// before (views) or after (fit) it is tried.
-void check_views(const std::vector<CameraView>& views, const Coverage& coverage);
+/// Throws ConfigError with the reason and the remedy where the views cannot carry a calibration.
+/// `coverage` of the views that were used.
 void check_fit(const CameraFit& fit, const Coverage& coverage);
 
 }  // namespace tagwrench
