@@ -41,6 +41,9 @@ constexpr Duration kDrawEvery = std::chrono::milliseconds(150);
 constexpr Duration kSayEvery = std::chrono::seconds(1);
 constexpr double kMuchWhite = 0.10;  // of a tag
 constexpr double kFaint = 40;        // grey levels from ink to paper
+constexpr double kMuchSharpening = 0.3;
+
+bool at_floor(double blur_px) { return blur_px < 1.1 * kLeastBlur_px; }
 
 std::string only_camera() {
   std::vector<std::string> cameras;
@@ -141,18 +144,24 @@ class FocusView {
   static std::string tag_text(const Tag& tag) {
     if (!tag.width) return "not seen";
     const EdgeWidth& w = *tag.width;
-    std::string text = fmt::format("edges {:5.2f} px wide, best {:5.2f}   contrast {:3.0f}",
-                                   w.blur_px, tag.best_px, w.contrast);
+    std::string text =
+        at_floor(w.blur_px)
+            ? fmt::format("edges {:.1f} px wide or less, the least that can be measured",
+                          kLeastBlur_px)
+            : fmt::format("edges {:5.2f} px wide, best {:5.2f}", w.blur_px, tag.best_px);
+    text += fmt::format("   contrast {:3.0f}", w.contrast);
     if (w.contrast < kFaint) text += ": more light";
     if (w.white_fraction >= 0.005)
       text += fmt::format("   cut off {:.0f} %", 100 * w.white_fraction);
     if (w.white_fraction > kMuchWhite) text += ": less light";
+    if (w.sharpening > kMuchSharpening) text += "   sharpened by the camera";
     return text;
   }
 
   std::string advice() const {
     if (seen_ == 0) return blind_advice();
     const double now = guide_.now_px(), best = guide_.best_px();
+    if (at_floor(now)) return "as sharp as can be measured: leave it, and lock the lens";
     const auto away = [&](const char* words) {
       return fmt::format("{}: best was {:.1f} px, now {:.1f}, which is {:.0f} % more noise", words,
                          best, now, 100 * guide_.more_noise());

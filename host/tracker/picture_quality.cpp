@@ -86,9 +86,15 @@ std::optional<double> blur_px(const ImageView& image, double contrast) {
   return blur_from(*at);
 }
 
+// Of the sharpening that a camera does to its pictures (an unsharp mask), with what is known of it
+// beforehand: standard deviations of a factor e^0.5 and of 2, beside residuals of 3 grey levels.
+constexpr double kUsualRadius_px = 1;
+constexpr double kRadiusWeight = 9 / (0.5 * 0.5);
+constexpr double kAmountWeight = 9 / (2.0 * 2.0);
+constexpr double kMaxAmount = 4;
+constexpr double kBlack = 4;  // grey levels: below, the picture is at its end
+
 constexpr double kMaxPixels = 2500;  // of a tag; a grid of them where there are more
-constexpr double kPixelVariance = 1.0 / 12;
-constexpr double kMinVariance = 0.01;
 constexpr double kMaxBlur_px = 30;
 constexpr double kMinContrast = 8;     // grey levels
 constexpr double kMaxResidual = 0.12;  // of the contrast
@@ -96,8 +102,9 @@ constexpr double kMaxShift = 1;        // of a corner, cells
 constexpr double kMargin = 0.3;        // of white around the square that is looked at, cells
 constexpr double kClear = 2;           // blurs between that and the paper's end
 
-/// Corners (8), logarithm of the blur, gain, its slopes to the right and down, offset.
-constexpr int kBlur = 8, kGain = 9, kOffset = 12, kUnknowns = 13;
+/// Corners (8), logarithms of the blur and of the sharpening's radius, its amount, gain, its slopes
+/// to the right and down, offset.
+constexpr int kBlur = 8, kRadius = 9, kAmount = 10, kGain = 11, kOffset = 14, kUnknowns = 15;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 
 Unknowns with_corners(const Square& corners) {
@@ -126,30 +133,49 @@ Eigen::Matrix3d cells_from_pixels(const Unknowns& x, int cells) {
   return out;
 }
 
-/// Along one axis of the tag: how much of each cell a blurred place sees, and how that changes with
-/// the place (1/cells) and with the logarithm of the blur.
+/// Along one axis of the tag: how much of each cell a pixel sees through a blur, and how that
+/// changes with its place (1/cells) and with the logarithm of the blur.
 struct Seen {
   std::vector<double> part, by_place, by_blur;
 
-  void look(double at, double blur, int cells) {
+  /// `at` and `blur` in cells, `pixel` too: its width.
+  void look(double at, double blur, double pixel, int cells) {
     part.resize(static_cast<std::size_t>(cells));
     by_place.resize(part.size());
     by_blur.resize(part.size());
-    double before = 0, before_density = 0, before_moment = 0;
+    Beyond before;
     for (int line = 0; line <= cells; ++line) {
-      const double s = (at - line) / blur;
-      const double share = 0.5 * std::erfc(-s / std::numbers::sqrt2);
-      const double density = std::exp(-0.5 * s * s) / std::sqrt(2 * std::numbers::pi);
+      const Beyond here = beyond(at - line, blur, pixel);
       if (line > 0) {
         const auto cell = static_cast<std::size_t>(line - 1);
-        part[cell] = before - share;
-        by_place[cell] = (before_density - density) / blur;
-        by_blur[cell] = s * density - before_moment;
+        part[cell] = before.share - here.share;
+        by_place[cell] = (before.density - here.density) / blur;
+        by_blur[cell] = here.moment - before.moment;
       }
-      before = share;
-      before_density = density;
-      before_moment = s * density;
+      before = here;
     }
+  }
+
+ private:
+  struct Beyond {
+    double share = 0, density = 0, moment = 0;
+  };
+  /// How much is seen of what lies before a line, from `off` behind it: a Gaussian, averaged over
+  /// the pixel's width (Gauss-Legendre, three places).
+  static Beyond beyond(double off, double blur, double pixel) {
+    constexpr double kFar = 6;  // blurs
+    if (std::abs(off) > kFar * blur + 0.5 * pixel) return {off > 0 ? 1.0 : 0.0, 0, 0};
+    constexpr std::array<std::pair<double, double>, 3> kPlaces = {
+        {{-0.387298334620742, 5.0 / 18}, {0, 8.0 / 18}, {0.387298334620742, 5.0 / 18}}};
+    Beyond out;
+    for (const auto& [place, weight] : kPlaces) {
+      const double s = (off + place * pixel) / blur;
+      const double density = weight * std::exp(-0.5 * s * s) / std::sqrt(2 * std::numbers::pi);
+      out.share += weight * 0.5 * std::erfc(-s / std::numbers::sqrt2);
+      out.density += density;
+      out.moment += s * density;
+    }
+    return out;
   }
 };
 
@@ -183,21 +209,21 @@ class TagFit {
         const Eigen::Vector2d at = (to_cells * Eigen::Vector3d(column, row, 1)).hnormalized();
         if (at.minCoeff() < -margin || at.maxCoeff() > n + margin) continue;
         const int level = image_.pixels[static_cast<std::ptrdiff_t>(row) * image_.stride + column];
-        if (level >= kWhite)
-          ++white_;
-        else
-          pixels_.emplace_back(column, row, level);
+        if (level >= kWhite) ++white_;
+        pixels_.emplace_back(column, row, level);
       }
     }
   }
 
   double pixels() const { return static_cast<double>(pixels_.size()); }
-  double white_fraction() const { return white_ == 0 ? 0 : white_ / (white_ + pixels()); }
+  double white_fraction() const { return white_ == 0 ? 0 : white_ / pixels(); }
 
   FitSums<kUnknowns> sums(const Unknowns& x) {
     const Eigen::Matrix3d to_cells = cells_from_pixels(x, pattern_.cells);
     FitSums<kUnknowns> out;
     for (const Eigen::Vector3d& pixel : pixels_) add(x, to_cells, pixel, out);
+    out.add(Unknowns::Unit(kRadius), std::log(kUsualRadius_px) - x[kRadius], kRadiusWeight);
+    out.add(Unknowns::Unit(kAmount), -x[kAmount], kAmountWeight);
     return out;
   }
 
@@ -206,7 +232,9 @@ class TagFit {
   struct Shown {
     double level = 1, by_u = 0, by_v = 0, by_blur = 0;
   };
-  Shown shown() const {
+  Shown shown(const Eigen::Vector2d& at, double blur_px, const Eigen::Vector2d& per_px) {
+    across_.look(at.x(), blur_px * per_px.x(), per_px.x(), pattern_.cells);
+    down_.look(at.y(), blur_px * per_px.y(), per_px.y(), pattern_.cells);
     Shown out;
     for (int row = 0; row < pattern_.cells; ++row) {
       const auto j = static_cast<std::size_t>(row);
@@ -232,11 +260,16 @@ class TagFit {
     const Eigen::Vector2d at = h.hnormalized();
     const Eigen::Matrix2d by_pixel =
         (to_cells.topLeftCorner<2, 2>() - at * to_cells.bottomLeftCorner<1, 2>()) / h.z();
-    const double blur = std::exp(x[kBlur]);
+    const double blur = std::exp(x[kBlur]), radius = std::exp(x[kRadius]);
+    const double softer = std::hypot(blur, radius);
     // An edge's blur is that across it, whatever the angle between the tag's axes in the image.
-    across_.look(at.x(), blur * by_pixel.row(0).norm(), pattern_.cells);
-    down_.look(at.y(), blur * by_pixel.row(1).norm(), pattern_.cells);
-    const Shown tag = shown();
+    const Eigen::Vector2d per_px = by_pixel.rowwise().norm();
+    const Shown lens = shown(at, blur, per_px), mask = shown(at, softer, per_px);
+    const double amount = x[kAmount];
+    const Shown tag{
+        lens.level + amount * (lens.level - mask.level),
+        lens.by_u + amount * (lens.by_u - mask.by_u), lens.by_v + amount * (lens.by_v - mask.by_v),
+        lens.by_blur + amount * (lens.by_blur - mask.by_blur * std::pow(blur / softer, 2))};
     const double right = at.x() / pattern_.cells, below = at.y() / pattern_.cells;
     const double gain = x[kGain] + x[kGain + 1] * (right - 0.5) + x[kGain + 2] * (below - 0.5);
     const Eigen::RowVector2d by_place =
@@ -249,14 +282,19 @@ class TagFit {
       row[2 * k + 1] = -weight[static_cast<std::size_t>(k)] * by_place.y();
     }
     row[kBlur] = gain * tag.by_blur;
+    row[kRadius] = -gain * amount * mask.by_blur * std::pow(radius / softer, 2);
+    row[kAmount] = gain * (lens.level - mask.level);
     row.segment<3>(kGain) << tag.level, tag.level * (right - 0.5), tag.level * (below - 0.5);
     row[kOffset] = 1;
-    out.add(row, pixel.z() - gain * tag.level - x[kOffset]);
+    const double model = gain * tag.level + x[kOffset];
+    const bool cut_off =
+        (pixel.z() >= kWhite && model >= kWhite) || (pixel.z() <= kBlack && model <= kBlack);
+    if (!cut_off) out.add(row, pixel.z() - model);
   }
 
   const ImageView& image_;
   const TagPattern& pattern_;
-  std::vector<Eigen::Vector3d> pixels_;  ///< column, row, level; none that is white
+  std::vector<Eigen::Vector3d> pixels_;  ///< column, row, level
   double white_ = 0;
   Seen across_, down_;
 };
@@ -268,6 +306,7 @@ Unknowns start(TagFit& fit, const Square& corners) {
   for (const double blur : {1.0, 2.0, 4.0, 8.0}) {
     Unknowns x = with_corners(corners);
     x[kBlur] = std::log(blur);
+    x[kRadius] = std::log(kUsualRadius_px);
     x += fit.sums(x).step(0, kUnknowns - kGain);
     const double squares = fit.sums(x).squares;
     if (!(squares < least)) continue;
@@ -281,7 +320,8 @@ Unknowns start(TagFit& fit, const Square& corners) {
 double converge(TagFit& fit, Unknowns& x) {
   const auto moved = [](const Unknowns& from, const Unknowns& step) {
     Unknowns to = from + step;
-    to[kBlur] = std::clamp(to[kBlur], 0.5 * std::log(kPixelVariance), std::log(kMaxBlur_px));
+    to[kAmount] = std::clamp(to[kAmount], 0.0, kMaxAmount);
+    to[kBlur] = std::clamp(to[kBlur], std::log(kLeastBlur_px), std::log(kMaxBlur_px));
     return to;
   };
   const auto look = [&](const Unknowns& at) { return fit.sums(at); };
@@ -330,8 +370,8 @@ std::optional<EdgeWidth> edge_width(const ImageView& image, const TagPattern& pa
   const double squares = converge(fit, x);
   if (!x.allFinite() || fit.pixels() < 10 * kUnknowns) return std::nullopt;
   EdgeWidth out;
-  const double total = std::exp(2 * x[kBlur]);
-  out.blur_px = std::sqrt(std::max(total - kPixelVariance, kMinVariance));
+  out.blur_px = std::exp(x[kBlur]);
+  out.sharpening = x[kAmount];
   out.contrast = x[kGain];
   out.white_fraction = fit.white_fraction();
   out.residual_fraction = std::sqrt(squares / fit.pixels()) / std::abs(out.contrast);

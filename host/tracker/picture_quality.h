@@ -21,19 +21,26 @@ struct PictureQuality {
 /// Allocates; about a millisecond for 640 x 480.
 PictureQuality picture_quality(const ImageView& image);
 
+/// Sharper edges cannot be told from these.
+constexpr double kLeastBlur_px = 0.2;
+
 struct EdgeWidth {
-  double blur_px = 0;         ///< standard deviation of the Gaussian point spread before the pixels
-                              ///< average over their own width
-  double contrast = 0;        ///< grey levels from ink to paper, in the middle of the tag
-  double white_fraction = 0;  ///< of the tag's pixels, at the sensor's upper end
+  double blur_px = 0;            ///< of the lens: standard deviation of its Gaussian point spread,
+                                 ///< before the pixels average over their own width
+  double sharpening = 0;         ///< that the camera did: amount of its unsharp mask, 0 none
+  double contrast = 0;           ///< grey levels from ink to paper, in the middle of the tag
+  double white_fraction = 0;     ///< of the tag's pixels, at the sensor's upper end
   double residual_fraction = 0;  ///< RMS of what the fit leaves, over the contrast
   Square corners_px;             ///< of the black square, fitted
 };
 
-/// Below 0.7 px a pixel's own width hides much of it: good to a third there.
-///
-/// Fits the tag's cells, blurred, to its pixels by least squares over four corners, blur, and light
-/// (an offset, and a gain with slopes): an edge out of place must not pass for a wide one.
+/// Fits the tag's cells, as a lens, pixels and an unsharp mask show them, to the image by least
+/// squares over four corners, blur, the mask's amount a and radius r, and light (an offset, and a
+/// gain with slopes):
+///   level = (1 + a) G(s) * cells - a G(sqrt(s^2 + r^2)) * cells.
+/// An edge out of place must not pass for a wide one, nor what a camera did to its picture for a
+/// better lens: overshoot beside an edge tells of the mask, its slope of both. Pixels that are cut
+/// off at either end of the grey scale tell only that the model is there too.
 /// `corners_px` may be off by a third of a cell and may go round either way, as in a mirrored
 /// image. Empty where the pixels do not look like this tag. Allocates; some 20 ms.
 std::optional<EdgeWidth> edge_width(const ImageView& image, const TagPattern& pattern,

@@ -96,6 +96,35 @@ TEST_F(DoctorFocus, ReadsTheRealFrame) {
   for (const double width : found) EXPECT_NEAR(width, 1.9, 0.4) << outcome.out;  // by eye: 1.5 to 2
 }
 
+TEST_F(DoctorFocus, SaysWhenItCannotTellBetter) {
+  const std::string out = focus(scenario("optics: {psf_sigma_px: 0, defocus_px_per_mm: 0}\n")).out;
+  EXPECT_NE(out.find("edges 0.2 px wide or less, the least that can be measured"),
+            std::string::npos)
+      << out;
+  EXPECT_NE(out.find("as sharp as can be measured: leave it, and lock the lens"), std::string::npos)
+      << out;
+}
+
+/// One frame of the simulated sensor after an unsharp mask.
+TEST_F(DoctorFocus, IsOfTheLensWhereTheCameraSharpens) {
+  const std::string folder = temporary_ / "frames";
+  ASSERT_EQ(run_bridge({"sim", "--scenario",
+                        scenario("optics: {psf_sigma_px: 1.2, defocus_px_per_mm: 0}\n").substr(4),
+                        "--out", folder, "--frames", "1"})
+                .status,
+            0);
+  const std::string file = folder + "/000000.png";
+  const cv::Mat image = cv::imread(file, cv::IMREAD_GRAYSCALE);
+  cv::Mat soft;
+  cv::GaussianBlur(image, soft, {}, 1);
+  cv::imwrite(file, 2.5 * image - 1.5 * soft);
+  const Outcome outcome = focus("images:" + folder);
+  const std::vector<double> found = widths(outcome.out);
+  ASSERT_EQ(found.size(), 2u) << outcome.out;
+  for (const double width : found) EXPECT_NEAR(width / 1.2, 1, 0.2) << outcome.out;
+  EXPECT_NE(outcome.out.find("sharpened by the camera"), std::string::npos) << outcome.out;
+}
+
 TEST_F(DoctorFocus, SaysWhatIsSeenWhereTagsCannotBeRead) {
   const Outcome soft = focus(blurred_frames(9));
   EXPECT_EQ(soft.status, 1);

@@ -8,7 +8,7 @@
 namespace tagwrench {
 namespace {
 
-constexpr double kTolerance = 0.05;
+constexpr double kTolerance = 0.06;
 
 struct Shot {
   render::Picture picture;
