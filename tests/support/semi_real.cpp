@@ -112,7 +112,9 @@ SemiReal::SemiReal(const std::filesystem::path& picture, const SemiRealOptions& 
 
 void SemiReal::pose_tags(const cv::Mat& picture) {
   const auto parameters = cv::aruco::DetectorParameters::create();
-  parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_CONTOUR;  // lines along the edges
+  parameters->cornerRefinementMethod = options_.planes == TagPlanes::by_ink
+                                           ? cv::aruco::CORNER_REFINE_CONTOUR  // lines along edges
+                                           : cv::aruco::CORNER_REFINE_SUBPIX;
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
   const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_ARUCO_ORIGINAL);
@@ -125,7 +127,9 @@ void SemiReal::pose_tags(const cv::Mat& picture) {
         ippe(corners[static_cast<std::size_t>(at - ids.begin())], options_.tag_size, camera_);
     cv::Mat cells;
     cv::aruco::drawMarker(dictionary, id, kCells, cells, 1);
-    camera_T_tag_.push_back(fit_tag_plane(picture, camera_, cells, options_.tag_size, start));
+    camera_T_tag_.push_back(options_.planes == TagPlanes::by_ink
+                                ? fit_tag_plane(picture, camera_, cells, options_.tag_size, start)
+                                : start);
     origin_ += camera_T_tag_.back().translation() / static_cast<double>(options_.ids.size());
   }
 }

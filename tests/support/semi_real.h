@@ -1,7 +1,10 @@
 // The real sensor's one picture, set in motion: its two tags' planes move by known displacements.
 // Ink, paper, light, blur and JPEG blocks are real; the motion and the truth are by construction.
 //
-// Each tag's plane is posed by all of its ink. A picture of the moved platform looks the real one
+// Each tag's plane is posed by all of its ink or by its four corners: the two disagree by two
+// degrees and more, as ink, paper and glue are real and a planar fit to either is a guess. Where a
+// tracker must learn the planes from the ink alone, the corners' are a second truth that its own
+// learning does not share. A picture of the moved platform looks the real one
 // up through the homographies of the two planes, which meet in a ridge between the tags; beyond the
 // tags the planes go on, so that all of the picture moves. The light moves with it. The real
 // picture is interpolated exactly (by its Fourier transform to four times the resolution, then
@@ -19,7 +22,14 @@
 
 namespace tagwrench::test {
 
+/// What poses the tags' planes in the picture at rest.
+enum class TagPlanes : std::uint8_t {
+  by_ink,      ///< least squares over all of the tag (plane_fit.h)
+  by_corners,  ///< OpenCV's sub-pixel corners and IPPE
+};
+
 struct SemiRealOptions {
+  TagPlanes planes = TagPlanes::by_ink;
   double f_px = 805;
   double tag_size = 3.8e-3;  ///< m
   double border = 0.35e-3;   ///< m
@@ -42,6 +52,8 @@ class SemiReal {
 
   int width() const { return width_; }
   int height() const { return height_; }
+  /// Of the tags at rest, in the order of the options' ids.
+  const std::vector<Eigen::Isometry3d>& camera_T_tag() const { return camera_T_tag_; }
 
   /// What frame number `frame` shows: rest for 25 frames, then a compound motion; m, rad.
   Vector6 displacement(int frame) const;
