@@ -115,14 +115,9 @@ TargetFile found(const fs::path& sensor_file, const SensorConfig& sensor,
                  const TargetEstimate& estimate) {
   TargetFile out;
   out.stamp = stamp_for(sensor_file);
-  out.target = sensor.target;
+  out.target = calibrated_target(sensor.target, estimate);
   out.rest = midpoint_frame(estimate.camera_T_tag);
   out.camera_sha256 = sha256_of(sensor.camera);
-  const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
-  for (std::size_t t = 0; t < out.target.tags.size(); ++t) {
-    out.target.tags[t].platform_T_tag = out.rest.inverse() * estimate.camera_T_tag[t];
-    out.target.tags[t].sigma = sigmas[t];
-  }
   if (readout_is_clear(estimate)) out.readout = estimate.readout;
   return out;
 }
@@ -156,7 +151,7 @@ int calibrate_target(const CalibrateTargetOptions& options) {
         return !termination_requested();
       });
   if (termination_requested()) return stopped_unwritten();
-  check_estimate(estimate, sensor.camera);
+  check_estimate(estimate, sensor.target, sensor.camera);
   measured.make({kMeasuredCamera});
   write_measured_target(measured.folder(), found(measured.sensor(), sensor, estimate),
                         record.at_rest().image);

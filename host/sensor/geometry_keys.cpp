@@ -12,6 +12,7 @@ namespace tagwrench {
 namespace {
 
 constexpr double kMm = 1e-3;
+constexpr double kMostScaleSigma = 0.5;
 
 Vector6 optional_pose_sigma(YamlReader& node, bool has_pose) {
   Vector6 sigma = Vector6::Zero();
@@ -104,6 +105,10 @@ Tag read_tag(YamlReader& entry, TagFamily family) {
   tag.sigma = optional_pose_sigma(entry, tag.platform_T_tag.has_value());
   entry.finish();
   return tag;
+}
+
+double optional_scale_sigma(YamlReader& node) {
+  return node.has("scale_sigma") ? node.within("scale_sigma", 0, kMostScaleSigma) : 0;
 }
 
 std::string optional_date(YamlReader& node, const char* key) {

@@ -29,6 +29,9 @@ TagFamily read_family(YamlReader& node);
 /// rotation_sigma_rad, both or neither.
 Tag read_tag(YamlReader& entry, TagFamily family);
 
+/// scale_sigma of a target, 0 where it is absent.
+double optional_scale_sigma(YamlReader& node);
+
 /// The text at `key`, empty or YYYY-MM-DD.
 std::string optional_date(YamlReader& node, const char* key);
 

@@ -217,6 +217,7 @@ TargetFile read_target_file(const fs::path& file) {
   out.target.family = read_family(root);
   out.target.tag_size = root.positive("tag_size_mm") * kMm;
   out.camera_sha256 = root.text("camera_sha256");
+  out.target.scale_sigma = optional_scale_sigma(root);
   out.target.tags.clear();
   for (YamlReader& entry : root.children("tags")) {
     out.target.tags.push_back(read_tag(entry, out.target.family));
@@ -300,6 +301,8 @@ std::string target_yaml(const TargetFile& file) {
   std::string text = "format: tagwrench-target-1\n" + stamp_text(file.stamp, "");
   text += fmt::format("family: {}\ntag_size_mm: {:.10g}\ncamera_sha256: {}\n",
                       name(file.target.family), file.target.tag_size / kMm, file.camera_sha256);
+  if (file.target.scale_sigma > 0)
+    text += fmt::format("scale_sigma: {:.4g}\n", file.target.scale_sigma);
   text += fmt::format("rest: {{{}}}\ntags:\n", pose_text(file.rest));
   for (const Tag& tag : file.target.tags) {
     text += fmt::format("  - {{id: {}, {}", tag.id, pose_text(tag.platform_T_tag.value()));

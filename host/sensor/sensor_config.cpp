@@ -110,6 +110,7 @@ struct Measured {
                                     [&](const Tag& other) { return other.id == tag.id; });
       if (its != file.target.tags.end()) tag = *its;
     }
+    to.target.scale_sigma = file.target.scale_sigma;
     to.rest.camera_T_platform = file.rest;
     to.rest.appearance.reset();
     if (file.picture) {
@@ -190,6 +191,7 @@ TargetDescription read_target(YamlReader node) {
   target.family = read_family(node);
   target.tag_size = node.within("tag_size_mm", kMinTag_mm, kMaxTag_mm) * kMm;
   if (node.has("border_mm")) target.border = node.within("border_mm", 0, kMaxTag_mm) * kMm;
+  target.scale_sigma = optional_scale_sigma(node);
   target.tags.clear();
   for (YamlReader& entry : node.children("tags")) {
     const Tag tag = read_tag(entry, target.family);

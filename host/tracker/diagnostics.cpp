@@ -36,8 +36,8 @@ constexpr int kEvenContrast = 25;    ///< grey levels
 constexpr double kMaxWhite = 0.4;    ///< of the picture
 constexpr double kUnsharp_px = 4.5;  ///< tags of the published size decode up to about this blur
 
-constexpr double kOtherScale = 0.03;
-constexpr double kSameScale = 0.01;  ///< motion shears a rolling shutter's picture, never alike
+constexpr double kOtherScale = 0.03;  ///< beside what is said not to be known of it
+constexpr double kSameScale = 0.01;   ///< motion shears a rolling shutter's picture, never alike
 /// Between tags, as four corners each tell it: rad.
 constexpr double kOtherTurn = 0.25;
 constexpr double kOtherDirection = 0.2;
@@ -106,7 +106,8 @@ Diagnostic judge_geometry(const TargetDescription& target, const KnownReference&
       details.concerned.add(target.tags[tags[j].index].id);
       details.amount = misfit->scale;
       if (misfit->elsewhere()) return Diagnostic::other_places;
-      if (std::abs(misfit->scale - 1) > kOtherScale) return Diagnostic::other_scale;
+      if (std::abs(misfit->scale - 1) > kOtherScale + 2 * target.scale_sigma)
+        return Diagnostic::other_scale;
     }
   }
   details.concerned = {};

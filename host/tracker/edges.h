@@ -41,6 +41,28 @@ struct EdgePoint {
 /// The point moved along its normal, toward white, m.
 EdgePoint shifted(EdgePoint point, double distance);
 
+/// How a whole tag's print lies off its pattern, in the tag's plane: ink spread (m, toward white)
+/// and half of its excess along x over y (m); size, aspect (x longer, y shorter) and shear, each as
+/// a part. Paper, printer, cut and the bleeding of light make them; a picture at rest tells aspect
+/// and shear from tilt only by perspective, and size from distance not at all.
+inline constexpr int kPrintModes = 5;
+inline constexpr int kSizeMode = 2;
+using PrintModes = Eigen::Matrix<double, kPrintModes, 1>;
+
+/// How far (m, toward white) an edge point of the pattern moves with each of them.
+PrintModes print_row(const EdgePoint& point);
+
+/// One standard deviation of each as printers usually are: what an estimate leans on.
+PrintModes print_prior();
+
+/// And as bad as this print may be, whose single edges scatter by `scatter` (m, robust standard
+/// deviation) about the pattern of a tag of `size` (m), for what scatters from edge to edge may be
+/// alike over the whole tag as well: what may be claimed of that estimate.
+PrintModes print_sigma(double scatter, double size);
+
+/// And of the size of all tags of a target together, whose ink spreads by `spread` (m): a part.
+double print_size_sigma(double scatter, double spread, double size);
+
 /// The middle of one cell.
 struct CellPoint {
   double x = 0;  ///< m, tag axes

@@ -409,7 +409,8 @@ Vector6 PhotometricAligner::motion_of(const Eigen::Isometry3d& pose,
 
 void GeometryUncertainty::set(PhotometricAligner& aligner,
                               const Eigen::Isometry3d& camera_T_platform,
-                              std::vector<Matrix6> tag_covariance, bool origin_follows) {
+                              std::vector<Matrix6> tag_covariance, double scale_sigma) {
+  scale_sigma_ = scale_sigma;
   const std::vector<PixelPatch>& patches = aligner.pixels().patches;
   const CameraModel& camera = aligner.pixels().camera;
   const auto tags = static_cast<double>(tag_covariance.size());
@@ -439,7 +440,7 @@ void GeometryUncertainty::set(PhotometricAligner& aligner,
       const double size = std::sqrt(std::max(0.0, eigen.values[k]));
       const Eigen::Matrix3d turn = rotation_from_vector(error.tail<3>());
       Eigen::Vector3d origin = camera_T_platform.translation();
-      if (origin_follows) origin += error.head<3>() / tags;
+      origin += error.head<3>() / tags;
       for (int axis = 0; axis < 6; ++axis) {
         Vector6 displacement = Vector6::Zero();
         displacement[axis] = axis < 3 ? kTry : kTryAngle;
@@ -467,6 +468,9 @@ Matrix6 GeometryUncertainty::covariance(const Vector6& displacement) const noexc
       spread += displacement[axis] * slope[static_cast<std::size_t>(axis)];
     sum += spread * spread.transpose();
   }
+  // A target that is larger and farther by a part moves by as much more, and turns alike.
+  const Eigen::Vector3d stretched = scale_sigma_ * displacement.head<3>();
+  sum.topLeftCorner<3, 3>() += stretched * stretched.transpose();
   return sum;
 }
 

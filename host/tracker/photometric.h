@@ -167,11 +167,11 @@ class PhotometricAligner {
 class GeometryUncertainty {
  public:
   /// `tag_covariance`: of each tag's motion in the platform frame at rest (camera axes; m, rad; see
-  /// rotation.h), with the spread of placement as its cause. `origin_follows`: the platform's
-  /// origin is the mean of the tags' centres, so that it moves with their errors. Differentiates
-  /// numerically; allocates.
+  /// rotation.h), with the spread of placement as its cause; the platform's origin, the mean of the
+  /// tags' centres, moves with their errors. `scale_sigma`: of all distances together, a part.
+  /// Differentiates numerically; allocates.
   void set(PhotometricAligner& aligner, const Eigen::Isometry3d& camera_T_platform,
-           std::vector<Matrix6> tag_covariance, bool origin_follows);
+           std::vector<Matrix6> tag_covariance, double scale_sigma);
 
   /// Of a displacement (m, rad) read from the image. No heap.
   Matrix6 covariance(const Vector6& displacement) const noexcept;
@@ -180,6 +180,7 @@ class GeometryUncertainty {
   /// Of each tag, per axis of displacement; columns: the tag's six errors, each by one standard
   /// deviation along a principal axis.
   std::vector<std::array<Matrix6, 6>> slopes_;
+  double scale_sigma_ = 0;
 };
 
 }  // namespace tagwrench

@@ -25,15 +25,17 @@ constexpr double kHalf_px = 6.0;  // as the fine stage of the refinement
 /// Of the pose: longer profiles reach the paper's edge and take the tag for tilted.
 constexpr double kPoseHalf_px = 3.5;
 constexpr int kSpreadIterations = 15;
+constexpr int kOpenIterations = 4;
+constexpr double kOpenCut_px = 4;
 constexpr int kClusterPoints = 12;  // in a row, of three cells' sides
 constexpr int kOffsetPasses = 3;
 constexpr double kMaxOffset_px = 2.0;
 constexpr double kMinContrastFraction = 0.3;  // of the tag's median
 constexpr double kMinFraction = 0.5;          // of a tag's points
 constexpr double kMinScale_px = 0.05;
-constexpr double kLengthScale = 5e-3;    // m per unit of translation in the normal equations
-constexpr double kSpreadScale = 1e-4;    // m
-constexpr double kSpreadPrior_px = 1.0;  // keeps a spread that the pattern cannot tell near zero
+constexpr double kLengthScale = 5e-3;  // m per unit of translation in the normal equations
+constexpr double kSpreadScale = 1e-4;  // m
+constexpr double kPartScale = 0.05;
 
 using Measurements = std::vector<std::vector<EdgeMeasurement>>;
 
@@ -47,52 +49,94 @@ Measurements measure_all(const EdgeMeter& meter, const PixelView<float>& image,
   return all;
 }
 
-double robust_cut(const Measurements& all) {
-  std::vector<double> offsets;
+/// How far edges are seen off their places, robust standard deviation.
+struct EdgeScatter {
+  double px = kMinScale_px;
+  double metres = 0;  ///< in the tag's plane
+};
+
+EdgeScatter edge_scatter(const Measurements& all) {
+  std::vector<double> px, metres;
   for (const auto& tag : all) {
-    for (const EdgeMeasurement& m : tag)
-      if (m.valid) offsets.push_back(std::abs(m.offset_px));
+    const double gain = median_gain(tag);
+    for (const EdgeMeasurement& m : tag) {
+      if (!m.valid) continue;
+      px.push_back(std::abs(m.offset_px));
+      metres.push_back(std::abs(m.offset_px) / gain / m.px_per_m);
+    }
   }
-  return kTukey95 * std::max(kMinScale_px, kMadToSigma * median(std::move(offsets)));
+  return {std::max(kMinScale_px, kMadToSigma * median(std::move(px))),
+          kMadToSigma * median(std::move(metres))};
 }
 
-/// Fits the platform's pose together with one ink spread for each tag (the distance by which black
-/// has grown on all sides) and moves the tags' edge points by it. Interior cells shrink where the
-/// outer square grows, which is what separates spread from distance. Fills the covariance of the
-/// pose (its motion, camera axes, m and rad) from what the residuals say. False when the fit fails.
-bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, EdgeTarget& target,
-                         Eigen::Isometry3d& camera_T_platform, Matrix6& covariance) {
+/// A rigid body of tags as seen at rest.
+struct RestFit {
+  Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
+  Matrix6 covariance = Matrix6::Zero();  ///< of its motion, camera axes, m and rad
+  std::vector<PrintModes> print;         ///< of each tag
+  double scatter = 0;                    ///< of the edges about pattern and print, m
+
+  double spread() const {
+    double sum = 0;
+    for (const PrintModes& tag : print) sum += std::abs(tag[0]);
+    return sum / static_cast<double>(print.size());
+  }
+};
+
+/// Fits the platform's pose together with how each tag is printed as a whole, from a start in
+/// `fit`, and moves the tags' edge points accordingly. Interior cells shrink where the outer square
+/// grows, which is what separates spread from distance; perspective separates aspect and shear from
+/// tilt, as far as it goes; for the rest stands what prints usually do (print_prior()). Fills the
+/// covariance from what the residuals say and what this print may do (print_sigma()). False when
+/// the fit fails.
+bool fit_pose_and_print(const EdgeMeter& meter, const PixelView<float>& image, double size,
+                        EdgeTarget& target, RestFit& fit) {
   const auto tags = static_cast<Eigen::Index>(target.tags.size());
-  Eigen::VectorXd units(6 + tags);
+  const Eigen::Index parameters = 6 + kPrintModes * tags;
+  const EdgeTarget pattern = target;
+  PrintModes print_units;
+  print_units << kSpreadScale, kSpreadScale, kPartScale, kPartScale, kPartScale;
+  Eigen::VectorXd units(parameters);
   units << Eigen::Vector3d::Constant(kLengthScale), Eigen::Vector3d::Ones(),
-      Eigen::VectorXd::Constant(tags, kSpreadScale);
+      print_units.replicate(tags, 1);
+  fit.print.assign(target.tags.size(), PrintModes::Zero());
+  double alike = kClusterPoints;  // of a cluster's points, as many err together
   for (int i = 0; i < kSpreadIterations; ++i) {
-    const Measurements all = measure_all(meter, image, target, camera_T_platform);
-    const double cut = robust_cut(all);
-    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(6 + tags, 6 + tags);
-    Eigen::VectorXd rhs = Eigen::VectorXd::Zero(6 + tags);
-    Eigen::VectorXd row(6 + tags);
+    const Measurements all = measure_all(meter, image, target, fit.camera_T_platform);
+    const EdgeScatter scatter = edge_scatter(all);
+    fit.scatter = scatter.metres;
+    // Half of the edges inside go the other way than the outline where ink has spread: they must be
+    // heard before they are taken for outliers.
+    const double cut = std::max(kTukey95 * scatter.px, i < kOpenIterations ? kOpenCut_px : 0.0);
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(parameters, parameters);
+    Eigen::VectorXd rhs = Eigen::VectorXd::Zero(parameters);
+    Eigen::VectorXd row(parameters);
     // What neighbouring points have in common (ragged ink, a neighbour's blur) moves the fit more
     // than noise of the same size: the sandwich estimator for clustered errors, three cells'
     // sides each.
-    Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(6 + tags, 6 + tags);
-    Eigen::VectorXd pull = Eigen::VectorXd::Zero(6 + tags);
+    Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(parameters, parameters);
+    Eigen::VectorXd pull = Eigen::VectorXd::Zero(parameters);
     int in_cluster = 0;
-    double clusters = 0;
+    double clusters = 0, noise = 0, count = 0;
     for (Eigen::Index t = 0; t < tags; ++t) {
       const auto& tag = all[static_cast<std::size_t>(t)];
+      const std::vector<EdgePoint>& points = pattern.tags[static_cast<std::size_t>(t)].points;
       const double gain = median_gain(tag);
-      for (const EdgeMeasurement& m : tag) {
+      for (std::size_t p = 0; p < tag.size(); ++p) {
+        const EdgeMeasurement& m = tag[p];
         const double weight = m.valid ? biweight(m.offset_px / cut) : 0;
         if (weight == 0) continue;
         row.setZero();
         row.head<6>() = m.row;
-        row[6 + t] = m.px_per_m;
+        row.segment<kPrintModes>(6 + kPrintModes * t) = m.px_per_m * print_row(points[p]);
         row.array() *= units.array();
-        const Eigen::VectorXd own_pull = weight * (m.offset_px / gain) * row;
+        const double offset = m.offset_px / gain;
+        const Eigen::VectorXd own_pull = weight * offset * row;
         normal += weight * row * row.transpose();
         rhs += own_pull;
         pull += own_pull;
+        noise += weight * offset * offset;
+        count += weight;
         if (++in_cluster == kClusterPoints) {
           meat += pull * pull.transpose();
           pull.setZero();
@@ -101,27 +145,51 @@ bool fit_pose_and_spread(const EdgeMeter& meter, const PixelView<float>& image, 
         }
       }
     }
+    if (!(count > 0)) return false;
+    // The print's prior, in the units of the equations: as if one point's variance were 1.
+    const double variance = std::max(noise / count, kMinScale_px * kMinScale_px) * alike;
+    Eigen::VectorXd prior = Eigen::VectorXd::Zero(parameters);
+    const PrintModes usual = print_prior();
+    const PrintModes worst = print_sigma(scatter.metres, size);
+    prior.tail(kPrintModes * tags) =
+        print_units.cwiseQuotient(usual).cwiseAbs2().replicate(tags, 1);
     for (Eigen::Index t = 0; t < tags; ++t) {
-      const auto& tag = all[static_cast<std::size_t>(t)];
-      const double px = tag.empty() ? 1.0 : tag.front().px_per_m * kSpreadScale / kSpreadPrior_px;
-      normal(6 + t, 6 + t) += px * px * 1e-3;
+      const Eigen::Index at = 6 + kPrintModes * t;
+      rhs.segment<kPrintModes>(at) -=
+          variance * prior.segment<kPrintModes>(at).cwiseProduct(
+                         fit.print[static_cast<std::size_t>(t)].cwiseQuotient(print_units));
     }
+    normal.diagonal() += variance * prior;
     const Ldlt<Eigen::Dynamic> ldlt(normal);
     if (!ldlt.positive(1e-12)) return false;
     const Eigen::VectorXd step = ldlt.solve(rhs).cwiseProduct(units);
     if (!step.allFinite()) return false;
-    camera_T_platform = moved(camera_T_platform, step.head<6>());
-    const auto parameters = static_cast<double>(6 + tags);
+    fit.camera_T_platform = moved(fit.camera_T_platform, step.head<6>());
     const Eigen::MatrixXd inverse = ldlt.inverse();
-    const double few = clusters > parameters ? clusters / (clusters - parameters) : 10.0;
-    covariance = few * (units.asDiagonal() * (inverse * meat * inverse) * units.asDiagonal())
-                           .topLeftCorner<6, 6>();
-    for (Eigen::Index t = 0; t < tags; ++t)
-      for (EdgePoint& point : target.tags[static_cast<std::size_t>(t)].points)
-        point = shifted(point, step[6 + t]);
+    const auto all_parameters = static_cast<double>(parameters);
+    const double few = clusters > all_parameters ? clusters / (clusters - all_parameters) : 10.0;
+    alike = std::clamp(few * (inverse * meat).trace() / all_parameters /
+                           std::max(noise / count, kMinScale_px * kMinScale_px),
+                       1.0, static_cast<double>(kClusterPoints));
+    meat *= few;
+    meat.diagonal().tail(kPrintModes * tags) +=
+        variance * variance *
+        (prior.tail(kPrintModes * tags).array() *
+         worst.cwiseQuotient(usual).cwiseAbs2().replicate(tags, 1).array())
+            .matrix();
+    fit.covariance = (units.asDiagonal() * (inverse * meat * inverse) * units.asDiagonal())
+                         .topLeftCorner<6, 6>();
+    for (Eigen::Index t = 0; t < tags; ++t) {
+      const auto tag = static_cast<std::size_t>(t);
+      fit.print[tag] += step.segment<kPrintModes>(6 + kPrintModes * t);
+      for (std::size_t p = 0; p < pattern.tags[tag].points.size(); ++p) {
+        const EdgePoint& printed = pattern.tags[tag].points[p];
+        target.tags[tag].points[p] = shifted(printed, print_row(printed).dot(fit.print[tag]));
+      }
+    }
   }
-  renormalise(camera_T_platform);
-  return camera_T_platform.matrix().allFinite() && camera_T_platform.translation().z() > 0;
+  renormalise(fit.camera_T_platform);
+  return fit.camera_T_platform.matrix().allFinite() && fit.camera_T_platform.translation().z() > 0;
 }
 
 /// Moves every point onto its own edge as seen at rest, drops points that have none, and notes
@@ -405,41 +473,52 @@ bool ReferenceEstimator::finish() {
 
   // Every tag by itself, from where the joint fit has it.
   std::vector<Eigen::Isometry3d> camera_T_tag;
-  std::vector<EdgeTag> spread;
+  std::vector<EdgeTag> printed;
   std::vector<Matrix6> tag_covariance;
+  double scale_sigma = 0;
   for (std::size_t t = 0; t < patterns_.size(); ++t) {
-    Eigen::Isometry3d pose = last_pose_ * joint_.target().tags[t].platform_T_tag;
     EdgeTarget alone{{make_edge_tag(patterns_[t], Eigen::Isometry3d::Identity())}, 0};
-    Matrix6 covariance;
-    if (!fit_pose_and_spread(meter_, mean, alone, pose, covariance)) return false;
-    covariance += distance_covariance(pose);
-    if (description_.tags[t].platform_T_tag)
-      covariance = description_.tags[t].sigma.cwiseAbs2().asDiagonal();
+    RestFit fit;
+    fit.camera_T_platform = last_pose_ * joint_.target().tags[t].platform_T_tag;
+    if (!fit_pose_and_print(meter_, mean, description_.tag_size, alone, fit)) return false;
+    Matrix6 covariance = fit.covariance + distance_covariance(fit.camera_T_platform);
+    scale_sigma =
+        std::max(scale_sigma, print_size_sigma(fit.scatter, fit.spread(), description_.tag_size));
     tag_covariance.push_back(covariance);
-    camera_T_tag.push_back(pose);
-    spread.push_back(std::move(alone.tags.front()));
+    camera_T_tag.push_back(fit.camera_T_platform);
+    printed.push_back(std::move(alone.tags.front()));
   }
   if (!place(camera_T_tag)) return false;
   bool any_given = false;
-  for (std::size_t t = 0; t < spread.size(); ++t) {
+  for (std::size_t t = 0; t < printed.size(); ++t) {
     any_given = any_given || description_.tags[t].platform_T_tag.has_value();
-    learned_.target.tags[t].points = std::move(spread[t].points);
+    learned_.target.tags[t].points = std::move(printed[t].points);
   }
   Eigen::Isometry3d fitted = learned_.camera_T_platform;
+  learned_.scale_sigma = scale_sigma;
   if (any_given) {
     // Given tags make one rigid body: they and the reference pose are fitted together, and the open
     // ones placed by it.
     EdgeTarget given;
-    for (std::size_t t = 0; t < patterns_.size(); ++t)
-      if (description_.tags[t].platform_T_tag) given.tags.push_back(learned_.target.tags[t]);
-    fitted = last_pose_;
-    Matrix6 covariance;
-    if (!fit_pose_and_spread(meter_, mean, given, fitted, covariance)) return false;
-    learned_.pose_covariance = covariance + distance_covariance(fitted);
+    for (std::size_t t = 0; t < patterns_.size(); ++t) {
+      const EdgeTag& tag = learned_.target.tags[t];
+      if (description_.tags[t].platform_T_tag)
+        given.tags.push_back(make_edge_tag(patterns_[t], tag.platform_T_tag));
+    }
+    RestFit fit;
+    fit.camera_T_platform = last_pose_;
+    if (!fit_pose_and_print(meter_, mean, description_.tag_size, given, fit)) return false;
+    fitted = fit.camera_T_platform;
+    learned_.pose_covariance = fit.covariance + distance_covariance(fitted);
     if (!options_.camera_T_platform) learned_.camera_T_platform = fitted;
-    for (std::size_t t = 0; t < patterns_.size(); ++t)
-      if (!description_.tags[t].platform_T_tag)
+    for (std::size_t t = 0; t < patterns_.size(); ++t) {
+      if (description_.tags[t].platform_T_tag)
+        tag_covariance[t] = tagwrench::tag_covariance(
+            description_.tags[t], (fitted * learned_.target.tags[t].platform_T_tag).linear());
+      else
         learned_.target.tags[t].platform_T_tag = fitted.inverse() * camera_T_tag[t];
+    }
+    learned_.scale_sigma = description_.scale_sigma;
   }
   if (!learn_appearance(meter_, mean, learned_.target, fitted)) return false;
   learned_.tag_covariance = std::move(tag_covariance);

@@ -23,6 +23,7 @@ struct LearnedReference {
   PixelNoise noise;                           ///< of one frame
   /// How well each tag's pose is known: of its motion, camera axes, m and rad.
   std::vector<Matrix6> tag_covariance;
+  double scale_sigma = 0;  ///< of all distances together, a part: how large the tags really are
 };
 
 /// Feed it frames until it is done. It averages them, so that one careful fit at the end sees

@@ -91,16 +91,35 @@ std::optional<int> identify_tag(TagFamily family, const std::vector<std::uint8_t
 struct Tag {
   int id = 0;
   std::optional<Eigen::Isometry3d> platform_T_tag;  ///< learned at rest when absent
-  /// One standard deviation of platform_T_tag: position (m), then a small rotation of the tag along
-  /// the platform's axes (rad). Zero when not known.
+  /// One standard deviation of platform_T_tag along the tag's own axes: position (m), then a small
+  /// rotation (rad). Zero when not known. What tracking feels is the plane: tilt about x and y and
+  /// place along z.
   Vector6 sigma = Vector6::Zero();
 };
+
+/// The covariance of a tag's motion along axes in which the tag's are the columns of
+/// `axes_T_tag`: m, rad.
+inline Matrix6 tag_covariance(const Tag& tag, const Eigen::Matrix3d& axes_T_tag) {
+  Matrix6 turn = Matrix6::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = axes_T_tag;
+  return turn * tag.sigma.cwiseAbs2().asDiagonal() * turn.transpose();
+}
+
+/// The inverse: standard deviations along the tag's axes.
+inline Vector6 tag_sigma(const Matrix6& covariance, const Eigen::Matrix3d& axes_T_tag) {
+  Matrix6 turn = Matrix6::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = axes_T_tag.transpose();
+  const Matrix6 own = turn * covariance * turn.transpose();
+  return own.diagonal().cwiseMax(0.0).cwiseSqrt();
+}
 
 struct TargetDescription {
   TagFamily family = TagFamily::aruco_original;
   double tag_size = 3.8e-3;  ///< edge of the black square, m
   double border = 0.35e-3;   ///< white margin around it, m
   std::vector<Tag> tags = {{5, {}}, {2, {}}};
+  /// One standard deviation of the scale of all places together, as a part. Zero when not known.
+  double scale_sigma = 0;
 };
 
 /// The averaged picture of the sensor at rest, flipped or not as the camera delivers it.
@@ -124,6 +143,8 @@ struct KnownReference {
   bool picture_given = false;  ///< and so was its picture
   Eigen::Isometry3d camera_T_platform = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Isometry3d> platform_T_tag;  ///< in the target's order
+  std::vector<Vector6> tag_sigma;                 ///< as Tag::sigma
+  double scale_sigma = 0;                         ///< as TargetDescription's
 };
 
 }  // namespace tagwrench

@@ -92,8 +92,10 @@ struct Tracker::Impl {
     for (std::size_t t = 0; t < description.tags.size(); ++t) {
       const Tag& tag = description.tags[t];
       given.target.tags.push_back(make_edge_tag(acquirer.patterns()[t], *tag.platform_T_tag));
-      given.tag_covariance.emplace_back(tag.sigma.cwiseAbs2().asDiagonal());
+      given.tag_covariance.push_back(
+          tag_covariance(tag, (given.camera_T_platform * *tag.platform_T_tag).linear()));
     }
+    given.scale_sigma = description.scale_sigma;
     if (options.appearance) given.image = *options.appearance;
     reference.picture_given = options.appearance.has_value();
     adopt(given);
@@ -107,6 +109,13 @@ struct Tracker::Impl {
     reference.platform_T_tag.clear();
     for (const EdgeTag& tag : learned.target.tags)
       reference.platform_T_tag.push_back(tag.platform_T_tag);
+    reference.tag_sigma.clear();
+    for (std::size_t t = 0; t < learned.target.tags.size(); ++t) {
+      const Eigen::Isometry3d camera_T_tag =
+          learned.seen_from * learned.target.tags[t].platform_T_tag;
+      reference.tag_sigma.push_back(tag_sigma(learned.tag_covariance[t], camera_T_tag.linear()));
+    }
+    reference.scale_sigma = learned.scale_sigma;
     predictor.start({}, reference.camera_T_platform);
     reference.known = true;
     const ReferenceImage& image = learned.image;
@@ -117,7 +126,7 @@ struct Tracker::Impl {
                             std::max(1, image.frames), learned.noise, acquirer.patterns(),
                             learned.target, learned.seen_from, {}));
     pose_covariance = reference.given ? learned.pose_covariance : Matrix6::Zero();
-    geometry.set(aligner, learned.seen_from, learned.tag_covariance, !reference.given);
+    geometry.set(aligner, learned.seen_from, learned.tag_covariance, learned.scale_sigma);
     photometric = {};
   }
 

@@ -41,16 +41,11 @@ SensorConfig calibrated(const SensorConfig& sensor, const sim::Scenario& scenari
   }
   check_record(record, sensor.target, sensor.rest);
   const TargetEstimate estimate = adjust_target(record.at_rest(), record.keyframes());
-  check_estimate(estimate, sensor.camera);
+  check_estimate(estimate, sensor.target, sensor.camera);
 
   SensorConfig found = sensor;
-  const Eigen::Isometry3d platform = midpoint_frame(estimate.camera_T_tag);
-  const std::vector<Vector6> sigmas = platform_sigmas(estimate.covariance);
-  for (std::size_t t = 0; t < found.target.tags.size(); ++t) {
-    found.target.tags[t].platform_T_tag = platform.inverse() * estimate.camera_T_tag[t];
-    found.target.tags[t].sigma = sigmas[t];
-  }
-  found.rest.camera_T_platform = platform;
+  found.target = calibrated_target(sensor.target, estimate);
+  found.rest.camera_T_platform = midpoint_frame(estimate.camera_T_tag);
   found.rest.appearance = record.at_rest().image;
   return found;
 }

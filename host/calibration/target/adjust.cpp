@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "host/core/algebra/decompositions.h"
@@ -17,11 +18,10 @@ namespace {
 /// Half length of the profiles: short, for the paper's edge beyond the white margin comes near when
 /// a tag leans away, and its blur would pull at the outer edges.
 constexpr double kHalf_px = 3.5;
-constexpr int kMaxIterations = 12;
-constexpr double kStillPosition = 3e-8;  // m; a step of the tags below these is the end
-constexpr double kStillRotation = 1e-5;  // rad
-constexpr double kStillFocal = 1e-5;     // of the ratio
-constexpr double kMaxFocalStep = 0.03;
+constexpr int kMaxIterations = 30;
+constexpr double kUsualSteps = 16;      // both fits together, for the progress that is told
+constexpr double kStill = 0.03;         // sigmas of the shared unknowns together, to be the end
+constexpr double kMaxFocalStep = 0.03;  // a longer step is shortened, with all that goes with it
 
 constexpr double kMinNoise_px = 0.01;
 constexpr double kMinNoiseFraction = 0.5;  // of a point, to the median of all
@@ -33,9 +33,12 @@ constexpr double kModel_px = 0.004;
 /// And the same for the focal length, as a part of it.
 constexpr double kFocalModel = 0.002;
 /// And the read-out time: a picture's velocity is the mean over two steps.
-constexpr double kReadoutModel = 0.3e-3;      // s
-constexpr double kReadoutPrior = 30e-3;       // s, a rolling shutter's
-constexpr double kSpreadPrior = 50e-6;        // m
+constexpr double kReadoutModel = 0.3e-3;  // s
+constexpr double kReadoutPrior = 30e-3;   // s, a rolling shutter's
+constexpr double kSpreadPrior = 50e-6;    // m
+constexpr double kCoherent = 0.01;        // size, aspect and shear of a whole tag
+/// Size and distance look alike: the tags together are as large as said, for the fit.
+constexpr double kTotalSize = 1e-5;
 constexpr double kMinContrastFraction = 0.3;  // of the tag's median, for a point to be used
 
 CameraModel with_focal(CameraModel camera, double ratio) {
@@ -47,6 +50,7 @@ CameraModel with_focal(CameraModel camera, double ratio) {
 constexpr double kMinScatter = 0.5e-6;  // m
 constexpr double kFirstScatter = 5e-6;  // m, before anything is known
 constexpr double kCut = 4.0;            // sigmas, for an outlier
+constexpr int kRun = 12;                // points of one edge whose errors are alike
 constexpr int kLags = 5;                // points along an edge over which errors may be alike
 
 bool same_edge(const EdgePoint& a, const EdgePoint& b) {
@@ -59,14 +63,9 @@ struct PrintScatter {
   double effective = 0;  ///< what a point counts as: neighbours along an edge err alike, m
 };
 
-/// `shift` of every point of all tags in order (tag t has first[t] .. first[t+1]) and `spread` of
-/// every tag, both toward white, m.
+/// `error`, m, of every point of all tags in order: tag t has first[t] .. first[t+1].
 PrintScatter print_scatter(const std::vector<EdgeTag>& printed,
-                           const std::vector<Eigen::Index>& first, const Eigen::VectorXd& shift,
-                           const std::vector<double>& spread) {
-  Eigen::VectorXd error = shift;
-  for (std::size_t t = 0; t < printed.size(); ++t)
-    error.segment(first[t], first[t + 1] - first[t]).array() -= spread[t];
+                           const std::vector<Eigen::Index>& first, Eigen::VectorXd error) {
   if (error.size() == 0 || error.isZero()) return {kFirstScatter, kFirstScatter};
   const Eigen::VectorXd sizes = error.cwiseAbs();
   PrintScatter out;
@@ -105,7 +104,7 @@ struct Problem {
   // What moves while iterating.
   struct State {
     std::vector<Eigen::Isometry3d> camera_T_tag;
-    std::vector<double> spread;
+    std::vector<PrintModes> print;
     Eigen::VectorXd shift;  // of each point, toward white, m
     std::vector<Eigen::Isometry3d> poses;
     double readout = 0;  // s
@@ -152,6 +151,17 @@ struct Problem {
       out.points[i] =
           shifted(out.points[i], state.shift[first[tag] + static_cast<Eigen::Index>(i)]);
     return out;
+  }
+
+  /// How far each point lies off the pattern as a whole was printed, m.
+  Eigen::VectorXd off_print(const State& state) const {
+    Eigen::VectorXd off = state.shift;
+    for (std::size_t t = 0; t < printed.size(); ++t) {
+      for (std::size_t i = 0; i < printed[t].points.size(); ++i)
+        off[first[t] + static_cast<Eigen::Index>(i)] -=
+            print_row(printed[t].points[i]).dot(state.print[t]);
+    }
+    return off;
   }
 
   /// How far (m, along its normal) the rolling shutter shows each point off its place.
@@ -227,70 +237,139 @@ struct Problem {
       noise = noise > 0 ? std::max(noise, kMinNoiseFraction * typical) : typical;
   }
 
+  /// `use` is told an observation of the point, its keyframe or -1, and its weight, 1/px^2.
+  template <class Use>
+  void for_each_offset(Eigen::Index p, const Use& use) const {
+    const auto frames = static_cast<int>(moving.size());
+    const double variance = noise_px[p] * noise_px[p];
+    const Observation& still = at_rest[static_cast<std::size_t>(p)];
+    if (still.valid) {
+      use(still, -1,
+          1 / (variance / std::max(1, rest.image.frames) + kRestFloor_px * kRestFloor_px));
+    }
+    for (int k = 0; k < frames; ++k) {
+      const Observation& seen = moving[static_cast<std::size_t>(k)][static_cast<std::size_t>(p)];
+      const double weight = seen.valid ? biweight(seen.offset / (kTukey95 * noise_px[p])) /
+                                             (variance + frames * kModel_px * kModel_px)
+                                       : 0;
+      if (weight > 0) use(seen, k, weight);
+    }
+  }
+
+  /// 1/m^2. A point off the print tells nothing of the scale, but still of the motion.
+  double print_weight(double off) const {
+    const double print =
+        biweight(off / (kTukey95 * scatter.robust)) / (scatter.effective * scatter.effective);
+    return std::max(print, 1 / (kSpreadPrior * kSpreadPrior));
+  }
+
+  /// Wider than what prints are known to do: the motion tells.
+  PrintModes wide_print_sigma() const {
+    PrintModes sigma = print_sigma(scatter.robust, rest.patterns.front().size);
+    for (int mode = kSizeMode; mode < kPrintModes; ++mode)
+      sigma[mode] = std::max(kCoherent, sigma[mode]);
+    return sigma;
+  }
+
   TargetNormal equations(const State& state, bool at_rest_only) const {
     const int frames = at_rest_only ? 0 : static_cast<int>(moving.size());
     TargetNormal normal(frames, static_cast<int>(printed.size()), points);
     normal.add_prior(normal.readout_index(), -state.readout, 1 / (kReadoutPrior * kReadoutPrior));
+    double size = 0;
+    for (const PrintModes& print : state.print) size += print[kSizeMode];
+    normal.add_total_size(-size, 1 / (kTotalSize * kTotalSize));
+    const Eigen::VectorXd off = off_print(state);
+    const PrintModes sigma = wide_print_sigma();
     for (std::size_t t = 0; t < printed.size(); ++t) {
       const int tag = static_cast<int>(t);
-      normal.add_prior(normal.spread_index(tag), -state.spread[t],
-                       1 / (kSpreadPrior * kSpreadPrior));
+      for (int mode = 0; mode < kPrintModes; ++mode)
+        normal.add_prior(normal.print_index(tag) + mode, -state.print[t][mode],
+                         1 / (sigma[mode] * sigma[mode]));
       for (Eigen::Index p = first[t]; p < first[t + 1]; ++p) {
-        const double off_print = state.shift[p] - state.spread[t];
-        const double print = biweight(off_print / (kTukey95 * scatter.robust)) /
-                             (scatter.effective * scatter.effective);
-        // A point off the print tells nothing of the scale, but still of the motion.
-        normal.add_print(p, tag, -off_print, std::max(print, 1 / (kSpreadPrior * kSpreadPrior)));
-        const double variance = noise_px[p] * noise_px[p];
-        const auto add = [&](const Observation& seen, int frame, double weight) {
-          if (seen.valid && weight > 0) normal.add({frame, tag, p, seen.by, seen.offset, weight});
-        };
-        add(at_rest[p], -1,
-            1 / (variance / std::max(1, rest.image.frames) + kRestFloor_px * kRestFloor_px));
-        for (int k = 0; k < frames; ++k) {
-          const Observation& seen = moving[k][p];
-          add(seen, k,
-              biweight(seen.offset / (kTukey95 * noise_px[p])) /
-                  (variance + frames * kModel_px * kModel_px));
-        }
+        normal.add_print(p, tag,
+                         print_row(printed[t].points[static_cast<std::size_t>(p - first[t])]),
+                         -off[p], print_weight(off[p]));
+        for_each_offset(p, [&](const Observation& seen, int frame, double weight) {
+          if (frame < frames) normal.add({frame, tag, p, seen.by, seen.offset, weight});
+        });
       }
     }
     return normal;
   }
 
-  /// One step; true once it is so small that another would change nothing. Throws nothing; a step
-  /// without a solution leaves NaN in the state.
-  bool iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal) {
+  enum class Step : std::uint8_t {
+    taken,
+    still,  ///< taken, and so small that another would change nothing
+    none,   ///< the equations have no solution
+  };
+
+  Step iterate(const std::vector<Keyframe>& frames, State& state, bool free_focal) {
     observe_all(frames, state);
     learn_noise();
-    scatter = print_scatter(printed, first, state.shift, state.spread);
+    scatter = print_scatter(printed, first, off_print(state));
     TargetNormal normal = equations(state, false);
     const Eigen::VectorXd shared =
         normal.reduce() ? normal.shared_step(free_focal) : Eigen::VectorXd();
-    if (shared.size() == 0) {
-      state.focal_ratio = std::nan("");
-      return true;
-    }
+    if (shared.size() == 0) return Step::none;
+    // All or nothing: a step in part would pull apart what it moves together.
+    const double zoom = shared[normal.focal_index()];
+    const double part = std::min(1.0, kMaxFocalStep / std::max(std::abs(zoom), 1e-12));
     const Eigen::VectorXd moved_frames = normal.frame_steps(shared);
-    state.shift += normal.point_steps(shared, moved_frames);
+    state.shift += part * normal.point_steps(shared, moved_frames);
     for (std::size_t k = 0; k < state.poses.size(); ++k) {
       state.poses[k] =
-          moved(state.poses[k], moved_frames.segment<6>(6 * static_cast<Eigen::Index>(k)));
+          moved(state.poses[k], part * moved_frames.segment<6>(6 * static_cast<Eigen::Index>(k)));
       renormalise(state.poses[k]);
     }
-    bool still = true;
     for (std::size_t t = 0; t < state.camera_T_tag.size(); ++t) {
-      const Vector6 step = shared.segment<6>(6 * static_cast<Eigen::Index>(t));
+      const int tag = static_cast<int>(t);
+      const Vector6 step = part * shared.segment<6>(6 * tag);
       state.camera_T_tag[t] = moved(state.camera_T_tag[t], step);
       renormalise(state.camera_T_tag[t]);
-      state.spread[t] += shared[normal.spread_index(static_cast<int>(t))];
-      still =
-          still && step.head<3>().norm() < kStillPosition && step.tail<3>().norm() < kStillRotation;
+      state.print[t] += part * shared.segment<kPrintModes>(normal.print_index(tag));
     }
-    state.readout += shared[normal.readout_index()];
-    const double zoom = std::clamp(shared[normal.focal_index()], -kMaxFocalStep, kMaxFocalStep);
-    state.focal_ratio *= std::exp(zoom);
-    return still && std::abs(zoom) < kStillFocal;
+    state.readout += part * shared[normal.readout_index()];
+    state.focal_ratio *= std::exp(part * zoom);
+    const double sigmas = std::sqrt(shared.dot(normal.information() * shared));
+    if (!std::isfinite(sigmas) || !std::isfinite(state.focal_ratio)) return Step::none;
+    return sigmas < kStill ? Step::still : Step::taken;
+  }
+
+  /// How the residuals pull at the shared unknowns, summed over runs of neighbouring points on one
+  /// edge: what is wrong with these is wrong in every keyframe and hardly averages out.
+  Eigen::MatrixXd pulls(const State& state, const TargetNormal& normal) const {
+    const Eigen::VectorXd off = off_print(state);
+    const Eigen::Index frames = normal.keyframe_unknowns();
+    std::vector<Eigen::VectorXd> all;
+    for (std::size_t t = 0; t < printed.size(); ++t) {
+      const Eigen::Index place = frames + 6 * static_cast<Eigen::Index>(t);
+      const Eigen::Index print = frames + normal.print_index(static_cast<int>(t));
+      const std::vector<EdgePoint>& edge = printed[t].points;
+      Eigen::VectorXd pull = Eigen::VectorXd::Zero(frames + normal.shared_count());
+      int run = 0;
+      for (std::size_t i = 0; i < edge.size(); ++i) {
+        const Eigen::Index p = first[t] + static_cast<Eigen::Index>(i);
+        double own = 0;
+        for_each_offset(p, [&](const Observation& seen, int frame, double weight) {
+          const double w = weight * seen.offset;
+          own += w * seen.by.normal;
+          if (frame >= 0) pull.segment<6>(6 * frame) += w * seen.by.frame;
+          pull.segment<6>(place) += w * seen.by.tag;
+          pull[frames + normal.readout_index()] += w * seen.by.readout;
+          pull[frames + normal.focal_index()] += w * seen.by.focal;
+        });
+        const double printed_off = print_weight(off[p]) * off[p];
+        pull.segment<kPrintModes>(print) += printed_off * print_row(edge[i]);
+        pull += normal.point_pull(p, own - printed_off);
+        if (++run < kRun && i + 1 < edge.size() && same_edge(edge[i], edge[i + 1])) continue;
+        all.push_back(normal.reduced_pull(pull));
+        pull.setZero();
+        run = 0;
+      }
+    }
+    Eigen::MatrixXd columns(normal.shared_count(), all.size());
+    for (std::size_t c = 0; c < all.size(); ++c) columns.col(static_cast<Eigen::Index>(c)) = all[c];
+    return columns;
   }
 
   const TargetAtRest& rest;
@@ -309,14 +388,35 @@ using Places = Eigen::Matrix<Eigen::Index, 6, 1>;
 
 constexpr double kLengthUnit = 5e-3;  // m
 constexpr double kSpreadUnit = 1e-4;  // m
+constexpr double kPartUnit = 0.05;
 constexpr double kReadoutUnit = 0.1;  // s
 
 Eigen::VectorXd unit_vector(Eigen::Index frames, Eigen::Index tags) {
-  Eigen::VectorXd units = Eigen::VectorXd::Ones(6 * (frames + tags) + tags + 2);
+  const Eigen::Index prints = 6 * (frames + tags);
+  Eigen::VectorXd units = Eigen::VectorXd::Ones(prints + kPrintModes * tags + 2);
   for (Eigen::Index i = 0; i < frames + tags; ++i) units.segment<3>(6 * i).setConstant(kLengthUnit);
-  units.segment(6 * (frames + tags), tags).setConstant(kSpreadUnit);
-  units[6 * (frames + tags) + tags] = kReadoutUnit;
+  for (Eigen::Index t = 0; t < tags; ++t)
+    units.segment<kPrintModes>(prints + kPrintModes * t) << kSpreadUnit, kSpreadUnit, kPartUnit,
+        kPartUnit, kPartUnit;
+  units[prints + kPrintModes * tags] = kReadoutUnit;
   return units;
+}
+
+/// The sandwich estimator for clustered errors (Liang and Zeger, Biometrika 73(1), 1986), never
+/// less than `covariance`: each column of `pulls` is one cluster's, `fitted` parameters were taken
+/// out of them.
+Eigen::MatrixXd with_common_errors(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& pulls,
+                                   Eigen::Index fitted) {
+  const auto clusters = static_cast<double>(pulls.cols());
+  const double few = clusters / std::max(0.25 * clusters, clusters - static_cast<double>(fitted));
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  if (root.info() != Eigen::Success) return covariance;
+  // In units in which the covariance is one.
+  const Eigen::MatrixXd unit_pulls = root.matrixL().transpose() * pulls;
+  const EigenSystem<Eigen::Dynamic> eigen =
+      symmetric_eigen(Eigen::MatrixXd(few * unit_pulls * unit_pulls.transpose()));
+  const Eigen::MatrixXd axes = root.matrixL() * eigen.vectors;
+  return axes * eigen.values.cwiseMax(1.0).asDiagonal() * axes.transpose();
 }
 
 }  // namespace
@@ -326,49 +426,64 @@ TargetEstimate adjust_target(const TargetAtRest& rest, const std::vector<Keyfram
   Problem problem(rest);
   Problem::State state;
   state.camera_T_tag = rest.camera_T_tag;
-  state.spread.assign(state.camera_T_tag.size(), 0.0);
+  state.print.assign(state.camera_T_tag.size(), PrintModes::Zero());
   state.shift = Eigen::VectorXd::Zero(problem.points);
   for (const Keyframe& frame : frames)
     state.poses.push_back(moved(problem.rest_pose, frame.displacement));
 
   int steps = 0;
-  const auto settle = [&](Problem::State& from, bool free_focal) {
+  bool given_up = false;
+  const auto settles = [&](Problem::State& from, bool free_focal) {
     for (int i = 0; i < kMaxIterations; ++i) {
-      const bool still = problem.iterate(frames, from, free_focal);
-      if (progress && !progress(++steps / (2.0 * kMaxIterations))) return false;
-      if (still) break;
+      const Problem::Step step = problem.iterate(frames, from, free_focal);
+      given_up = progress && !progress(std::min(1.0, ++steps / kUsualSteps));
+      if (given_up || step == Problem::Step::none) return false;
+      if (step == Problem::Step::still) return true;
     }
-    return std::isfinite(from.focal_ratio);
+    return false;
   };
   TargetEstimate estimate;
   estimate.points = static_cast<int>(problem.points);
-  if (!settle(state, false)) return estimate;
+  if (!settles(state, false)) return estimate;
+
+  const auto inverse = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
+    return Ldlt<Eigen::Dynamic>(information).inverse();
+  };
+  // A focal length of the fit's own: where that leads nowhere the motion does not tell it.
   Problem::State zoomed = state;
-  if (!settle(zoomed, true)) return estimate;
-  estimate.focal_ratio = zoomed.focal_ratio;
+  if (settles(zoomed, true)) {
+    problem.observe_all(frames, zoomed);
+    problem.learn_noise();
+    TargetNormal normal = problem.equations(zoomed, false);
+    if (normal.reduce()) {
+      const Eigen::Index focal = normal.focal_index();
+      const double variance = inverse(normal.information())(focal, focal);
+      estimate.focal_ratio = zoomed.focal_ratio;
+      if (variance > 0) estimate.focal_sigma = std::hypot(kFocalModel, std::sqrt(variance));
+    }
+  }
+  if (given_up) return estimate;
 
   problem.observe_all(frames, state);
   problem.learn_noise();
+  problem.scatter = print_scatter(problem.printed, problem.first, problem.off_print(state));
   TargetNormal normal = problem.equations(state, false);
   TargetNormal alone = problem.equations(state, true);
   if (!normal.reduce() || !alone.reduce()) return estimate;
   const Eigen::Index all = normal.shared_count() - 1;  // without the focal length
   const auto tags = static_cast<Eigen::Index>(6 * state.camera_T_tag.size());
-  const auto inverse = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
-    return Ldlt<Eigen::Dynamic>(information).inverse();
-  };
-  const Eigen::MatrixXd covariance = inverse(normal.information().topLeftCorner(all, all));
+  const Eigen::MatrixXd covariance =
+      with_common_errors(inverse(normal.information().topLeftCorner(all, all)),
+                         problem.pulls(state, normal).topRows(all), tags);
   estimate.covariance = covariance.topLeftCorner(tags, tags);
   estimate.covariance_at_rest =
       inverse(alone.information().topLeftCorner(all, all)).topLeftCorner(tags, tags);
-  estimate.focal_sigma =
-      std::hypot(kFocalModel, std::sqrt(inverse(normal.information())(all, all)));
   estimate.readout = state.readout;
   const Eigen::Index readout = normal.readout_index();
   const double readout_noise = std::sqrt(covariance(readout, readout));
   estimate.readout_sigma = std::hypot(kReadoutModel, readout_noise);
   estimate.camera_T_tag = state.camera_T_tag;
-  estimate.ink_spread = state.spread;
+  estimate.print = state.print;
   estimate.print_scatter = problem.scatter.robust;
   estimate.noise_px = median({problem.noise_px.begin(), problem.noise_px.end()});
   double squares = 0, count = 0;
@@ -382,8 +497,7 @@ TargetEstimate adjust_target(const TargetAtRest& rest, const std::vector<Keyfram
   estimate.residual_px = std::sqrt(squares / std::max(1.0, count));
   // What one parameter takes off a sum of squared normalised residuals, in a linear fit.
   estimate.readout_gain = std::pow(estimate.readout / readout_noise, 2) / std::max(1.0, count);
-  estimate.solved = estimate.covariance.allFinite() && estimate.covariance_at_rest.allFinite() &&
-                    std::isfinite(estimate.focal_sigma);
+  estimate.solved = estimate.covariance.allFinite() && estimate.covariance_at_rest.allFinite();
   return estimate;
 }
 
@@ -415,7 +529,10 @@ EdgeDerivatives edge_derivatives(const CameraModel& camera, const EdgeMeasuremen
 }
 
 TargetNormal::TargetNormal(int frames, int tags, Eigen::Index points)
-    : tags_(tags), moving_(6 * frames), shared_(7 * tags + 2), units_(unit_vector(frames, tags)) {
+    : tags_(tags),
+      moving_(6 * frames),
+      shared_((6 + kPrintModes) * tags + 2),
+      units_(unit_vector(frames, tags)) {
   const Eigen::Index all = moving_ + shared_;
   normal_ = Eigen::MatrixXd::Zero(all, all);
   right_ = Eigen::VectorXd::Zero(all);
@@ -444,10 +561,13 @@ void TargetNormal::add(const EdgeEquation& equation) {
   pull_[equation.point] += v * equation.offset;
 }
 
-void TargetNormal::add_print(Eigen::Index point, int tag, double offset, double weight) {
-  const Eigen::Index spread = moving_ + spread_index(tag);
-  add_prior(spread_index(tag), -offset, weight);
-  coupling_(spread, point) -= weight * units_[spread];
+void TargetNormal::add_print(Eigen::Index point, int tag, const PrintModes& row, double offset,
+                             double weight) {
+  const Eigen::Index first = moving_ + print_index(tag);
+  const PrintModes by = row.cwiseProduct(units_.segment<kPrintModes>(first));
+  normal_.block<kPrintModes, kPrintModes>(first, first) += weight * by * by.transpose();
+  right_.segment<kPrintModes>(first) -= weight * offset * by;
+  coupling_.col(point).segment<kPrintModes>(first) -= weight * by;
   pivot_[point] += weight;
   pull_[point] += weight * offset;
 }
@@ -456,6 +576,17 @@ void TargetNormal::add_prior(Eigen::Index shared, double offset, double weight) 
   const Eigen::Index at = moving_ + shared;
   normal_(at, at) += weight * units_[at] * units_[at];
   right_[at] += weight * offset * units_[at];
+}
+
+void TargetNormal::add_total_size(double offset, double weight) {
+  for (int a = 0; a < tags_; ++a) {
+    const Eigen::Index i = moving_ + print_index(a) + kSizeMode;
+    right_[i] += weight * offset * units_[i];
+    for (int b = 0; b < tags_; ++b) {
+      const Eigen::Index j = moving_ + print_index(b) + kSizeMode;
+      normal_(i, j) += weight * units_[i] * units_[j];
+    }
+  }
 }
 
 bool TargetNormal::reduce() {
@@ -482,6 +613,19 @@ bool TargetNormal::reduce() {
 Eigen::MatrixXd TargetNormal::information() const {
   const auto units = units_.tail(shared_).cwiseInverse();
   return units.asDiagonal() * reduced_ * units.asDiagonal();
+}
+
+Eigen::VectorXd TargetNormal::reduced_pull(const Eigen::VectorXd& pull) const {
+  const auto lower = normal_.topLeftCorner(moving_, moving_).triangularView<Eigen::Lower>();
+  Eigen::VectorXd frames = pull.head(moving_).cwiseProduct(units_.head(moving_));
+  lower.solveInPlace(frames);
+  lower.transpose().solveInPlace(frames);
+  const Eigen::VectorXd given = normal_.bottomLeftCorner(shared_, moving_) * frames;
+  return pull.tail(shared_) - given.cwiseQuotient(units_.tail(shared_));
+}
+
+Eigen::VectorXd TargetNormal::point_pull(Eigen::Index point, double pull) const {
+  return -(pull / pivot_[point]) * coupling_.col(point).cwiseQuotient(units_);
 }
 
 Eigen::VectorXd TargetNormal::shared_step(bool free_focal) const {

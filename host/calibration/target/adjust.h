@@ -1,14 +1,16 @@
 // Bundle adjustment of the tags' placement: where each tag sits at rest, from the rest image and
 // pictures of the target in motion.
 //
-// Unknowns  camera_T_tag at rest for each tag; one ink spread for each tag; for every edge point
-//           how far its edge lies off the printed pattern (along its normal, in the tag's plane);
+// Unknowns  camera_T_tag at rest for each tag; how each tag is printed as a whole (ink spread,
+//           size, aspect, shear: PrintModes); for every edge point how far its edge lies off the
+//           printed pattern (along its normal, in the tag's plane);
 //           the displacement in every keyframe; the time that the camera takes from its first
 //           row to its last, while the target moves on; the focal length's error, if asked.
 // Data      the offsets of all edge points in the rest image and in all keyframes, px.
-// Prior     the edges lie about the pattern grown by the ink spread, with a scatter that is
-//           estimated. It gives the scale, and all that the rest image can tell about the planes;
-//           the rest comes from parallax, which knows nothing of the print.
+// Prior     the edges lie about the pattern as that tag printed it, with a scatter that is
+//           estimated, and the tags together are as large as said. That gives the scale, and all
+//           that the rest image can tell about the planes; the rest comes from parallax, which
+//           knows nothing of the print.
 //
 // Gauss-Newton. The points, one number each, are eliminated first, then the keyframes, six numbers
 // each (Schur complements), which leaves the few numbers that are wanted and their information
@@ -18,6 +20,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "host/core/types.h"
@@ -30,7 +33,7 @@ namespace tagwrench {
 /// What is known before the motion, and what after it, of the same parameters.
 struct TargetEstimate {
   std::vector<Eigen::Isometry3d> camera_T_tag;  ///< at rest
-  std::vector<double> ink_spread;               ///< of each tag, m
+  std::vector<PrintModes> print;                ///< of each tag
   /// Of all tags' motions at rest (6 numbers each: m, rad, camera axes), the focal length taken as
   /// given.
   Eigen::MatrixXd covariance;
@@ -39,11 +42,12 @@ struct TargetEstimate {
   double readout_sigma = 0;            ///< s
   /// By how much of an edge's variance the fit would be worse without the read-out time.
   double readout_gain = 0;
-  double focal_ratio = 1;    ///< that fits best, to the camera's
-  double focal_sigma = 0;    ///< of the ratio
+  double focal_ratio = 1;  ///< that fits best, to the camera's
+  /// Of the ratio; infinite where the motion does not tell it.
+  double focal_sigma = std::numeric_limits<double>::infinity();
   double noise_px = 0;       ///< of one edge in one keyframe
   double residual_px = 0;    ///< RMS over all edges of all keyframes, outliers included
-  double print_scatter = 0;  ///< of the edges about the pattern, m
+  double print_scatter = 0;  ///< of the edges about the tags' patterns as printed, m
   int points = 0;            ///< edge points in use
   bool solved = false;       ///< false: the equations had no solution
 };
@@ -107,14 +111,16 @@ struct EdgeEquation {
 };
 
 /// Unknowns: 6 for each keyframe; one for each point; and the shared ones, in the order 6 for each
-/// tag, one ink spread for each tag, the read-out time, the focal length's logarithm. SI.
+/// tag, the print modes of each tag, the read-out time, the focal length's logarithm. SI.
 class TargetNormal {
  public:
   TargetNormal(int frames, int tags, Eigen::Index points);
 
   void add(const EdgeEquation& equation);
-  /// shift - spread of the tag = offset + noise
-  void add_print(Eigen::Index point, int tag, double offset, double weight);
+  /// shift - row . modes of the tag's print = offset + noise
+  void add_print(Eigen::Index point, int tag, const PrintModes& row, double offset, double weight);
+  /// The sum of all tags' sizes = offset + noise
+  void add_total_size(double offset, double weight);
   /// A shared unknown, by its index = offset + noise
   void add_prior(Eigen::Index shared, double offset, double weight);
 
@@ -132,8 +138,16 @@ class TargetNormal {
   Eigen::VectorXd frame_steps(const Eigen::VectorXd& shared) const;
   Eigen::VectorXd point_steps(const Eigen::VectorXd& shared, const Eigen::VectorXd& frames) const;
 
+  /// What a pull on keyframes (6 each) and shared unknowns means for the shared ones, the keyframes
+  /// having given way.
+  Eigen::VectorXd reduced_pull(const Eigen::VectorXd& pull) const;
+  /// And what a pull on a point means for both.
+  Eigen::VectorXd point_pull(Eigen::Index point, double pull) const;
+  Eigen::Index keyframe_unknowns() const noexcept { return moving_; }
+
   Eigen::Index shared_count() const noexcept { return shared_; }
-  Eigen::Index spread_index(int tag) const noexcept { return 6 * tags_ + tag; }
+  /// The first of the tag's print modes.
+  Eigen::Index print_index(int tag) const noexcept { return 6 * tags_ + kPrintModes * tag; }
   Eigen::Index readout_index() const noexcept { return shared_ - 2; }
   Eigen::Index focal_index() const noexcept { return shared_ - 1; }
 

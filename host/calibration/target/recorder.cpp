@@ -46,11 +46,10 @@ constexpr double kMaxNoise_px = 0.3;  // of one edge
 constexpr double kMaxFocalError = 0.01;
 constexpr double kFocalSigmas = 3.0;
 constexpr double kReadoutSigmas = 8;
-constexpr double kMinReadoutGain = 0.05;     // of an edge's variance
-constexpr double kMaxPositionSigma = 10e-6;  // m
-constexpr double kMaxRotationSigma = 2e-3;   // rad
-constexpr double kBetterFraction = 0.9;      // of a sigma, to be called better known
-constexpr double kLearnedFraction = 0.98;    // and for the motion to have told anything
+constexpr double kMinReadoutGain = 0.05;   // of an edge's variance
+constexpr double kMaxOffset = 10e-6;       // m, standard deviation of a plane along its normal
+constexpr double kMaxTilt = 2e-3;          // rad, likewise
+constexpr double kLearnedFraction = 0.98;  // and for the motion to have told anything
 
 template <class... Args>
 [[noreturn]] void refuse(fmt::format_string<Args...> line, Args&&... args) {
@@ -269,13 +268,14 @@ void check_record(const TargetRecorder& record, const TargetDescription& target,
   }
 }
 
-void check_estimate(const TargetEstimate& estimate, const CameraModel& camera) {
+void check_estimate(const TargetEstimate& estimate, const TargetDescription& target,
+                    const CameraModel& camera) {
   if (!estimate.solved) {
     refuse(
         "the recording does not determine the tags' places; record again with slow, large motions "
         "along every axis");
   }
-  const double off = std::abs(estimate.focal_ratio - 1);
+  const double off = std::abs(estimate.focal_ratio - 1);  // with an infinite sigma where not told
   if (off > kMaxFocalError && off > kFocalSigmas * estimate.focal_sigma) {
     refuse(
         "the focal length that fits best is {:.1f} +- {:.1f} px, sensor.yaml says {:.1f}; run "
@@ -293,29 +293,72 @@ void check_estimate(const TargetEstimate& estimate, const CameraModel& camera) {
         "the motion tells nothing that the rest image does not; tilt and push further, with better "
         "light");
   }
-  double position = 0, rotation = 0;
-  for (const Vector6& sigma : platform_sigmas(estimate.covariance)) {
-    position = std::max(position, sigma.head<3>().maxCoeff());
-    rotation = std::max(rotation, sigma.tail<3>().maxCoeff());
-  }
-  if (position > kMaxPositionSigma || rotation > kMaxRotationSigma) {
+  const TargetSigmas sigmas = target_sigmas(estimate, target);
+  if (sigmas.tilt() > kMaxTilt || sigmas.offset() > kMaxOffset) {
     refuse(
-        "the tags' places stay uncertain by {:.1f} um and {:.2f} mrad, {:.0f} and {:.0f} are the "
+        "the tags' planes stay uncertain by {:.1f} um and {:.2f} mrad, {:.0f} and {:.0f} are the "
         "limit; move further and longer, and check focus, light and print",
-        position * 1e6, rotation * 1e3, kMaxPositionSigma * 1e6, kMaxRotationSigma * 1e3);
+        sigmas.offset() * 1e6, sigmas.tilt() * 1e3, kMaxOffset * 1e6, kMaxTilt * 1e3);
   }
 }
 
-std::vector<Vector6> platform_sigmas(const Eigen::MatrixXd& covariance) {
-  const Eigen::Index tags = covariance.rows() / 6;
-  std::vector<Vector6> out;
-  for (Eigen::Index t = 0; t < tags; ++t) {
-    Eigen::MatrixXd map = Eigen::MatrixXd::Zero(6, covariance.rows());
-    map.middleCols<6>(6 * t).setIdentity();
-    for (Eigen::Index other = 0; other < tags; ++other)
-      map.block<3, 3>(0, 6 * other) -= Eigen::Matrix3d::Identity() / static_cast<double>(tags);
-    const Eigen::MatrixXd own = map * covariance * map.transpose();
-    out.emplace_back(own.diagonal().cwiseMax(0.0).cwiseSqrt());
+double TargetSigmas::tilt() const {
+  double largest = 0;
+  for (const Vector6& sigma : tag) largest = std::max({largest, sigma[3], sigma[4]});
+  return largest;
+}
+
+double TargetSigmas::offset() const {
+  double largest = 0;
+  for (const Vector6& sigma : tag) largest = std::max(largest, sigma[2]);
+  return largest;
+}
+
+TargetSigmas target_sigmas(const Eigen::MatrixXd& covariance,
+                           const std::vector<Eigen::Isometry3d>& camera_T_tag) {
+  const Eigen::Index all = covariance.rows();
+  const auto tags = static_cast<double>(camera_T_tag.size());
+  Eigen::VectorXd distances = Eigen::VectorXd::Zero(all);  // motion of the tags by the scale
+  Eigen::VectorXd scale = Eigen::VectorXd::Zero(all);      // scale by the tags' motion
+  for (std::size_t t = 0; t < camera_T_tag.size(); ++t) {
+    const Eigen::Vector3d& place = camera_T_tag[t].translation();
+    distances.segment<3>(6 * static_cast<Eigen::Index>(t)) = place;
+    scale.segment<3>(6 * static_cast<Eigen::Index>(t)) = place / (place.squaredNorm() * tags);
+  }
+  const Eigen::MatrixXd without =
+      Eigen::MatrixXd::Identity(all, all) - distances * scale.transpose();
+  const Eigen::MatrixXd shape = without * covariance * without.transpose();
+  TargetSigmas out;
+  out.scale = std::sqrt(std::max(0.0, scale.dot(covariance * scale)));
+  for (std::size_t t = 0; t < camera_T_tag.size(); ++t) {
+    const auto at = 6 * static_cast<Eigen::Index>(t);
+    out.tag.push_back(tag_sigma(shape.block<6, 6>(at, at), camera_T_tag[t].linear()));
+  }
+  return out;
+}
+
+double widest_spread(const TargetEstimate& estimate) {
+  double widest = 0;
+  for (const PrintModes& print : estimate.print) widest = std::max(widest, std::abs(print[0]));
+  return widest;
+}
+
+TargetSigmas target_sigmas(const TargetEstimate& estimate, const TargetDescription& target) {
+  TargetSigmas out = target_sigmas(estimate.covariance, estimate.camera_T_tag);
+  out.scale = std::hypot(out.scale, print_size_sigma(estimate.print_scatter,
+                                                     widest_spread(estimate), target.tag_size));
+  return out;
+}
+
+TargetDescription calibrated_target(const TargetDescription& target,
+                                    const TargetEstimate& estimate) {
+  TargetDescription out = target;
+  const Eigen::Isometry3d platform = midpoint_frame(estimate.camera_T_tag);
+  const TargetSigmas sigmas = target_sigmas(estimate, target);
+  out.scale_sigma = sigmas.scale;
+  for (std::size_t t = 0; t < out.tags.size(); ++t) {
+    out.tags[t].platform_T_tag = platform.inverse() * estimate.camera_T_tag[t];
+    out.tags[t].sigma = sigmas.tag[t];
   }
   return out;
 }
@@ -348,32 +391,34 @@ std::vector<std::string> describe(const TargetRecorder& record, const TargetEsti
       range[0] * 1e3, range[1] * 1e3, range[2] * 1e3, range[3] / kDegree, range[4] / kDegree,
       range[5] / kDegree, span.widest / kDegree, span.narrowest / kDegree, kMinView / kDegree));
   const Eigen::Isometry3d platform = midpoint_frame(estimate.camera_T_tag);
-  const std::vector<Vector6> after = platform_sigmas(estimate.covariance);
-  const std::vector<Vector6> before = platform_sigmas(estimate.covariance_at_rest);
+  const TargetSigmas after = target_sigmas(estimate, target);
+  const TargetSigmas before = target_sigmas(estimate.covariance_at_rest, estimate.camera_T_tag);
   for (std::size_t t = 0; t < target.tags.size(); ++t) {
     const Vector6 pose = motion_between(Eigen::Isometry3d::Identity(),
                                         platform.inverse() * estimate.camera_T_tag[t]);
-    const auto three = [](const Vector6& v, Eigen::Index from, double scale, int digits) {
-      return fmt::format("{:.{}f} {:.{}f} {:.{}f}", v[from] * scale, digits, v[from + 1] * scale,
-                         digits, v[from + 2] * scale, digits);
+    const auto plane = [&](const TargetSigmas& sigmas) {
+      const Vector6& s = sigmas.tag[t];
+      return fmt::format("{:.1f} um along its normal, {:.2f} and {:.2f} mrad of tilt", s[2] * 1e6,
+                         s[3] * 1e3, s[4] * 1e3);
     };
-    lines.push_back(
-        fmt::format("tag {}: position {} mm +- {} um (from the rest alone +- {}); rotation {} rad "
-                    "+- {} mrad (+- {})",
-                    target.tags[t].id, three(pose, 0, 1e3, 4), three(after[t], 0, 1e6, 2),
-                    three(before[t], 0, 1e6, 2), three(pose, 3, 1, 5), three(after[t], 3, 1e3, 2),
-                    three(before[t], 3, 1e3, 2)));
+    lines.push_back(fmt::format(
+        "tag {}: position {:.4f} {:.4f} {:.4f} mm, rotation {:.5f} {:.5f} {:.5f} rad; its plane to "
+        "+- {} (from the rest alone +- {})",
+        target.tags[t].id, pose[0] * 1e3, pose[1] * 1e3, pose[2] * 1e3, pose[3], pose[4], pose[5],
+        plane(after), plane(before)));
   }
-  const int all = static_cast<int>(estimate.covariance.rows());
-  const int better = better_known(estimate, kBetterFraction);
-  lines.push_back(
-      fmt::format("{} of {} combinations of these are known better than from the rest; the other "
-                  "{} hang on the print, whose edges scatter by {:.1f} um",
-                  better, all, all - better, estimate.print_scatter * 1e6));
   lines.push_back(fmt::format(
-      "focal length: {:.2f} +- {:.2f} px fits best, sensor.yaml says {:.2f}; residual {:.3f} px",
-      camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma, camera.fx_px,
-      estimate.residual_px));
+      "scale: +- {:.1f} %, from the tags' size as printed (edges scatter by {:.1f} um about the "
+      "pattern, ink or light spreads by up to {:.1f} um); a calibration in newtons absorbs it",
+      100 * after.scale, estimate.print_scatter * 1e6, 1e6 * widest_spread(estimate)));
+  lines.push_back(
+      std::isfinite(estimate.focal_sigma)
+          ? fmt::format("focal length: {:.2f} +- {:.2f} px fits best, sensor.yaml says {:.2f}",
+                        camera.fx_px * estimate.focal_ratio, camera.fx_px * estimate.focal_sigma,
+                        camera.fx_px)
+          : fmt::format("focal length: this motion does not tell it; sensor.yaml says {:.2f} px",
+                        camera.fx_px));
+  lines.back() += fmt::format("; residual {:.3f} px", estimate.residual_px);
   lines.push_back(fmt::format(
       "read-out: {:.1f} +- {:.1f} ms from the first row to the last, sensor.yaml says {:.1f}{}",
       std::round(estimate.readout * 1e4) * 0.1 + 0.0,  // never "-0"

@@ -118,11 +118,32 @@ void check_record(const TargetRecorder& record, const TargetDescription& target,
 
 /// Throws ConfigError for an adjustment that must not be believed: no solution, edges off the
 /// model, another focal length, nothing learned from the motion, too uncertain.
-void check_estimate(const TargetEstimate& estimate, const CameraModel& camera);
+void check_estimate(const TargetEstimate& estimate, const TargetDescription& target,
+                    const CameraModel& camera);
 
-/// Standard deviations of a tag's pose in the platform frame: m, rad. The platform's origin moves
-/// with the tags.
-std::vector<Vector6> platform_sigmas(const Eigen::MatrixXd& covariance);
+/// How well the tags' places are known.
+struct TargetSigmas {
+  /// Of each tag, along its own axes: m, rad; the scale of all taken out. Along x and y and about z
+  /// every edge point has a place of its own, so that motion cannot tell these and tracking does
+  /// not feel them; the plane is what counts: tilt about x and y, and place along z.
+  std::vector<Vector6> tag;
+  double scale = 0;  ///< of all distances together, a part
+
+  double tilt() const;    ///< the largest, rad
+  double offset() const;  ///< along a normal, the largest, m
+};
+
+/// `covariance` of all tags' motions (6 each, camera axes); the scale's is that of the tags' mean
+/// distance from the lens.
+TargetSigmas target_sigmas(const Eigen::MatrixXd& covariance,
+                           const std::vector<Eigen::Isometry3d>& camera_T_tag);
+
+/// After the motion, with what the size of the print leaves open.
+TargetSigmas target_sigmas(const TargetEstimate& estimate, const TargetDescription& target);
+
+/// The target with its tags where the motion has them, and how well that is known.
+TargetDescription calibrated_target(const TargetDescription& target,
+                                    const TargetEstimate& estimate);
 
 /// Of the unknowns of all tags, combinations whose standard deviation the motion has brought below
 /// this part of that from the rest image alone.

@@ -189,8 +189,9 @@ class Session {
     SensorConfig now = sensor_;
     for (std::size_t t = 0; t < now.target.tags.size(); ++t) {
       now.target.tags[t].platform_T_tag = rest.platform_T_tag[t];
-      now.target.tags[t].sigma.setZero();  // of another measurement, if there was one
+      now.target.tags[t].sigma = rest.tag_sigma[t];
     }
+    now.target.scale_sigma = rest.scale_sigma;
     now.rest.camera_T_platform = rest.camera_T_platform;
     now.rest.appearance.reset();
     const MeasuredStamp stamp{date, "tagwrench in a browser", fs::path(name_).filename().string()};

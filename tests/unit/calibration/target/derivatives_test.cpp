@@ -114,7 +114,7 @@ TEST(TargetEquations, EliminationSolvesWhatTheFullEquationsSay) {
   constexpr int kViews = 3;
   constexpr int kTags = 2;
   constexpr Eigen::Index kPoints = 16;
-  constexpr Eigen::Index kShared = 7 * kTags + 2;
+  constexpr Eigen::Index kShared = (6 + kPrintModes) * kTags + 2;
   constexpr Eigen::Index kAll = 6 * kViews + kShared + kPoints;
   std::mt19937 random(3);
   std::normal_distribution<double> gauss;
@@ -157,16 +157,25 @@ TEST(TargetEquations, EliminationSolvesWhatTheFullEquationsSay) {
       add(row, e.offset, e.weight);
     }
     const double offset = gauss(random);
-    normal.add_print(p, tag, offset, 2.0);
+    PrintModes modes;
+    for (double& mode : modes) mode = gauss(random);
+    normal.add_print(p, tag, modes, offset, 2.0);
     Eigen::VectorXd row = Eigen::VectorXd::Zero(kAll);
     row[points + p] = 1;
-    row[shared + normal.spread_index(tag)] = -1;
+    row.segment<kPrintModes>(shared + normal.print_index(tag)) = -modes;
     add(row, offset, 2.0);
   }
+  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(kAll);
   for (int tag = 0; tag < kTags; ++tag) {
-    normal.add_prior(normal.spread_index(tag), 0.3, 0.5);
-    add(Eigen::VectorXd::Unit(kAll, shared + normal.spread_index(tag)), 0.3, 0.5);
+    for (int mode = 0; mode < kPrintModes; ++mode) {
+      const Eigen::Index at = normal.print_index(tag) + mode;
+      normal.add_prior(at, 0.3, 0.5);
+      add(Eigen::VectorXd::Unit(kAll, shared + at), 0.3, 0.5);
+    }
+    sizes[shared + normal.print_index(tag) + kSizeMode] = 1;
   }
+  normal.add_total_size(0.1, 4.0);
+  add(sizes, 0.1, 4.0);
   normal.add_prior(normal.readout_index(), -0.2, 1.5);
   add(Eigen::VectorXd::Unit(kAll, shared + normal.readout_index()), -0.2, 1.5);
   const Eigen::VectorXd solution = full.ldlt().solve(right);
@@ -182,6 +191,14 @@ TEST(TargetEquations, EliminationSolvesWhatTheFullEquationsSay) {
   EXPECT_LT(
       (normal.information() * covariance - Eigen::MatrixXd::Identity(kShared, kShared)).norm(),
       1e-6);
+  // A pull on any unknown moves the shared ones as the full equations say.
+  Eigen::VectorXd pulls(kAll);
+  for (double& pull : pulls) pull = gauss(random);
+  Eigen::VectorXd pulled = pulls.head(shared + kShared);
+  for (Eigen::Index p = 0; p < kPoints; ++p) pulled += normal.point_pull(p, pulls[points + p]);
+  const Eigen::VectorXd answer = full.ldlt().solve(pulls);
+  EXPECT_LT((covariance * normal.reduced_pull(pulled) - answer.segment(shared, kShared)).norm(),
+            1e-8 * answer.norm());
   // With the focal length held it must stay, and the others move by less.
   const Eigen::VectorXd held = normal.shared_step(false);
   EXPECT_EQ(held[kShared - 1], 0.0);
