@@ -181,7 +181,7 @@ struct DiagnosticDetails {
   std::string_view expected_family;
   double amount = 0;  ///< grey level of the brightest pixels; part of pixels that are white; px
                       ///< that the sharpest edge is wide; size of the tags over what was described;
-                      ///< readout (s)
+                      ///< readout (s); sway of a platform at rest (m)
   Vector6 offset = Vector6::Zero();  ///< from rest to where the target is, m and rad, camera axes
   bool rest_given = false;           ///< by the sensor's description, not learned
 };

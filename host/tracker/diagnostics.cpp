@@ -373,7 +373,14 @@ std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& d) {
     case Diagnostic::image_looks_unmirrored:
       return "the image does not look mirrored, but sensor.yaml says so; set camera.mirrored: "
              "false in sensor.yaml";
-    case Diagnostic::rest_learned: return "rest pose learned; the wrench counts from here";
+    case Diagnostic::rest_learned:
+      if (d.amount > 0)
+        return fmt::format(
+            "rest pose learned while the platform swayed by {:.0f} um; all numbers are uncertain "
+            "by "
+            "as much; for better ones put it on something firm, hands off, and start again",
+            d.amount * 1e6);
+      return "rest pose learned; the wrench counts from here";
     case Diagnostic::moved_while_learning:
       return "the platform moved while its rest pose was learned; let it rest for a moment";
     case Diagnostic::appearance_does_not_fit:

@@ -17,6 +17,9 @@ namespace {
 /// Motion of the tags' corners that spoils the average, px: a fifth of the blur would still be
 /// harmless.
 constexpr double kMoved_px = 0.5;
+/// Root mean square from where less is not told from noise, px: edges are found to a few
+/// hundredths.
+constexpr double kSway_px = 0.1;
 
 /// Light, blur and profiles of finite length displace edges by about this much, px; scatter does
 /// not show it.
@@ -69,6 +72,24 @@ double likeness(const CameraModel& camera, const ReferenceImage& image, const Ta
 
 }  // namespace
 
+void RestSway::add(const Vector6& motion, double motion_px, bool counted) {
+  ++frames_;
+  squares_px_ += motion_px * motion_px;
+  sum_ += motion;
+  squares_ += motion * motion.transpose();
+  if (!counted) return;
+  ++counted_;
+  counted_sum_ += motion;
+}
+
+Matrix6 RestSway::covariance() const {
+  if (counted_ == 0 || squares_px_ < frames_ * kSway_px * kSway_px) return Matrix6::Zero();
+  const Vector6 mean = counted_sum_ / counted_;
+  const Vector6 all = sum_ / frames_;
+  return squares_ / frames_ - mean * all.transpose() - all * mean.transpose() +
+         mean * mean.transpose();
+}
+
 ReferenceEstimator::ReferenceEstimator(const CameraModel& camera, const TargetDescription& target,
                                        const ReferenceOptions& options,
                                        const std::vector<TagPattern>& patterns)
@@ -83,22 +104,36 @@ ReferenceEstimator::ReferenceEstimator(const CameraModel& camera, const TargetDe
 ReferenceEstimator::Progress ReferenceEstimator::add(const ImageView& image,
                                                      const Finding& finding) {
   if (frames_ == 0) {
-    if (!start(image, finding)) return Progress::waiting;
+    if (!start(image, finding)) {
+      held_ = 0;
+      return Progress::waiting;
+    }
+    apart_ = 0;
+    sway_.begin();
+    sway_.add(Vector6::Zero(), 0, true);
   } else {
     const Refinement fit = joint_.refine(image, last_pose_);
     tags_seen_ = fit.tags_held;
-    const bool all = fit.verdict == Verdict::held && fit.tags_held == description_.tags.size();
-    const bool has_moved = all && motion_px(fit.camera_T_platform) > kMoved_px;
-    if (!all || has_moved) {
-      frames_ = 0;
-      return has_moved ? Progress::moved : Progress::waiting;
+    if (fit.verdict != Verdict::held || fit.tags_held != description_.tags.size()) {
+      frames_ = held_ = 0;
+      return Progress::waiting;
     }
     last_pose_ = fit.camera_T_platform;
+    const double way_px = motion_px(last_pose_);
+    const bool near = way_px <= kMoved_px;
+    sway_.add(motion_between(first_pose_, last_pose_), way_px, near);
+    ++held_;
+    apart_ = near ? 0 : apart_ + 1;
+    if (!near && sways() && apart_ < least_frames()) return Progress::swaying;
+    if (!near) {
+      frames_ = 0;
+      return Progress::moved;
+    }
   }
   accumulate(image);
-  if (frames_ < std::max(1, options_.frames)) return Progress::learning;
+  if (frames_ < least_frames()) return Progress::learning;
   const bool learned = finish();
-  frames_ = 0;
+  frames_ = held_ = 0;
   return learned ? Progress::done : Progress::waiting;
 }
 
@@ -252,6 +287,7 @@ bool ReferenceEstimator::finish() {
   const float scale = 1.0F / static_cast<float>(frames_);
   for (float& level : sum_) level *= scale;
   learned_.noise = measure_noise();
+  learned_.sway = sway_.covariance();
   const PixelView<float> mean{sum_.data(), camera_.width_px, camera_.height_px, camera_.width_px};
 
   // Every tag by itself, from where the joint fit has it.

@@ -125,7 +125,7 @@ struct Tracker::Impl {
         make_pixel_template(camera, {image.level.data(), image.width, image.height, image.width},
                             std::max(1, image.frames), learned.noise, acquirer.patterns(),
                             learned.target, learned.seen_from, {}));
-    pose_covariance = reference.given ? learned.pose_covariance : Matrix6::Zero();
+    pose_covariance = reference.given ? learned.pose_covariance : learned.sway;
     geometry.set(aligner, learned.seen_from, learned.tag_covariance, learned.scale_sigma);
     photometric = {};
   }
@@ -137,6 +137,7 @@ struct Tracker::Impl {
     track.tags_held = static_cast<std::uint8_t>(learner.tags_seen());
     if (facts.learning != ReferenceEstimator::Progress::done) return;
     adopt(learner.learned());
+    track.details.amount = std::sqrt(learner.learned().sway.diagonal().head<3>().maxCoeff());
     predictor.start(frame.capture_time, reference.camera_T_platform);
     enter_held();
   }
@@ -285,7 +286,8 @@ struct Tracker::Impl {
   PhotometricAligner aligner;
   PhotometricState photometric;
   GeometryUncertainty geometry;
-  Matrix6 pose_covariance = Matrix6::Zero();  ///< of the picture's place against a given reference
+  /// Of the picture's place against a given reference, or of a platform that swayed at rest.
+  Matrix6 pose_covariance = Matrix6::Zero();
 };
 
 Tracker::Tracker(const CameraModel& camera, const TargetDescription& target,

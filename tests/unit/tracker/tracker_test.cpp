@@ -236,6 +236,31 @@ TEST(Tracker, MovingWhileLearningStartsAgain) {
   EXPECT_EQ(bench.show(elsewhere).diagnostic, Diagnostic::rest_learned);
 }
 
+TEST(Tracker, APlatformThatNeverStandsStillIsLearnedWithItsSwayInTheCovariance) {
+  constexpr double kSway_mm = 0.02;  // 0.75 px, twice a second
+  Bench bench(render::roof(), roof_target());
+  const auto swayed = [&](int i) {
+    return pose6(kSway_mm * std::sin(2 * M_PI * 2.0 * i / 25), 0, 0, 0, 0, 0);
+  };
+  int i = 0;
+  Track track;
+  while (i < 10 * kRestFrames && track.diagnostic != Diagnostic::rest_learned)
+    track = bench.show(swayed(++i));
+  ASSERT_EQ(track.diagnostic, Diagnostic::rest_learned);
+  EXPECT_GT(i, 2 * kRestFrames) << "not while a still rest may come";
+  EXPECT_NEAR(track.details.amount, 1e-3 * kSway_mm / std::sqrt(2), 0.7e-3 * kSway_mm);
+  double squares = 0;
+  constexpr int kJudged = 50;
+  for (int k = 0; k < kJudged; ++k) {
+    const Vector6 truth = swayed(++i);
+    track = bench.show(truth);
+    ASSERT_EQ(track.status, Status::ok);
+    squares += std::pow(track.displacement[0] - truth[0], 2) / track.covariance(0, 0);
+  }
+  EXPECT_LT(squares / kJudged, 1.5);
+  EXPECT_LT(std::sqrt(track.covariance(0, 0)), 2e-3 * kSway_mm);
+}
+
 TEST(Tracker, MirroredImageIsRecognised) {
   Bench bench(render::roof(), roof_target());
   Scene flipped = bench.scene;
