@@ -2,7 +2,7 @@
 // In:  frames of a source; the camera as calibrated.
 // Out: each tag's pose in the platform frame (m, rad) with sigmas, the rest pose in the
 //      camera frame, the picture at rest, the shutter's read-out (s).
-// Then: adjust.h (the least squares).
+// Then: adjust.h (the least squares), equations.h.
 //
 // First the platform is seen at rest, then in motion; then whether that, and what was found, is
 // good enough to be written.

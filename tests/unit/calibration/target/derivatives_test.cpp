@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <random>
 
-#include "host/calibration/target/adjust.h"
+#include "host/calibration/target/equations.h"
 #include "host/tracker/acquire.h"
 #include "host/tracker/camera_model.h"
 #include "tests/support/differences.h"
