@@ -71,24 +71,28 @@ double overlap(double a0, double a1, double b0, double b1) {
   return std::max(0.0, std::min(a1, b1) - std::max(a0, b0));
 }
 
-// The ink with every black cell grown by `spread` on all sides, as area coverage. Growth cuts each
-// axis into strips: one around every line between cells (it belongs to both neighbours) and one
-// inside of every cell.
+// The ink with every black cell grown on both sides along x and along y, as area coverage. Growth
+// cuts each axis into strips: one around every line between cells (it belongs to both neighbours)
+// and one inside of every cell.
 class InkCoverage {
  public:
-  InkCoverage(const TagCells& cells, double size, double spread)
-      : cells_(cells), cell_(size / cells.across), start_(-0.5 * size), spread_(spread) {}
+  InkCoverage(const TagCells& cells, double size, double spread_x, double spread_y)
+      : cells_(cells),
+        cell_(size / cells.across),
+        start_(-0.5 * size),
+        spread_x_(spread_x),
+        spread_y_(spread_y) {}
 
   /// Share of the rectangle that is black.
   double operator()(double x0, double x1, double y0, double y1) const {
-    const Range columns = strips(x0, x1);
-    const Range rows = strips(y0, y1);
+    const Range columns = strips(x0, x1, spread_x_);
+    const Range rows = strips(y0, y1, spread_y_);
     double area = 0;
     for (int row = rows.first; row <= rows.last; ++row) {
-      const double height = strip_overlap(row, y0, y1);
+      const double height = strip_overlap(row, y0, y1, spread_y_);
       if (height <= 0) continue;
       for (int column = columns.first; column <= columns.last; ++column)
-        if (black(column, row)) area += height * strip_overlap(column, x0, x1);
+        if (black(column, row)) area += height * strip_overlap(column, x0, x1, spread_x_);
     }
     return area / ((x1 - x0) * (y1 - y0));
   }
@@ -99,16 +103,16 @@ class InkCoverage {
   };
 
   // Strip 2i lies around line i, strip 2i + 1 inside of cell i.
-  Range strips(double a0, double a1) const {
-    const int first = 2 * static_cast<int>(std::floor((a0 - spread_ - start_) / cell_));
-    const int last = 2 * static_cast<int>(std::ceil((a1 + spread_ - start_) / cell_));
+  Range strips(double a0, double a1, double spread) const {
+    const int first = 2 * static_cast<int>(std::floor((a0 - spread - start_) / cell_));
+    const int last = 2 * static_cast<int>(std::ceil((a1 + spread - start_) / cell_));
     return {std::max(first, 0), std::min(last, 2 * cells_.across)};
   }
 
-  double strip_overlap(int strip, double a0, double a1) const {
+  double strip_overlap(int strip, double a0, double a1, double spread) const {
     const double line = start_ + (strip / 2) * cell_;
-    return strip % 2 == 0 ? overlap(line - spread_, line + spread_, a0, a1)
-                          : overlap(line + spread_, line + cell_ - spread_, a0, a1);
+    return strip % 2 == 0 ? overlap(line - spread, line + spread, a0, a1)
+                          : overlap(line + spread, line + cell_ - spread, a0, a1);
   }
 
   bool black(int column_strip, int row_strip) const {
@@ -125,7 +129,7 @@ class InkCoverage {
   }
 
   const TagCells& cells_;
-  double cell_, start_, spread_;
+  double cell_, start_, spread_x_, spread_y_;
 };
 
 std::vector<float> gaussian(double sigma) {
@@ -249,8 +253,8 @@ TagCells tag_cells(const std::string& family, int id) {
                 [&bits](int row, int column) { return bits.at<std::uint8_t>(row, column) != 0; });
 }
 
-Texture print_tag(const Target& target, const TagCells& cells, double texels_per_m,
-                  std::uint64_t seed) {
+Texture print_tag(const Target& target, const PrintFault& fault, const TagCells& cells,
+                  double texels_per_m, std::uint64_t seed) {
   const double half_paper = 0.5 * target.tag_size + target.border;
   const double half = half_paper + kMaxRaggedness * target.paper_raggedness;
   Texture t = Texture::of_size(half, half, texels_per_m);
@@ -258,7 +262,8 @@ Texture print_tag(const Target& target, const TagCells& cells, double texels_per
   const SmoothNoise ink_x(random, kInkEdgeSize), ink_y(random, kInkEdgeSize);
   const SmoothNoise cut_x(random, kCutSize), cut_y(random, kCutSize);
   const SmoothNoise grain(random, kInkGrainSize);
-  const InkCoverage ink(cells, target.tag_size, target.ink_spread);
+  const InkCoverage ink(cells, target.tag_size, target.ink_spread + fault.growth.x(),
+                        target.ink_spread + fault.growth.y());
   const double h = 0.5 / texels_per_m;
   const double limit = kMaxRaggedness * target.paper_raggedness;
   t.each([&](double x, double y, Texel& texel) {
@@ -266,8 +271,9 @@ Texture print_tag(const Target& target, const TagCells& cells, double texels_per
     const double cy = y + std::clamp(target.paper_raggedness * cut_y(x, y), -limit, limit);
     const double paper = overlap(cx - h, cx + h, -half_paper, half_paper) *
                          overlap(cy - h, cy + h, -half_paper, half_paper) / (4 * h * h);
-    const double ix = x + target.ink_edge_roughness * ink_x(x, y);
-    const double iy = y + target.ink_edge_roughness * ink_y(x, y);
+    const Eigen::Vector2d drawn = fault.drawn({x, y});
+    const double ix = drawn.x() + target.ink_edge_roughness * ink_x(x, y);
+    const double iy = drawn.y() + target.ink_edge_roughness * ink_y(x, y);
     const double black = ink(ix - h, ix + h, iy - h, iy + h);
     const double clean =
         target.paper_reflectance + black * (target.ink_reflectance - target.paper_reflectance);

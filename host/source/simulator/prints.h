@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "host/source/simulator/disturbances.h"
+#include "host/source/simulator/print_fault.h"
 #include "host/source/simulator/random.h"
 #include "host/source/simulator/scenario.h"
 
@@ -79,9 +80,9 @@ int family_size(const std::string& family);
 TagCells tag_cells(const std::string& family, int id);
 
 /// Paper and ink; every edge at its exact place (area coverage), moved only by ink spread and
-/// roughness.
-Texture print_tag(const Target& target, const TagCells& cells, double texels_per_m,
-                  std::uint64_t seed);
+/// roughness, and by what is off as a whole.
+Texture print_tag(const Target& target, const PrintFault& fault, const TagCells& cells,
+                  double texels_per_m, std::uint64_t seed);
 
 // Dust and scratches on a printed tag.
 

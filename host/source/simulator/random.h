@@ -73,7 +73,7 @@ enum Stream : std::uint64_t {
   kHardMotion, kHardMotionOrder, kDisturbances, kDisturbanceOrder, kDirt, kLostFrames,
   kDeliveryJitter, kStaleFrames,
   kBenchMass, kBenchPoint, kBenchMounting, kBenchAction, kBenchStroke, kBenchHand,
-  kLoadCell, kSixAxis, kBenchString, kDeskActs, kDeskWander,
+  kLoadCell, kSixAxis, kBenchString, kDeskActs, kDeskWander, kPrintFault,
   kPrint = 100
 };
 // clang-format on

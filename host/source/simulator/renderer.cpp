@@ -93,9 +93,11 @@ void Renderer::build_layers(const Scenario& scenario) {
   for (std::size_t i = 0; i < tags_.size(); ++i) {
     Layer paper;
     paper.platform_T_plane = tags_[i].platform_T_tag;
+    const RigidPose rest{Eigen::Matrix3d::Identity(), target_.rest_position};
+    const PrintFault fault = print_fault(target_, i, seed_, rest * tags_[i].platform_T_tag);
     const Texture print =
-        print_tag(target_, tag_cells(target_.family, tags_[i].id), kTexelsPerPixel * texels_per_m,
-                  seed_ + static_cast<std::uint64_t>(tags_[i].id));
+        print_tag(target_, fault, tag_cells(target_.family, tags_[i].id),
+                  kTexelsPerPixel * texels_per_m, seed_ + static_cast<std::uint64_t>(tags_[i].id));
     paper.texture = softened(print, kTexelsPerPixel * before_sampling_px(optics_));
     paper.fine = true;
     paper.tag = i;

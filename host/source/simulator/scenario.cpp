@@ -226,7 +226,15 @@ std::vector<Section> sections(Scenario& s) {
             {"ink_spread_um", s.target.ink_spread, -kMost, kMost, kMicro},
             {"ink_edge_roughness_um", s.target.ink_edge_roughness, 0, 1e3, kMicro},
             {"ink_grain", s.target.ink_grain, 0, 0.5},
-            {"paper_raggedness_um", s.target.paper_raggedness, 0, 1e3, kMicro}}},
+            {"paper_raggedness_um", s.target.paper_raggedness, 0, 1e3, kMicro},
+            {"print_size", s.target.print_size, -0.05, 0.05},
+            {"print_aspect", s.target.print_aspect, -0.05, 0.05},
+            {"print_shear", s.target.print_shear, -0.05, 0.05},
+            {"ink_growth_x_um", s.target.ink_growth_x, 0, 1e3, kMicro},
+            {"ink_growth_y_um", s.target.ink_growth_y, 0, 1e3, kMicro},
+            {"paper_curl_um", s.target.paper_curl, -1e3, 1e3, kMicro},
+            {"paper_curl_direction_rad", s.target.paper_curl_direction, -kMost, kMost},
+            {"print_error", s.target.print_error, 0, 0.02}}},
           {"light",
            {{"level_counts", s.light.level_counts, 0, 1e4},
             {"unevenness", s.light.unevenness, 0, 1},
@@ -400,6 +408,8 @@ std::string target_problem(const Target& t) {
     return "target.border_mm must lie between 0 and the tag size";
   if (!(t.ink_spread >= 0 && t.ink_spread < 0.02 * t.tag_size))
     return "target.ink_spread_um must lie between 0 and 2 % of the tag size";
+  if (std::max(t.ink_growth_x, t.ink_growth_y) > 0.02 * t.tag_size)
+    return "target.ink_growth_x_um and ink_growth_y_um must lie between 0 and 2 % of the tag size";
   return {};
 }
 

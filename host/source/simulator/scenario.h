@@ -118,6 +118,23 @@ struct Target {
   double ink_edge_roughness = 3e-6;  ///< standard deviation of the ink's edge, m
   double ink_grain = 0.02;           ///< standard deviation of the reflectance of ink and paper
   double paper_raggedness = 30e-6;   ///< standard deviation of the cut edge, m
+
+  // What is alike over a whole tag (print_fault.h), for all tags; none of it by default. Parts of
+  // the tag's size. Lines along and across the feed of two laser printers differed by 0.2 and by
+  // 2.8 %, at 2 % allowed (B. Beeton, comp.laser-printers, June 1988).
+
+  double print_size = 0;    ///< printed larger
+  double print_aspect = 0;  ///< x longer and y shorter
+  double print_shear = 0;   ///< x moves with y, and y with x
+  /// Black grows beyond ink_spread on both sides of a line, along x and along y, m: toner goes with
+  /// the drum's turn, ink with the fibres. An estimate; a dot of 600 dpi is 42 um.
+  double ink_growth_x = 0;
+  double ink_growth_y = 0;
+  double paper_curl = 0;            ///< the middle stands off the plane of the edges, m: damp, glue
+  double paper_curl_direction = 0;  ///< along which it is bent, rad from x towards y
+  /// Draws all of these on top for each tag, from the seed: size, aspect and shear up to this part,
+  /// half of it in common, growth and curl up to this part of half the tag.
+  double print_error = 0;
 };
 
 struct Light {
