@@ -15,6 +15,10 @@ inline constexpr double kMadToSigma = 1.4826;
 inline constexpr double kTukey95 = 4.685;
 constexpr double biweight(double q) { return q * q < 1 ? (1 - q * q) * (1 - q * q) : 0; }
 
+/// Huber's: errors beyond so many standard deviations pull with the same force; 95 % efficient for
+/// normal errors (Huber 1964). It has one minimum, where the biweight may have several.
+inline constexpr double kHuber95 = 1.345;
+
 /// Of an even number the upper of the two in the middle; 0 of none.
 inline double median(std::vector<double> values) {
   if (values.empty()) return 0;

@@ -157,12 +157,15 @@ bool sane(const Eigen::Isometry3d& pose) {
 /// What printers and paper do to a whole tag beyond what single edges show, as a part of its size:
 /// feed, stretch, curl. Of two laser printers that were measured, lines along and across the feed
 /// differed by 0.2 % on one and 2.8 % on the other; makers then allowed 2 % (B. Beeton,
-/// comp.laser-printers, June 1988). The first is what an estimate expects; what is claimed has to
-/// cover worse.
-constexpr double kUsualCoherent = 2e-3;
-constexpr double kCoherent = 4e-3;
+/// comp.laser-printers, June 1988), an aspect of 0.1 and 1.4 %. An estimate expects a good
+/// one; what is claimed has to cover worse.
+constexpr double kUsualAspect = 3e-4;
+constexpr double kCoherent = 3e-3;
+/// An estimate leaves the size to the scale of all: at rest it looks like distance, and perspective
+/// would tell it from what lens and blur do to edges.
+constexpr double kUsualSize = 3e-4;
 /// And to all tags of a sheet together, the ruler that measured them included.
-constexpr double kPrintSize = 5e-3;
+constexpr double kPrintSize = 3e-3;
 constexpr double kSpread = 50e-6;       // m: a dot of 600 dpi is 42 um
 constexpr double kSpreadApart = 10e-6;  // m
 
@@ -180,7 +183,7 @@ PrintModes print_row(const EdgePoint& point) {
 
 PrintModes print_prior() {
   PrintModes sigma;
-  sigma << kSpread, kSpreadApart, kUsualCoherent, kUsualCoherent, kUsualCoherent;
+  sigma << kSpread, kSpreadApart, kUsualSize, kUsualAspect, kUsualAspect;
   return sigma;
 }
 

@@ -25,6 +25,13 @@ constexpr double kSway_px = 0.1;
 /// not show it.
 constexpr double kEdgeBias_px = 0.015;
 
+Matrix6 centre_covariance(const Eigen::Isometry3d& camera_T_tag) {
+  const Eigen::Matrix<double, 3, 2> plane = camera_T_tag.linear().leftCols<2>();
+  Matrix6 covariance = Matrix6::Zero();
+  covariance.topLeftCorner<3, 3>() = kPrintCentre * kPrintCentre * (plane * plane.transpose());
+  return covariance;
+}
+
 constexpr double kMinLikeness = 0.7;  // glare over a quarter of a tag leaves more
 constexpr double kMinSeen = 0.5;      // of a tag's cells
 constexpr double kMinContrast = 4;    // grey levels, standard deviation over the cells
@@ -283,6 +290,23 @@ Matrix6 ReferenceEstimator::distance_covariance(const Eigen::Isometry3d& camera_
   return covariance;
 }
 
+/// All displacements of given tags are seen over a distance that the picture tells: by its fit, and
+/// by how far apart the tags are, of which paper and glue leave a little open.
+double ReferenceEstimator::seen_scale_sigma(const Eigen::Isometry3d& camera_T_platform) const {
+  const Eigen::Vector3d sight = camera_T_platform.translation().normalized();
+  const double variance = sight.dot(learned_.pose_covariance.topLeftCorner<3, 3>() * sight) /
+                          camera_T_platform.translation().squaredNorm();
+  double open = 0, apart = 0;  // m^2
+  for (const Tag& tag : description_.tags) {
+    if (!tag.platform_T_tag) continue;
+    open += kPrintCentre * kPrintCentre + tag.sigma.head<3>().squaredNorm() / 3;
+    apart += tag.platform_T_tag->translation().squaredNorm();
+  }
+  const double size = 0.5 * description_.tag_size;  // of a single tag
+  const auto tags = static_cast<double>(description_.tags.size());
+  return std::sqrt(variance + open / std::max(apart, size * size) / tags);
+}
+
 bool ReferenceEstimator::finish() {
   const float scale = 1.0F / static_cast<float>(frames_);
   for (float& level : sum_) level *= scale;
@@ -337,8 +361,10 @@ bool ReferenceEstimator::finish() {
       else
         learned_.target.tags[t].platform_T_tag = fitted.inverse() * camera_T_tag[t];
     }
-    learned_.scale_sigma = description_.scale_sigma;
+    learned_.scale_sigma = std::hypot(description_.scale_sigma, seen_scale_sigma(fitted));
   }
+  for (std::size_t t = 0; t < tag_covariance.size(); ++t)
+    tag_covariance[t] += centre_covariance(camera_T_tag[t]);
   if (!learn_appearance(meter_, mean, learned_.target, fitted)) return false;
   learned_.tag_covariance = std::move(tag_covariance);
   learned_.seen_from = fitted;

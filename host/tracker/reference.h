@@ -81,6 +81,7 @@ class ReferenceEstimator {
   double motion_px(const Eigen::Isometry3d& camera_T_platform) const;
   bool finish();
   PixelNoise measure_noise() const;
+  double seen_scale_sigma(const Eigen::Isometry3d& camera_T_platform) const;
   Matrix6 distance_covariance(const Eigen::Isometry3d& camera_T_body) const;
 
   CameraModel camera_;

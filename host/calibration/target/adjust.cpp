@@ -19,11 +19,13 @@ namespace {
 /// Half length of the profiles: short, for the paper's edge beyond the white margin comes near when
 /// a tag leans away, and its blur would pull at the outer edges.
 constexpr double kHalf_px = 3.5;
-constexpr int kMaxIterations = 60;
+constexpr int kMaxIterations = 40;
 constexpr double kUsualSteps = 16;  // both fits together, for the progress that is told
 constexpr double kStill = 0.2;      // sigmas of the shared unknowns together, to be the end
+constexpr double kNearlyStill = 1;  // where it will not get better
 constexpr int kLearningSteps = 10;
 constexpr double kLeastPart = 0.125;
+constexpr int kSmallParts = 4;
 constexpr double kMaxFocalStep = 0.03;  // a longer step is shortened, with all that goes with it
 
 constexpr double kMinNoise_px = 0.01;
@@ -39,7 +41,8 @@ constexpr double kFocalModel = 0.002;
 constexpr double kReadoutModel = 0.3e-3;  // s
 constexpr double kReadoutPrior = 30e-3;   // s, a rolling shutter's
 constexpr double kSpreadPrior = 50e-6;    // m
-constexpr double kCoherent = 0.01;        // size, aspect and shear of a whole tag
+constexpr double kOpen = 0.02;            // aspect and shear of which nothing is known
+constexpr double kSizeApart = 0.01;       // of one tag from that of all
 /// Size and distance look alike: the tags together are as large as said, for the fit.
 constexpr double kTotalSize = 1e-5;
 constexpr double kMinContrastFraction = 0.3;  // of the tag's median, for a point to be used
@@ -50,7 +53,7 @@ CameraModel with_focal(CameraModel camera, double ratio) {
   return camera;
 }
 
-constexpr double kMinScatter = 0.5e-6;  // m
+constexpr double kMinScatter = 1e-6;    // m
 constexpr double kFirstScatter = 5e-6;  // m, before anything is known
 constexpr double kCut = 4.0;            // sigmas, for an outlier
 constexpr int kRun = 12;                // points of one edge whose errors are alike
@@ -261,20 +264,25 @@ struct Problem {
 
   /// 1/m^2. A point off the print tells nothing of the scale, but still of the motion.
   double print_weight(double off) const {
-    const double print =
-        biweight(off / (kTukey95 * scatter.robust)) / (scatter.effective * scatter.effective);
+    const double print = std::min(1.0, kHuber95 * scatter.robust / std::abs(off)) /
+                         (scatter.effective * scatter.effective);
     return std::max(print, 1 / (kSpreadPrior * kSpreadPrior));
   }
 
-  /// Wider than what prints are known to do: the motion tells.
-  PrintModes wide_print_sigma() const {
-    PrintModes sigma = print_sigma(scatter.robust, rest.patterns.front().size);
-    for (int mode = kSizeMode; mode < kPrintModes; ++mode)
-      sigma[mode] = std::max(kCoherent, sigma[mode]);
-    return sigma;
+  /// Of the print's modes, in SI. Sizes are told apart by the motion. Aspect and shear are
+  /// usually small and sometimes large: Cauchy's distribution, so that a print which the motion
+  /// shows to be off is not held back.
+  PrintModes print_weights(const PrintModes& print, bool square) const {
+    PrintModes sigma = print_prior();
+    sigma[kSizeMode] = kSizeApart;
+    PrintModes variance = sigma.cwiseAbs2();
+    for (int mode = kSizeMode + 1; mode < kPrintModes; ++mode)
+      variance[mode] = square ? variance[mode] + print[mode] * print[mode] : kOpen * kOpen;
+    return variance.cwiseInverse();
   }
 
-  TargetNormal equations(const State& state, bool at_rest_only) const {
+  /// `square`: prints are taken for square, as far as nothing speaks against it.
+  TargetNormal equations(const State& state, bool at_rest_only, bool square = true) const {
     const int frames = at_rest_only ? 0 : static_cast<int>(moving.size());
     TargetNormal normal(frames, static_cast<int>(printed.size()), points);
     normal.add_prior(normal.readout_index(), -state.readout, 1 / (kReadoutPrior * kReadoutPrior));
@@ -282,12 +290,11 @@ struct Problem {
     for (const PrintModes& print : state.print) size += print[kSizeMode];
     normal.add_total_size(-size, 1 / (kTotalSize * kTotalSize));
     const Eigen::VectorXd off = off_print(state);
-    const PrintModes sigma = wide_print_sigma();
     for (std::size_t t = 0; t < printed.size(); ++t) {
       const int tag = static_cast<int>(t);
+      const PrintModes weights = print_weights(state.print[t], square);
       for (int mode = 0; mode < kPrintModes; ++mode)
-        normal.add_prior(normal.print_index(tag) + mode, -state.print[t][mode],
-                         1 / (sigma[mode] * sigma[mode]));
+        normal.add_prior(normal.print_index(tag) + mode, -state.print[t][mode], weights[mode]);
       for (Eigen::Index p = first[t]; p < first[t + 1]; ++p) {
         normal.add_print(p, tag,
                          print_row(printed[t].points[static_cast<std::size_t>(p - first[t])]),
@@ -311,6 +318,7 @@ struct Problem {
   struct Pace {
     int steps = 0;
     double part = 1;
+    int small = 0;  ///< parts in a row that were the least
     double sigmas = std::numeric_limits<double>::infinity();
 
     bool learns() const { return steps < kLearningSteps; }
@@ -319,6 +327,9 @@ struct Problem {
       part = length > (1 - 0.5 * part) * sigmas ? std::max(kLeastPart, 0.5 * part)
                                                 : std::min(1.0, 1.5 * part);
       sigmas = length;
+      // Small parts of the way may go round in circles as well.
+      small = part == kLeastPart ? small + 1 : 0;
+      if (small == kSmallParts) part = 1;
       ++steps;
     }
   };
@@ -446,7 +457,7 @@ TargetEstimate adjust_target(const TargetAtRest& rest, const std::vector<Keyfram
       if (given_up || step == Problem::Step::none) return false;
       if (step == Problem::Step::still) return true;
     }
-    return false;
+    return pace.sigmas < kNearlyStill;
   };
   TargetEstimate estimate;
   estimate.points = static_cast<int>(problem.points);
@@ -460,7 +471,8 @@ TargetEstimate adjust_target(const TargetAtRest& rest, const std::vector<Keyfram
   if (settles(zoomed, true)) {
     problem.observe_all(frames, zoomed);
     problem.learn_noise();
-    TargetNormal normal = problem.equations(zoomed, false);
+    // No camera is accused on the strength of how square a print is.
+    TargetNormal normal = problem.equations(zoomed, false, false);
     if (normal.reduce()) {
       const Eigen::Index focal = normal.focal_index();
       const auto tags = static_cast<Eigen::Index>(6 * zoomed.camera_T_tag.size());

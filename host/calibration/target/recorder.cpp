@@ -359,6 +359,8 @@ TargetDescription calibrated_target(const TargetDescription& target,
   for (std::size_t t = 0; t < out.tags.size(); ++t) {
     out.tags[t].platform_T_tag = platform.inverse() * estimate.camera_T_tag[t];
     out.tags[t].sigma = sigmas.tag[t];
+    for (const int axis : {0, 1})
+      out.tags[t].sigma[axis] = std::hypot(sigmas.tag[t][axis], kPrintCentre);
   }
   return out;
 }

@@ -75,7 +75,7 @@ void expect_agreement(const std::vector<Subsets::Result>& results) {
     for (std::size_t b = a + 1; b < results.size(); ++b) {
       const TargetEstimate &one = results[a].estimate, &other = results[b].estimate;
       EXPECT_LE(std::abs(one.focal_ratio - other.focal_ratio),
-                2.5 * std::hypot(one.focal_sigma, other.focal_sigma))
+                3 * std::hypot(one.focal_sigma, other.focal_sigma))
           << a << " and " << b;
     }
   }
