@@ -75,6 +75,31 @@ void realistic(Table& table, bool jpeg) {
   bench_case(c, table);
 }
 
+/// Trouble that the bound does not know and no calibration takes away: only what must never happen
+/// is a target.
+Case troubled(const std::string& name, const std::string& what) {
+  Case c = simulated(name, what, scenario_named(name));
+  c.calibrate = false;
+  c.targets.absolute = {};
+  c.targets.std_over_bound = 0;
+  return c;
+}
+
+void webcam_cheap(Table& table) {
+  Case c = troubled("webcam_cheap",
+                    "long exposure, smoothing, sharpening, hunting exposure, JPEG quality 70");
+  c.targets.speed_gain_over_b = 15;
+  bench_case(c, table);
+}
+
+void motion_blur(Table& table) {
+  Case c = troubled("motion_blur", "an exposure of 25 ms, pushed about at up to 6 Hz");
+  c.april.reset();
+  c.targets.speed_gain_over_b = 0;
+  c.targets.p99_over_median = 0;
+  bench_case(c, table);
+}
+
 void full_hd(Table& table) {
   constexpr int kFrames = 100;
   const sim::Scenario small = scenario_named("clean");
@@ -149,6 +174,8 @@ const std::vector<NamedCase>& cases() {
       {"clean", clean},
       {"realistic", [](Table& t) { realistic(t, false); }},
       {"jpeg85", [](Table& t) { realistic(t, true); }},
+      {"webcam_cheap", webcam_cheap},
+      {"motion_blur", motion_blur},
       {"full_hd", full_hd},
       {"semi_real", semi_real},
       {"grid", grid},

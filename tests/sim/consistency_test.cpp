@@ -26,6 +26,16 @@ constexpr double kCalibrationTime = 9;  // s
 /// scale is claimed of real ink.
 constexpr double kPrintError = 0.005;
 
+/// Of the normalised error squared; its mean is 6 when a covariance is true.
+constexpr double kTrue = 7.5;
+/// Places that are given to the last digit, of paper that stands off them: distance and shape then
+/// contradict each other by a little, which only pictures without trouble show.
+constexpr double kCurled = 9;
+/// A camera's noise reduction over time drags edges behind, by up to a micrometre, and a focal
+/// length that is wrong by half a percent tilts; neither shows in a picture, so that nothing counts
+/// them.
+constexpr double kDragged = 70;
+
 enum class Geometry : std::uint8_t { learned_at_rest, given, calibrated };
 
 constexpr const char* kGeometryNames[] = {"learned at rest", "given", "calibrated"};
@@ -101,14 +111,16 @@ SensorConfig calibrated(SensorConfig sensor, sim::Scenario scenario) {
 struct Row {
   const char* scenario;
   Geometry geometry;
+  double most_moved = kTrue;  ///< in motion; where it is more, the reason is named
+  int seeds = kSeeds;
 };
 
 class Consistent : public testing::TestWithParam<Row> {};
 
 TEST_P(Consistent, NormalisedErrorSquaredIsNearSix) {
-  const auto [name, geometry] = GetParam();
+  const auto [name, geometry, most_moved, seeds] = GetParam();
   Consistency still, moved;
-  for (int seed = 1; seed <= kSeeds; ++seed) {
+  for (int seed = 1; seed <= seeds; ++seed) {
     sim::Scenario scenario = load_scenario(std::string(TAGWRENCH_SCENARIOS) + "/" + name + ".yaml");
     scenario.seed = static_cast<std::uint64_t>(seed);
     if (scenario.target.print_error == 0) scenario.target.print_error = kPrintError;
@@ -131,18 +143,21 @@ TEST_P(Consistent, NormalisedErrorSquaredIsNearSix) {
     // them, which is worse than these: nothing to mend, but not near six.
     const bool wide = geometry == Geometry::learned_at_rest && cell.per_axis == moved.per_axis;
     EXPECT_GT(mean, wide ? 1.5 : 4.5) << motion;
-    // Places that are given to the last digit, of paper that stands off them: distance and shape
-    // then contradict each other by a little, which only pictures without trouble show.
-    const bool curled = geometry == Geometry::given && std::string_view(name) == "clean";
-    EXPECT_LT(mean, curled ? 9 : 7.5) << motion;
+    EXPECT_LT(mean, cell.per_axis == moved.per_axis ? most_moved : kTrue) << motion;
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Table, Consistent,
-    testing::Values(Row{"clean", Geometry::learned_at_rest}, Row{"clean", Geometry::given},
+    testing::Values(Row{"clean", Geometry::learned_at_rest}, Row{"clean", Geometry::given, kCurled},
                     Row{"clean", Geometry::calibrated}, Row{"realistic", Geometry::learned_at_rest},
-                    Row{"realistic", Geometry::given}, Row{"realistic", Geometry::calibrated}),
+                    Row{"realistic", Geometry::given}, Row{"realistic", Geometry::calibrated},
+                    Row{"webcam_cheap", Geometry::learned_at_rest, kDragged, 2},
+                    Row{"webcam_cheap", Geometry::given, kDragged, 2},
+                    Row{"webcam_good", Geometry::learned_at_rest, kDragged, 2},
+                    Row{"webcam_good", Geometry::given, kDragged, 2},
+                    Row{"phone", Geometry::learned_at_rest, kDragged, 2},
+                    Row{"phone", Geometry::given, kDragged, 2}),
     [](const auto& param) {
       std::string geometry = kGeometryNames[static_cast<int>(param.param.geometry)];
       std::replace(geometry.begin(), geometry.end(), ' ', '_');

@@ -81,6 +81,13 @@ struct Camera {
   std::array<double, 5> distortion{-0.06, 0.02, 4e-4, -3e-4, 0};  ///< OpenCV's k1 k2 p1 p2 k3
   double frame_rate = 25.0;                                       ///< Hz
   bool mirrored = false;  ///< delivers the image flipped left to right; this is of it unflipped
+
+  // What the owner's sensor.yaml says of this camera, where that is wrong. OpenCV's own calibration
+  // of two public sets of real boards is known to 0.4 and 0.6 % of the focal length.
+
+  double told_focal_factor = 1;  ///< of fx and fy
+  std::array<double, 2> told_centre_offset_px{0, 0};
+  bool told_distortion = true;  ///< false: sensor.yaml knows of none
 };
 
 struct Optics {
@@ -194,6 +201,27 @@ struct Delivery {
 struct Noise {
   double read_counts = 0.8;             ///< standard deviation without light, grey levels
   double shot_counts_per_count = 0.02;  ///< variance per grey level of light, grey levels
+};
+
+/// What the camera's own image processor does, in this order (processor.h); nothing by default.
+/// Webcams have it in firmware and show little of it: brightness, gamma, sharpness and the like are
+/// controls of the USB Video Class (1.5, section 4.2.2.3). Strengths are estimates.
+struct Processing {
+  double exposure_hunt = 0;     ///< an auto exposure in search: largest part of the light, +-
+  double exposure_hunt_hz = 0;  ///< how fast
+  bool demosaicing = false;     ///< every other pixel's brightness comes from its neighbours
+  /// Pixels that differ by less are averaged over 3 x 3, grey levels.
+  double spatial_counts = 0;
+  /// Part of the picture before that a pixel keeps which has not changed, 0..0.95; one that has
+  /// changed by temporal_counts or more keeps nothing.
+  double temporal = 0;
+  double temporal_counts = 12;
+  /// Brightness to this power. Video's is nearly 0.5 (ITU-R BT.709-6, section 1.2).
+  double gamma = 1;
+  double contrast = 0;  ///< part of a smooth step that is mixed into the tone curve, 0..1
+  /// Unsharp mask: so much of what a Gaussian of this width takes away is added.
+  double sharpening = 0;
+  double sharpening_radius_px = 1;
 };
 
 enum class FileFormat : std::uint8_t { png, pgm, jpeg };
@@ -416,6 +444,7 @@ struct Scenario {
   Exposure exposure;
   Delivery delivery;
   Noise noise;
+  Processing processing;
   Compression compression;
   Disturbances disturbances;
   DeskSettings desk;    ///< of use where trajectory.motion is `desk`

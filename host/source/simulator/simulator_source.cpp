@@ -54,6 +54,7 @@ SimulatorSource::SimulatorSource(const sim::Scenario& scenario, bool live, sim::
       motion_(scenario.mechanics, sim::TrajectoryPlayer(scenario.trajectory, scenario.seed),
               -renderer_.half_window() - kWarmUp,
               sim::true_period(scenario) + 4 * sim::PlatformMotion::kStep, load_),
+      processor_(scenario.processing, scenario.camera.width_px, scenario.camera.height_px),
       jpeg_(scenario.camera.width_px, scenario.camera.height_px, scenario.compression.jpeg_quality),
       pixels_(static_cast<std::size_t>(scenario.camera.width_px) *
               static_cast<std::size_t>(scenario.camera.height_px)) {
@@ -169,6 +170,7 @@ void SimulatorSource::render(std::uint64_t sequence) noexcept {
   motion_.advance_to(time + renderer_.half_window());
   renderer_.render(motion_, time, sequence, pixels_.data());
   rendered_ = true;
+  processor_.apply(pixels_.data(), time);
   jpeg_.apply(pixels_.data());
   truth_.displacement = motion_.seen(time);
   truth_.exposed_displacement.setZero();
@@ -350,6 +352,8 @@ void JpegRoundTrip::apply(std::uint8_t* pixels) noexcept {
 std::string sensor_yaml(const Scenario& s) {
   const Camera& c = s.camera;
   const Mechanics& m = s.mechanics;
+  const std::array<double, 5> distortion =
+      c.told_distortion ? c.distortion : std::array<double, 5>{};
   std::string tags, centres;
   for (const TagPlacement& tag : s.target.tags) tags += fmt::format("    - {{id: {}}}\n", tag.id);
   const Eigen::Matrix<double, 4, 3, Eigen::RowMajor> places = spring_centres(m);
@@ -364,8 +368,10 @@ std::string sensor_yaml(const Scenario& s) {
       "wrench:\n  springs:\n    centres_mm:\n{}    axial_n_per_mm: {:.10g}\n"
       "    lateral_n_per_mm: {:.10g}\n    bending_nm_per_rad: {:.10g}\n"
       "    torsion_nm_per_rad: {:.10g}\n  range_n: {}\n  range_nm: {}\n",
-      c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, list(c.distortion.data(), 5, 1),
-      c.mirrored, s.target.family, s.target.tag_size * 1e3, s.target.border * 1e3, tags,
+      c.width_px, c.height_px, c.told_focal_factor * c.fx_px, c.told_focal_factor * c.fy_px,
+      c.cx_px + c.told_centre_offset_px[0], c.cy_px + c.told_centre_offset_px[1],
+      list(distortion.data(), 5, 1), c.mirrored, s.target.family, s.target.tag_size * 1e3,
+      s.target.border * 1e3, tags,
       std::clamp(static_cast<int>(0.8 * s.trajectory.rest_time * c.frame_rate), 1, 25), centres,
       m.axial_stiffness * 1e-3, m.lateral_stiffness * 1e-3, m.bending_stiffness,
       m.torsion_stiffness, list(m.range.data(), 3, 1), list(m.range.data() + 3, 3, 1));

@@ -11,6 +11,7 @@
 #include "host/core/os/unique_fd.h"
 #include "host/source/frame_source.h"
 #include "host/source/simulator/mechanics.h"
+#include "host/source/simulator/processor.h"
 #include "host/source/simulator/renderer.h"
 #include "host/source/simulator/scenario.h"
 
@@ -114,6 +115,7 @@ class SimulatorSource final : public FrameSource, private CameraLight {
   sim::AppliedLoad* load_;
   sim::Renderer renderer_;
   sim::PlatformMotion motion_;
+  sim::Processor processor_;
   sim::JpegRoundTrip jpeg_;
   std::vector<std::uint8_t> pixels_;
   bool rendered_ = false;  ///< pixels_ hold a picture
