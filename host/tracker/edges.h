@@ -60,9 +60,9 @@ PrintModes print_prior();
 /// alike over the whole tag as well: what may be claimed of that estimate.
 PrintModes print_sigma(double scatter, double size);
 
-/// Where the middle of a tag is in its plane, one standard deviation, m: paper that stands off a few
-/// hundredths of a millimetre is seen beside its place. An estimate. Nothing but the point hangs on
-/// it to which displacement belongs.
+/// Where the middle of a tag is in its plane, one standard deviation, m: paper that stands off a
+/// few hundredths of a millimetre is seen beside its place. An estimate. Nothing but the point
+/// hangs on it to which displacement belongs.
 inline constexpr double kPrintCentre = 5e-6;
 
 /// And of the size of all tags of a target together, whose ink spreads by `spread` (m): a part.
