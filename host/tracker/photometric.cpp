@@ -34,7 +34,13 @@ constexpr double kTypicalRank = 0.3;
 /// translations. Fewer groups than patches would otherwise be blamed for what is common to all.
 constexpr double kGroupsFitted = 3;
 
-constexpr int kMaxSteps = 10;
+constexpr int kMaxSteps = 12;
+/// Patches that are inliers in one step and outliers in the next would keep a fit from settling:
+/// after so many steps they are what they are.
+constexpr int kJudgedSteps = 7;
+/// Of the inliers' pixels, whose patches would be inliers no more: where it is more the fit has
+/// only been kept from changing its mind (a sheared picture, mostly).
+constexpr double kMaxDisputed = 0.03;
 constexpr int kFirstSteps = 3;  ///< by then residuals have fallen, or never will
 /// Squared sizes of steps, in standard deviations, all parameters together. A step shrinks to a few
 /// percent of the one before, squared: what one as small as kSmallStep leaves is lost in the noise
@@ -60,7 +66,20 @@ constexpr double kMinInlierFraction = 0.3;
 constexpr double kMaxResidualFraction = 0.10;
 constexpr double kMaxBlur_px2 = 0.8;
 
+/// What residuals leave unexplained beyond noise, over the contrast, that doubles the variance: so
+/// that the normalised error squared of simulated targets which smear by 3 to 10 px is 6 to 8.
+constexpr double kUnexplained = 0.04;
+
 constexpr double squared(double v) { return v * v; }
+
+/// Mean square of weighted residuals from where a patch is no inlier.
+float worst_square(double typical) {
+  return static_cast<float>(squared(kWorstPatch * std::max(1.0, typical)));
+}
+
+bool fits(const NormalEquations& patch, float worst) {
+  return patch.squares < worst * patch.weights && patch.weights > kMinWeights * patch.inside;
+}
 
 Eigen::Matrix<double, kIlluminationParameters, 1> illumination_prior() {
   Eigen::Matrix<double, kIlluminationParameters, 1> sigma;
@@ -153,17 +172,29 @@ double PhotometricAligner::typical_residual() noexcept {
   return std::sqrt(static_cast<double>(*at));
 }
 
+/// Of the inliers' pixels, those whose patch would be one no more.
+double PhotometricAligner::disputed(double typical) const noexcept {
+  const float worst = worst_square(typical);
+  double all = 0, against = 0;
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    if (inlier_[n] == 0) continue;
+    const auto pixels = static_cast<double>(template_.patches[n].pixels);
+    all += pixels;
+    if (!fits(sums_[n], worst)) against += pixels;
+  }
+  return all > 0 ? against / all : 1;
+}
+
 /// A covered or dazzled patch is left out, and so is a tag of which little is left.
 void PhotometricAligner::judge_patches(double typical, bool near) noexcept {
-  const auto worst = static_cast<float>(squared(kWorstPatch * std::max(1.0, typical)));
+  const float worst = worst_square(typical);
   std::array<double, kMaxTags> all{};
   std::array<double, kMaxTags> accepted{};
   for (std::size_t n = 0; n < sums_.size(); ++n) {
     const NormalEquations& s = sums_[n];
     const PixelPatch& patch = template_.patches[n];
     bool inlier = s.inside >= kMinInside * static_cast<float>(patch.pixels);
-    if (near && inlier)
-      inlier = s.squares < worst * s.weights && s.weights > kMinWeights * s.inside;
+    if (near && inlier) inlier = fits(s, worst);
     inlier_[n] = inlier ? 1 : 0;
     all[patch.tag] += static_cast<double>(patch.pixels);
     if (inlier) accepted[patch.tag] += static_cast<double>(patch.pixels);
@@ -277,7 +308,7 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
     if (!(typical > 0)) return fit;
     if (i == 0) first_typical = typical;
     if (i >= kFirstSteps && typical > first_typical) return fit;  // running away
-    judge_patches(typical, near);
+    if (i < kJudgedSteps) judge_patches(typical, near);
     if (!factorise()) return fit;
     const std::optional<double> taken = step(fit, now);
     if (!taken) return fit;
@@ -286,7 +317,7 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
     step_size = *taken / squared(scale);
     inverse_cut = static_cast<float>(1.0 / (kTukey * scale));
     if (near && step_size < kSmallStep) {
-      fit.converged = true;
+      fit.converged = i < kJudgedSteps || disputed(typical) < kMaxDisputed;
       break;
     }
     near = near || step_size < kNearStep;
@@ -370,7 +401,11 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
     // A variance known from so few groups makes the error Student's t, which spreads wider.
     ratio = std::max(ratio, 1 + excess * freedom / (freedom - 2));
   }
-  fit.covariance = std::max(1.0, ratio) * white;
+  // What all patches have in common, as the smear of a motion, no comparison of them shows; it
+  // grows with what the template does not explain beyond noise.
+  const double unexplained =
+      fit.residual_fraction * std::sqrt(std::max(0.0, 1 - 1 / squared(fit.residual)));
+  fit.covariance = std::max(1.0, ratio) * (1 + squared(unexplained / kUnexplained)) * white;
   if (!fit.covariance.allFinite()) fit.converged = false;
 }
 

@@ -140,6 +140,7 @@ class PhotometricAligner {
   void view_patches(const Eigen::Isometry3d& pose, const RowMotion& rows,
                     const PhotometricState& state) noexcept;
   double typical_residual() noexcept;
+  double disputed(double typical) const noexcept;
   void judge_patches(double typical, bool near) noexcept;
   bool factorise() noexcept;
   /// The step's size, squared, in standard deviations, all shared parameters together; nothing
