@@ -369,42 +369,85 @@ struct Problem {
     return sigmas < kStill ? Step::still : Step::taken;
   }
 
-  /// How the residuals pull at the shared unknowns, summed over runs of neighbouring points on one
-  /// edge: what is wrong with these is wrong in every keyframe and hardly averages out.
-  Eigen::MatrixXd pulls(const State& state, const TargetNormal& normal) const {
-    const Eigen::VectorXd off = off_print(state);
-    const Eigen::Index frames = normal.keyframe_unknowns();
-    std::vector<Eigen::VectorXd> all;
-    for (std::size_t t = 0; t < printed.size(); ++t) {
-      const Eigen::Index place = frames + 6 * static_cast<Eigen::Index>(t);
-      const Eigen::Index print = frames + normal.print_index(static_cast<int>(t));
-      const std::vector<EdgePoint>& edge = printed[t].points;
-      Eigen::VectorXd pull = Eigen::VectorXd::Zero(frames + normal.shared_count());
-      int run = 0;
-      for (std::size_t i = 0; i < edge.size(); ++i) {
-        const Eigen::Index p = first[t] + static_cast<Eigen::Index>(i);
-        double own = 0;
-        for_each_offset(p, [&](const Observation& seen, int frame, double weight) {
-          const double w = weight * seen.offset;
-          own += w * seen.by.normal;
-          if (frame >= 0) pull.segment<6>(6 * frame) += w * seen.by.frame;
-          pull.segment<6>(place) += w * seen.by.tag;
-          pull[frames + normal.readout_index()] += w * seen.by.readout;
-          pull[frames + normal.focal_index()] += w * seen.by.focal;
-        });
-        const double printed_off = print_weight(off[p]) * off[p];
-        pull.segment<kPrintModes>(print) += printed_off * print_row(edge[i]);
-        pull += normal.point_pull(p, own - printed_off);
-        if (++run < kRun && i + 1 < edge.size() && same_edge(edge[i], edge[i + 1])) continue;
-        all.push_back(normal.reduced_pull(pull));
-        pull.setZero();
-        run = 0;
+  /// How the residuals pull at keyframes and shared unknowns, summed over what is likely to err
+  /// alike: each column is one such cluster.
+  class Clusters {
+   public:
+    Clusters(const Problem& problem, const TargetNormal& normal)
+        : problem_(problem), normal_(normal) {}
+
+    /// Runs of neighbouring points on one edge: what is wrong with these is wrong in every keyframe
+    /// and hardly averages out.
+    Eigen::MatrixXd of_points(const State& state) const {
+      const Eigen::VectorXd off = problem_.off_print(state);
+      std::vector<Eigen::VectorXd> all;
+      for (std::size_t t = 0; t < problem_.printed.size(); ++t) {
+        const Eigen::Index print =
+            normal_.keyframe_unknowns() + normal_.print_index(static_cast<int>(t));
+        const std::vector<EdgePoint>& edge = problem_.printed[t].points;
+        Eigen::VectorXd pull = none();
+        int run = 0;
+        for (std::size_t i = 0; i < edge.size(); ++i) {
+          const Eigen::Index p = problem_.first[t] + static_cast<Eigen::Index>(i);
+          double own = 0;
+          problem_.for_each_offset(p, [&](const Observation& seen, int frame, double weight) {
+            own += add_offset(seen, frame, t, weight, pull);
+          });
+          const double printed_off = problem_.print_weight(off[p]) * off[p];
+          pull.segment<kPrintModes>(print) += printed_off * print_row(edge[i]);
+          pull += normal_.point_pull(p, own - printed_off);
+          if (++run < kRun && i + 1 < edge.size() && same_edge(edge[i], edge[i + 1])) continue;
+          all.push_back(normal_.reduced_pull(pull));
+          pull.setZero();
+          run = 0;
+        }
       }
+      return columns(all);
     }
-    Eigen::MatrixXd columns(normal.shared_count(), all.size());
-    for (std::size_t c = 0; c < all.size(); ++c) columns.col(static_cast<Eigen::Index>(c)) = all[c];
-    return columns;
-  }
+
+    /// One tag in one keyframe: paper that bends as it moves, a smear.
+    Eigen::MatrixXd of_views() const {
+      const std::size_t views = problem_.moving.size() + 1;  // and the rest image
+      std::vector<Eigen::VectorXd> all(views * problem_.printed.size(), none());
+      for (std::size_t t = 0; t < problem_.printed.size(); ++t) {
+        for (Eigen::Index p = problem_.first[t]; p < problem_.first[t + 1]; ++p) {
+          problem_.for_each_offset(p, [&](const Observation& seen, int frame, double weight) {
+            Eigen::VectorXd& pull = all[views * t + static_cast<std::size_t>(frame + 1)];
+            const double own = add_offset(seen, frame, t, weight, pull);
+            pull += normal_.point_pull(p, own);
+          });
+        }
+      }
+      for (Eigen::VectorXd& pull : all) pull = normal_.reduced_pull(pull);
+      return columns(all);
+    }
+
+   private:
+    Eigen::VectorXd none() const {
+      return Eigen::VectorXd::Zero(normal_.keyframe_unknowns() + normal_.shared_count());
+    }
+
+    /// Returns the pull on the point's own shift.
+    double add_offset(const Observation& seen, int frame, std::size_t tag, double weight,
+                      Eigen::VectorXd& pull) const {
+      const Eigen::Index shared = normal_.keyframe_unknowns();
+      const double w = weight * seen.offset;
+      if (frame >= 0) pull.segment<6>(6 * frame) += w * seen.by.frame;
+      pull.segment<6>(shared + 6 * static_cast<Eigen::Index>(tag)) += w * seen.by.tag;
+      pull[shared + normal_.readout_index()] += w * seen.by.readout;
+      pull[shared + normal_.focal_index()] += w * seen.by.focal;
+      return w * seen.by.normal;
+    }
+
+    Eigen::MatrixXd columns(const std::vector<Eigen::VectorXd>& all) const {
+      Eigen::MatrixXd out(normal_.shared_count(), all.size());
+      for (std::size_t c = 0; c < all.size(); ++c) out.col(static_cast<Eigen::Index>(c)) = all[c];
+      return out;
+    }
+
+    const Problem& problem_;
+    const TargetNormal& normal_;
+  };
 
   const TargetAtRest& rest;
   Eigen::Isometry3d rest_pose;
@@ -476,8 +519,15 @@ TargetEstimate adjust_target(const TargetAtRest& rest, const std::vector<Keyfram
     if (normal.reduce()) {
       const Eigen::Index focal = normal.focal_index();
       const auto tags = static_cast<Eigen::Index>(6 * zoomed.camera_T_tag.size());
-      const double variance = with_common_errors(
-          inverse(normal.information()), problem.pulls(zoomed, normal), tags + 1)(focal, focal);
+      const Problem::Clusters clusters(problem, normal);
+      const Eigen::MatrixXd covariance = inverse(normal.information());
+      // Both ways of erring alike, what both count off once: Cameron, Gelbach and Miller, Journal
+      // of Business & Economic Statistics 29(2), 2011. A keyframe's pose takes up one tag's view.
+      const double variance =
+          with_common_errors(covariance, clusters.of_points(zoomed), tags + 1)(focal, focal) +
+          with_common_errors(covariance, clusters.of_views(),
+                             static_cast<Eigen::Index>(frames.size()))(focal, focal) -
+          covariance(focal, focal);
       estimate.focal_ratio = zoomed.focal_ratio;
       if (variance > 0) estimate.focal_sigma = std::hypot(kFocalModel, std::sqrt(variance));
     }
@@ -494,7 +544,7 @@ TargetEstimate adjust_target(const TargetAtRest& rest, const std::vector<Keyfram
   const auto tags = static_cast<Eigen::Index>(6 * state.camera_T_tag.size());
   const Eigen::MatrixXd covariance =
       with_common_errors(inverse(normal.information().topLeftCorner(all, all)),
-                         problem.pulls(state, normal).topRows(all), tags);
+                         Problem::Clusters(problem, normal).of_points(state).topRows(all), tags);
   estimate.covariance = covariance.topLeftCorner(tags, tags);
   estimate.covariance_at_rest =
       inverse(alone.information().topLeftCorner(all, all)).topLeftCorner(tags, tags);
