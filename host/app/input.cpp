@@ -186,6 +186,12 @@ void check_appearance(const Input& input) {
   const SensorConfig& sensor = input.sensor;
   const auto mismatch = check_appearance(sensor.camera, sensor.target, sensor.rest);
   if (!mismatch) return;
+  if (mismatch->seen_id)
+    throw ConfigError(
+        "{}: the picture at rest shows tag {} of {} where the rest pose puts tag {}; correct "
+        "target.tags and run `tagwrench calibrate target`, or put tag {} in its place",
+        sensor.target_from.file, *mismatch->seen_id, name(sensor.target.family), mismatch->id,
+        mismatch->id);
   throw ConfigError(
       "{}: the picture at rest does not show tag {} of {} where the rest pose puts it (likeness "
       "{:.2f}); run `tagwrench calibrate target`, or remove {}",

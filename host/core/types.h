@@ -157,6 +157,7 @@ enum class Diagnostic : std::uint8_t {
   tag_printed_mirrored,  ///< some tags read as they are, others only when flipped
   other_scale,           ///< the tags' size does not go with the distances between them
   other_places,          ///< the tags sit differently to each other
+  other_print,           ///< another tag of the family is where one of the target's should be
   rest_elsewhere,        ///< the target is out of reach of its rest pose
 };
 
@@ -176,7 +177,7 @@ struct DiagnosticDetails {
   };
   Ids expected;             ///< the sensor's tags
   Ids seen;                 ///< in view, whether expected or not
-  Ids concerned;            ///< those that are missing, there twice, or printed mirrored
+  Ids concerned;            ///< those that are missing, there twice, printed mirrored, or replaced
   std::string_view family;  ///< of the tags seen; a name that stays
   std::string_view expected_family;
   double amount = 0;  ///< grey level of the brightest pixels; part of pixels that are white; px

@@ -45,6 +45,9 @@ constexpr double kOtherDirection = 0.2;
 /// Frames in a row that a given picture of the target may fail to fit before it is called wrong.
 constexpr int kMisfits = 15;
 
+/// Frames in a row that show another tag before it is said.
+constexpr int kOtherPrints = 5;
+
 /// Farther from a given reference pose than anybody seats a platform twice: m and rad; how long it
 /// stands there; and how long it must stand near it for the pose to be right.
 constexpr double kFar = 0.3e-3;
@@ -275,6 +278,16 @@ void TrackingDiagnostics::check_geometry(const FrameFacts& facts, Track& track) 
   track.details = look.details;
 }
 
+/// Once each time, when another tag is where one of the target's should be.
+void TrackingDiagnostics::check_print(const FrameFacts& facts, Track& track) {
+  other_prints_ = facts.other_print ? other_prints_ + 1 : 0;
+  if (other_prints_ != kOtherPrints) return;
+  track.diagnostic = Diagnostic::other_print;
+  track.details = {};
+  track.details.concerned.add(target_.tags[facts.other_print->tag].id);
+  track.details.seen.add(facts.other_print->seen_id);
+}
+
 /// Once, when pictures of a moving target that are not accepted turn out to be sheared.
 void TrackingDiagnostics::check_shutter(const FrameFacts& facts, Track& track) {
   if (camera_.readout > 0 || !facts.aligner.ready()) return;
@@ -347,9 +360,11 @@ void TrackingDiagnostics::add(const FrameFacts& facts, Track& track) {
   if (facts.learning == Progress::moved) track.diagnostic = Diagnostic::moved_while_learning;
   if (facts.learning == Progress::done) track.diagnostic = Diagnostic::rest_learned;
   if (facts.pose) {
-    if (!facts.accepted) check_shutter(facts, track);
+    check_print(facts, track);
+    const bool explained = facts.other_print.has_value();
+    if (!facts.accepted && !explained) check_shutter(facts, track);
     shutter_.seen(facts.frame.capture_time, *facts.pose);
-    check_picture(facts, track);
+    if (!explained) check_picture(facts, track);
     if (facts.accepted) check_distance(facts, track);
   } else {
     shutter_.lost();
@@ -358,7 +373,7 @@ void TrackingDiagnostics::add(const FrameFacts& facts, Track& track) {
     if (not_held_since_) said_ = {};
     not_held_since_.reset();
     if (facts.accepted && track.diagnostic == Diagnostic::none) check_geometry(facts, track);
-  } else if (facts.searched && track.diagnostic == Diagnostic::none) {
+  } else if (facts.searched && !facts.other_print && track.diagnostic == Diagnostic::none) {
     explain(facts, track);
   }
 }
@@ -452,6 +467,11 @@ std::string diagnostic_text(Diagnostic diagnostic, const DiagnosticDetails& d) {
           "{} sit differently to each other than target.tags in sensor.yaml says (swapped, turned "
           "or glued anew?); run `tagwrench calibrate target`",
           tags(d.concerned));
+    case Diagnostic::other_print:
+      return fmt::format(
+          "{} is seen where sensor.yaml has {}; correct target.tags and run `tagwrench calibrate "
+          "target`, or put {} in its place",
+          tags(d.seen), tags(d.concerned), tags(d.concerned));
     case Diagnostic::rest_elsewhere:
       return fmt::format(
           "{} {} seen, but the target is {} {}, farther than its springs let it go; {}",

@@ -6,6 +6,7 @@
 
 #include "host/tracker/acquire.h"
 #include "host/tracker/photometric.h"
+#include "host/tracker/print_check.h"
 #include "host/tracker/reference.h"
 #include "host/tracker/rotation.h"
 
@@ -58,6 +59,7 @@ struct FrameFacts {
   std::optional<Eigen::Isometry3d> pose{};  ///< while the target is held
   bool accepted = false;                    ///< and numbers were made of it
   bool by_picture = false;                  ///< and not by edges, which lie a little elsewhere
+  std::optional<OtherPrint> other_print{};  ///< then no numbers are made
 };
 
 /// Says each cause why the target is not held once: when two looks in a row agree, and then not
@@ -74,6 +76,7 @@ class TrackingDiagnostics {
  private:
   void explain(const FrameFacts& facts, Track& track);
   void check_geometry(const FrameFacts& facts, Track& track);
+  void check_print(const FrameFacts& facts, Track& track);
   void check_shutter(const FrameFacts& facts, Track& track);
   void check_picture(const FrameFacts& facts, Track& track);
   void check_distance(const FrameFacts& facts, Track& track);
@@ -88,6 +91,7 @@ class TrackingDiagnostics {
   Diagnosis said_;
   // Of one that is.
   bool geometry_checked_ = false;
+  int other_prints_ = 0;           ///< frames in a row
   int misfits_ = 0;                ///< to a given picture, frames in a row
   bool distance_checked_ = false;  ///< said to be far from its reference, or seen to be there
   std::optional<TimePoint> still_since_;  ///< only while that is open

@@ -8,6 +8,7 @@
 #include "host/core/algebra/decompositions.h"
 #include "host/core/robust_statistics.h"
 #include "host/tracker/camera_model.h"
+#include "host/tracker/print_check.h"
 #include "host/tracker/rest_fit.h"
 #include "host/tracker/rotation.h"
 
@@ -376,12 +377,20 @@ std::optional<AppearanceMismatch> check_appearance(const CameraModel& camera,
                                                    const TargetDescription& target,
                                                    const ReferenceOptions& reference) {
   if (!reference.appearance || !reference.camera_T_platform) return std::nullopt;
-  for (const Tag& tag : target.tags) {
+  const ReferenceImage& picture = *reference.appearance;
+  std::vector<TagPattern> patterns;
+  for (const Tag& tag : target.tags)
+    patterns.push_back(tag_pattern(target.family, tag.id, target.tag_size, target.border));
+  const PrintCheck prints(camera, target.family, patterns);
+  for (std::size_t t = 0; t < patterns.size(); ++t) {
+    const Tag& tag = target.tags[t];
     if (!tag.platform_T_tag) continue;
-    const double found =
-        likeness(camera, *reference.appearance,
-                 tag_pattern(target.family, tag.id, target.tag_size, target.border),
-                 *reference.camera_T_platform * *tag.platform_T_tag);
+    const Eigen::Isometry3d camera_T_tag = *reference.camera_T_platform * *tag.platform_T_tag;
+    const double found = likeness(camera, picture, patterns[t], camera_T_tag);
+    const PrintReading print = prints.read(
+        {picture.level.data(), picture.width, picture.height, picture.width}, t, camera_T_tag);
+    if (print.verdict == PrintReading::Verdict::other)
+      return AppearanceMismatch{tag.id, found, print.other_id};
     if (!(found >= kMinLikeness)) return AppearanceMismatch{tag.id, found};
   }
   return std::nullopt;

@@ -113,6 +113,7 @@ struct AppearanceMismatch {
   /// Correlation of the picture's grey levels with the tag's cells, -1 to 1; of a picture that is
   /// flat there, zero.
   double likeness = 0;
+  std::optional<int> seen_id{};  ///< which tag is there instead, where one can be told
 };
 
 /// Does a loaded picture of the sensor at rest show this target at its reference pose? The first

@@ -8,6 +8,7 @@
 #include "host/tracker/diagnostics.h"
 #include "host/tracker/edges.h"
 #include "host/tracker/photometric.h"
+#include "host/tracker/print_check.h"
 #include "host/tracker/reference.h"
 #include "host/tracker/rotation.h"
 
@@ -82,6 +83,7 @@ struct Tracker::Impl {
         acquirer(model, description),
         refiner(model),
         learner(model, description, options, acquirer.patterns()),
+        prints(model, description.family, acquirer.patterns()),
         diagnostics(model, description) {
     reference.given = options.camera_T_platform.has_value();
     const bool placed = std::all_of(description.tags.begin(), description.tags.end(),
@@ -230,7 +232,9 @@ struct Tracker::Impl {
     else
       predictor.start(time, pose);
     enter_held();
-    facts.accepted = is_accepted(fit);
+    const bool own_tags = prints.agrees(facts.frame, pose, reference.platform_T_tag, found.anew);
+    facts.accepted = is_accepted(fit) && own_tags;
+    facts.other_print = prints.other();
     facts.pose = pose;
     facts.by_picture = state == TrackingState::held_by_picture;
     track.tags_held = fit.converged ? fit.tags_held : found.edges.tags_held;
@@ -278,6 +282,7 @@ struct Tracker::Impl {
   Acquirer acquirer;
   Refiner refiner;
   ReferenceEstimator learner;
+  PrintWatch prints;
   TrackingDiagnostics diagnostics;
   TrackingState state = TrackingState::learning_reference;
   KnownReference reference;
