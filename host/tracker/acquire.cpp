@@ -432,25 +432,39 @@ void Acquirer::add_sharpened(const ImageView& image, SquareList& list) {
   }
 }
 
-Finding Acquirer::detect(const ImageView& image) {
+Finding Acquirer::detect(const ImageView& image, const Eigen::Vector2d& origin) {
   std::optional<SquareList> list = finder_.find(image, false);
   if (!list) return {.looked = false};
   if (bits_per_side(target_.family) >= kFineCells) add_sharpened(image, *list);
+  for (std::vector<Square>* squares : {&list->tags, &list->others})
+    for (Square& square : *squares)
+      for (Eigen::Vector2d& corner : square) corner += origin;
   return sorted(camera_, target_, std::move(*list));
 }
 
 Finding Acquirer::find(const ImageView& image) {
   std::optional<FlippedImage> flipped;
   if (camera_.mirrored) flipped.emplace(image);
-  Finding finding = detect(flipped ? flipped->view() : image);
+  Finding finding = detect(flipped ? flipped->view() : image, {0, 0});
   if (!finding.tags.empty()) {
     misses_ = 0;
     return finding;
   }
   if (!finding.looked || misses_++ % kFlipEvery != 0) return finding;
   if (!flipped) flipped.emplace(image);
-  finding.other_way_round = !detect(camera_.mirrored ? image : flipped->view()).tags.empty();
+  finding.other_way_round =
+      !detect(camera_.mirrored ? image : flipped->view(), {0, 0}).tags.empty();
   return finding;
+}
+
+Finding Acquirer::find_in(const ImageView& image, const Region& part) {
+  const Region inside = part.clipped(image.width, image.height);
+  const ImageView seen{
+      image.pixels + static_cast<std::ptrdiff_t>(inside.y) * image.stride + inside.x, inside.width,
+      inside.height, image.stride};
+  if (!camera_.mirrored) return detect(seen, {inside.x, inside.y});
+  const int right = image.width - inside.x - inside.width;
+  return detect(FlippedImage(seen).view(), {right, inside.y});
 }
 
 bool within_reach(const Eigen::Isometry3d& reference, const Eigen::Isometry3d& camera_T_platform) {

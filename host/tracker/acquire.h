@@ -122,9 +122,13 @@ class Acquirer {
   const std::vector<TagPattern>& patterns() const noexcept { return patterns_; }
 
   Finding find(const ImageView& image);
+  /// Looks at a part of the image alone, and only at the way round that the camera has. Everything
+  /// found is in px of the whole image.
+  Finding find_in(const ImageView& image, const Region& part);
 
  private:
-  Finding detect(const ImageView& image);
+  /// `origin`: of the image in the one that the camera's model describes, px.
+  Finding detect(const ImageView& image, const Eigen::Vector2d& origin);
   void add_sharpened(const ImageView& image, SquareList& list);
 
   CameraModel camera_;

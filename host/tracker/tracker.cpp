@@ -19,6 +19,11 @@ namespace {
 /// without the whole frame, px. Chosen: 25 mm/s at 25 frames a second, 20 mm before the lens.
 constexpr int kMargin_px = 40;
 
+/// A target that was held so lately is looked for near that place first: a tap or a hand moves it
+/// that far, px. A whole large image costs several times as much.
+constexpr Duration kLately = std::chrono::seconds(1);
+constexpr int kSearchMargin_px = 80;
+
 /// What a frame showed of the target. A frame of which too small a part was decoded to tell, and
 /// one that counts for the reference, leave the state as it is.
 enum class Outcome : std::uint8_t { nothing, target_by_edges, target_by_picture };
@@ -186,13 +191,30 @@ struct Tracker::Impl {
   }
 
   Refinement find_anywhere(FrameFacts& facts) {
+    const Refinement near = find_where_it_was(facts);
+    if (near.verdict != Verdict::lost) return near;
     search_whole(facts);
+    return refine_found(facts.frame);
+  }
+
+  /// All tags or nothing: of one that is missing the whole image tells why.
+  Refinement find_where_it_was(FrameFacts& facts) {
+    if (!seen || facts.frame.capture_time - *seen > kLately || !aligner.ready()) return {};
+    const Region part = aligner.region(predictor.last(), kSearchMargin_px);
+    if (part.empty()) return {};
+    finding = acquirer.find_in(facts.frame.image, part);
+    if (finding.tags.size() != target.tags.size()) return {};
+    facts.searched = finding.looked;
+    return refine_found(facts.frame);
+  }
+
+  Refinement refine_found(const Frame& frame) {
     if (finding.tags.empty()) return {};
     const std::optional<Eigen::Isometry3d> start =
         pose_from_corners(camera, target.tag_size, finding.tags, reference.platform_T_tag,
                           reference.camera_T_platform);
     if (!start) return {};
-    return refine_within_reach(facts.frame, *start);
+    return refine_within_reach(frame, *start);
   }
 
   /// From what the edges found to the pose that counts.
@@ -233,6 +255,7 @@ struct Tracker::Impl {
       predictor.start(time, pose);
     enter_held();
     const bool own_tags = prints.agrees(facts.frame, pose, reference.platform_T_tag, found.anew);
+    seen = time;
     facts.accepted = is_accepted(fit) && own_tags;
     facts.other_print = prints.other();
     facts.pose = pose;
@@ -286,7 +309,8 @@ struct Tracker::Impl {
   TrackingDiagnostics diagnostics;
   TrackingState state = TrackingState::learning_reference;
   KnownReference reference;
-  Finding finding;  ///< of the last search
+  Finding finding;                ///< of the last search
+  std::optional<TimePoint> seen;  ///< when the target was last held
   ConstantVelocityPredictor predictor;
   PhotometricAligner aligner;
   PhotometricState photometric;

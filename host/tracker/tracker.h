@@ -11,8 +11,8 @@
 // align     prediction + pixels -> pose: photometric alignment with the template, six motions with
 //           illumination and blur (photometric.h)
 // refine    where that fails, or while there is no template: model-based edges from the prediction
-//           (edges.h), then tags in the whole image, by OpenCV (acquire.h), edges,
-//           and alignment once more
+//           (edges.h), then tags by OpenCV (acquire.h), near where they were and then in the
+//           whole image, edges, and alignment once more
 // conclude  covariance: noise and residuals, the tags' placement (photometric.h), and
 //           where the reference pose was given, that of the picture
 // diagnose  what a person should know (diagnostics.h)

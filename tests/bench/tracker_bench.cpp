@@ -51,6 +51,7 @@ Case simulated(const std::string& name, const std::string& what, const sim::Scen
   result.targets = targets_of_every_case();
   result.targets.absolute = limits(0.15, 0.6, INFINITY, INFINITY, INFINITY);
   result.targets.std_over_bound = 1.2;
+  result.targets.found_again_ms = 3;
   result.calibrate = true;
   return result;
 }
@@ -117,6 +118,7 @@ void full_hd(Table& table) {
   c.smaller = clip_of(small, kFrames);
   c.targets = targets_of_every_case();
   c.targets.time_over_smaller = 1.2;
+  c.targets.found_again_ms = 8;
   bench_case(c, table);
 }
 

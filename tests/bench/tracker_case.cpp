@@ -173,6 +173,12 @@ void print_gains(const Case& benched, const std::vector<Contender>& all, Table& 
     table.at_most("median time of (e) / its time at 640x480", ours.median_us / smaller.median_us,
                   targets.time_over_smaller, "times");
   }
+  if (targets.found_again_ms > 0) {
+    const std::unique_ptr<Method> method = tagwrench_tracker("found again", benched.clip.sensor);
+    const double found_us = found_again_us(*benched.clip.open(), *method);
+    table.at_most("time of (e) to find tags that were covered a frame ago", 1e-3 * found_us,
+                  targets.found_again_ms, "ms");
+  }
   table.at_most("wrong oks of (e)", ours.wrong, 0, "frames");
 }
 

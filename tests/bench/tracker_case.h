@@ -20,6 +20,7 @@ struct Targets {
   double p99_over_median = 0;
   double std_over_bound = 0;
   double time_over_smaller = 0;
+  double found_again_ms = 0;
 };
 
 /// Six limits from x = y, z in um and three rotations in mrad.

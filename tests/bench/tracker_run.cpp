@@ -1,6 +1,11 @@
 #include "tests/bench/tracker_run.h"
 
+#include <algorithm>
+#include <cmath>
 #include <ctime>
+#include <vector>
+
+#include "host/core/robust_statistics.h"
 
 namespace tagwrench::bench {
 namespace {
@@ -32,6 +37,27 @@ Records run(ShotSource& source, const Methods& methods) {
     }
   }
   return records;
+}
+
+double found_again_us(ShotSource& source, Method& method) {
+  constexpr int kEvery = 6;
+  constexpr int kLooks = 20;
+  constexpr std::uint8_t kGrey = 90;
+  std::vector<double> times;
+  int moving = 0, looks = 0;
+  for (Shot shot; looks < kLooks && source.next(shot);) {
+    if (shot.phase == Phase::moving) ++moving;
+    const bool covered = moving % kEvery == kEvery - 1;
+    const bool looked = moving >= kEvery && moving % kEvery == 0;
+    if (covered) std::fill(shot.pixels.begin(), shot.pixels.end(), kGrey);
+    const double begin = thread_time_us();
+    const Reading reading = method.track(shot);
+    const double end = thread_time_us();
+    if (!looked) continue;
+    ++looks;
+    if (reading.ok) times.push_back(end - begin);
+  }
+  return 2 * times.size() < static_cast<std::size_t>(looks) || times.empty() ? NAN : median(times);
 }
 
 }  // namespace tagwrench::bench

@@ -17,4 +17,9 @@ double thread_time_us();  ///< processor time of this thread
 /// its own, as it would on a stream.
 Records run(ShotSource& source, const Methods& methods);
 
+/// Processor time in which a target is found that was covered in the frame before: every sixth
+/// moving frame is turned grey, and the one after it shows the tags where they are by then. Median,
+/// us; NaN if it is not found there in half of them.
+double found_again_us(ShotSource& source, Method& method);
+
 }  // namespace tagwrench::bench
