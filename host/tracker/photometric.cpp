@@ -25,6 +25,10 @@ constexpr double kVarianceFactor = 1.0193;
 constexpr double kWorstPatch = 3.0;
 constexpr float kMinWeights = 0.7F;
 constexpr float kMinInside = 0.7F;
+/// From this part of the pixels on, patches that were left out are tried again at once.
+constexpr double kMostSeen = 0.65;
+/// A tag whose residuals are more than this many times those of the best one is covered.
+constexpr double kWorstTag = 6.0;
 /// A tag is held when this part of its pixels are inliers.
 constexpr double kMinTagFraction = 0.35;
 /// The typical patch is the one at this rank from below: more than half of them may be covered.
@@ -77,6 +81,10 @@ float worst_square(double typical) {
   return static_cast<float>(squared(kWorstPatch * std::max(1.0, typical)));
 }
 
+std::uint64_t patch_bit(const PixelPatch& patch) {
+  return std::uint64_t{1} << (patch.row * kPatchesPerSide + patch.column);
+}
+
 bool fits(const NormalEquations& patch, float worst) {
   return patch.squares < worst * patch.weights && patch.weights > kMinWeights * patch.inside;
 }
@@ -85,18 +93,6 @@ Eigen::Matrix<double, kIlluminationParameters, 1> illumination_prior() {
   Eigen::Matrix<double, kIlluminationParameters, 1> sigma;
   sigma << kGainPrior, kGainSlopePrior, kGainSlopePrior, kGainSlopePrior, kOffsetPrior;
   return sigma.cwiseAbs2().cwiseInverse();
-}
-
-constexpr double kTry = 0.2e-3;        // m, displacement for the numeric derivative
-constexpr double kTryAngle = 0.01;     // rad
-constexpr double kTagTry = 20e-6;      // m, of a tag
-constexpr double kTagTryAngle = 2e-3;  // rad
-
-/// Where the line of sight through `p` (camera frame) meets the plane through `origin` with
-/// `normal`.
-Eigen::Vector3d on_plane(const Eigen::Vector3d& p, const Eigen::Vector3d& origin,
-                         const Eigen::Vector3d& normal) {
-  return p * (normal.dot(origin) / normal.dot(p));
 }
 
 }  // namespace
@@ -185,21 +181,45 @@ double PhotometricAligner::disputed(double typical) const noexcept {
   return all > 0 ? against / all : 1;
 }
 
+/// Far from the pose all residuals are large, and tell of whole tags only: one that looks much
+/// worse than the best would pull the fit away, and so would patches that were covered in the last
+/// frame.
+void PhotometricAligner::judge_far(const PhotometricState& state) noexcept {
+  std::array<double, kMaxTags> squares{};
+  std::array<double, kMaxTags> weights{};
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    const NormalEquations& s = sums_[n];
+    const PixelPatch& patch = template_.patches[n];
+    const bool seen = s.inside >= kMinInside * static_cast<float>(patch.pixels);
+    inlier_[n] = seen && (state.left_out[patch.tag] & patch_bit(patch)) == 0 ? 1 : 0;
+    if (inlier_[n] == 0) continue;
+    squares[patch.tag] += s.squares;
+    weights[patch.tag] += s.weights;
+  }
+  std::array<double, kMaxTags> mean{};
+  double best = 1e30;
+  for (std::size_t t = 0; t < template_.tags; ++t) {
+    if (!(weights[t] > 0)) continue;
+    mean[t] = squares[t] / weights[t];
+    best = std::min(best, mean[t]);
+  }
+  for (std::size_t n = 0; n < sums_.size(); ++n)
+    if (mean[template_.patches[n].tag] > squared(kWorstTag) * best) inlier_[n] = 0;
+}
+
 /// A covered or dazzled patch is left out, and so is a tag of which little is left.
-void PhotometricAligner::judge_patches(double typical, bool near) noexcept {
+void PhotometricAligner::judge_patches(double typical) noexcept {
   const float worst = worst_square(typical);
   std::array<double, kMaxTags> all{};
   std::array<double, kMaxTags> accepted{};
   for (std::size_t n = 0; n < sums_.size(); ++n) {
     const NormalEquations& s = sums_[n];
     const PixelPatch& patch = template_.patches[n];
-    bool inlier = s.inside >= kMinInside * static_cast<float>(patch.pixels);
-    if (near && inlier) inlier = fits(s, worst);
+    const bool inlier = s.inside >= kMinInside * static_cast<float>(patch.pixels) && fits(s, worst);
     inlier_[n] = inlier ? 1 : 0;
     all[patch.tag] += static_cast<double>(patch.pixels);
     if (inlier) accepted[patch.tag] += static_cast<double>(patch.pixels);
   }
-  if (!near) return;
   for (std::size_t n = 0; n < sums_.size(); ++n) {
     const std::size_t tag = template_.patches[n].tag;
     if (accepted[tag] < kMinTagFraction * all[tag]) inlier_[n] = 0;
@@ -308,7 +328,10 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
     if (!(typical > 0)) return fit;
     if (i == 0) first_typical = typical;
     if (i >= kFirstSteps && typical > first_typical) return fit;  // running away
-    if (i < kJudgedSteps) judge_patches(typical, near);
+    if (!near)
+      judge_far(state);
+    else if (i < kJudgedSteps)
+      judge_patches(typical);
     if (!factorise()) return fit;
     const std::optional<double> taken = step(fit, now);
     if (!taken) return fit;
@@ -323,9 +346,16 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
     near = near || step_size < kNearStep;
   }
   if (!fit.converged) return fit;
+  now.left_out.fill(0);
+  for (std::size_t n = 0; n < inlier_.size(); ++n) {
+    const PixelPatch& patch = template_.patches[n];
+    if (inlier_[n] == 0) now.left_out[patch.tag] |= patch_bit(patch);
+  }
   state = now;
   renormalise(fit.camera_T_platform);
   conclude(fit);
+  // Where most is seen, what is covered cannot pull far, and may be tried again.
+  if (fit.inlier_fraction > kMostSeen) state.left_out.fill(0);
   return fit;
 }
 
@@ -347,7 +377,13 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
     inside += sums_[n].inside;
     noise += patch.mean_noise * sums_[n].inside;
     held[patch.tag] = true;
+    fit.tag_share[patch.tag] += static_cast<double>(patch.pixels);
   }
+  std::array<double, kMaxTags> pixels{};
+  for (const PixelPatch& patch : template_.patches)
+    pixels[patch.tag] += static_cast<double>(patch.pixels);
+  for (std::size_t t = 0; t < template_.tags; ++t)
+    if (pixels[t] > 0) fit.tag_share[t] /= pixels[t];
   fit.inlier_fraction = inliers / all;
   fit.residual = std::sqrt(squares / inside / kMeanWeightedSquare);
   fit.residual_fraction = fit.residual * (noise / inside) / template_.contrast;
@@ -385,7 +421,11 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
   }
   // The fit has taken its own part out of the residuals.
   constexpr double kFitted = kSharedParameters;
-  if (patches > kFitted) ratio *= patches / (patches - kFitted);
+  if (patches > kFitted + 3) {
+    // And a variance known from so few makes the error Student's t, which spreads wider: most where
+    // one tag is covered.
+    ratio *= patches / (patches - kFitted - 2);
+  }
   for (Groups* groups : {&rows, &columns}) {
     for (const auto& tag : groups->pull) {
       for (const Vector6& pull : tag) {
@@ -398,7 +438,7 @@ void PhotometricAligner::conclude(PhotometricFit& fit) const noexcept {
     if (groups->count < 1.2 * kFitted) continue;
     const double freedom = groups->count - kGroupsFitted;
     const double excess = groups->ratio * groups->count / freedom - 1;
-    // A variance known from so few groups makes the error Student's t, which spreads wider.
+    // Student's t once more.
     ratio = std::max(ratio, 1 + excess * freedom / (freedom - 2));
   }
   // What all patches have in common, as the smear of a motion, no comparison of them shows; it
@@ -426,11 +466,13 @@ Region PhotometricAligner::region(const Eigen::Isometry3d& pose, int margin_px) 
 }
 
 Vector6 PhotometricAligner::motion_of(const Eigen::Isometry3d& pose,
-                                      std::span<const Eigen::Vector2d> shifts) {
+                                      std::span<const Eigen::Vector2d> shifts,
+                                      std::optional<std::size_t> only) {
   view_patches(pose, {}, {});
   Matrix6 normal = Matrix6::Zero();
   Vector6 rhs = Vector6::Zero();
   for (std::size_t n = 0; n < template_.patches.size(); ++n) {
+    if (only && template_.patches[n].tag != *only) continue;
     const Eigen::Matrix2d& gradient = template_.patches[n].gradient;
     const Eigen::Vector2d shift = template_per_image_[n] * shifts[n];
     normal += pixel_motion_[n].transpose() * gradient * pixel_motion_[n];
@@ -440,73 +482,6 @@ Vector6 PhotometricAligner::motion_of(const Eigen::Isometry3d& pose,
   unit << 1e-3, 1e-3, 1e-3, 0.05, 0.05, 0.05;
   const Matrix6 scaled = unit.asDiagonal() * normal * unit.asDiagonal();
   return unit.asDiagonal() * Ldlt<6>(scaled).solve(unit.asDiagonal() * rhs);
-}
-
-void GeometryUncertainty::set(PhotometricAligner& aligner,
-                              const Eigen::Isometry3d& camera_T_platform,
-                              std::vector<Matrix6> tag_covariance, double scale_sigma) {
-  scale_sigma_ = scale_sigma;
-  const std::vector<PixelPatch>& patches = aligner.pixels().patches;
-  const CameraModel& camera = aligner.pixels().camera;
-  const auto tags = static_cast<double>(tag_covariance.size());
-  std::vector<Eigen::Vector2d> shifts(patches.size());
-  Vector6 unit;
-  unit << Eigen::Vector3d::Constant(kTagTry), Eigen::Vector3d::Constant(kTagTryAngle);
-  slopes_.assign(tag_covariance.size(), {});
-  for (std::size_t t = 0; t < tag_covariance.size(); ++t) {
-    for (Matrix6& slope : slopes_[t]) slope.setZero();
-    // One plane for each tag, from a patch of it.
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-    double count = 0;
-    for (const PixelPatch& patch : patches) {
-      if (patch.tag != t) continue;
-      centre += camera_T_platform * patch.middle;
-      normal = camera_T_platform.linear() *
-               (patch.right - patch.middle).cross(patch.below - patch.middle);
-      ++count;
-    }
-    if (count == 0) continue;
-    centre /= count;
-    const EigenSystem<6> eigen = symmetric_eigen(Matrix6(
-        unit.cwiseInverse().asDiagonal() * tag_covariance[t] * unit.cwiseInverse().asDiagonal()));
-    for (int k = 0; k < 6; ++k) {
-      const Vector6 error = unit.cwiseProduct(eigen.vectors.col(k));
-      const double size = std::sqrt(std::max(0.0, eigen.values[k]));
-      const Eigen::Matrix3d turn = rotation_from_vector(error.tail<3>());
-      Eigen::Vector3d origin = camera_T_platform.translation();
-      origin += error.head<3>() / tags;
-      for (int axis = 0; axis < 6; ++axis) {
-        Vector6 displacement = Vector6::Zero();
-        displacement[axis] = axis < 3 ? kTry : kTryAngle;
-        const Eigen::Isometry3d displaced = moved(camera_T_platform, displacement);
-        const Eigen::Matrix3d rotation = rotation_from_vector(displacement.tail<3>());
-        for (std::size_t n = 0; n < patches.size(); ++n) {
-          Eigen::Vector3d real = camera_T_platform * patches[n].middle;
-          if (patches[n].tag == t) real = on_plane(real, centre + error.head<3>(), turn * normal);
-          const Eigen::Vector3d now = origin + displacement.head<3>() + rotation * (real - origin);
-          shifts[n] =
-              project(camera, now).pixel - project(camera, displaced * patches[n].middle).pixel;
-        }
-        slopes_[t][static_cast<std::size_t>(axis)].col(k) =
-            size / displacement[axis] * aligner.motion_of(displaced, shifts);
-      }
-    }
-  }
-}
-
-Matrix6 GeometryUncertainty::covariance(const Vector6& displacement) const noexcept {
-  Matrix6 sum = Matrix6::Zero();
-  for (const std::array<Matrix6, 6>& slope : slopes_) {
-    Matrix6 spread = Matrix6::Zero();
-    for (int axis = 0; axis < 6; ++axis)
-      spread += displacement[axis] * slope[static_cast<std::size_t>(axis)];
-    sum += spread * spread.transpose();
-  }
-  // A target that is larger and farther by a part moves by as much more, and turns alike.
-  const Eigen::Vector3d stretched = scale_sigma_ * displacement.head<3>();
-  sum.topLeftCorner<3, 3>() += stretched * stretched.transpose();
-  return sum;
 }
 
 }  // namespace tagwrench

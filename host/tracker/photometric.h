@@ -73,13 +73,15 @@ void sum_patches(const PixelTemplate& pixels, const PixelWindow& image,
 
 // The steps around it.
 
-/// Illumination and blur are carried from frame to frame: they change slowly.
+/// Carried from frame to frame: illumination and blur change slowly, and a hand stays for a while.
 struct PhotometricState {
   struct Illumination {
     std::array<double, 4> gain{1, 0, 0, 0};
     double offset = 0;
   };
   std::array<Illumination, kMaxTags> illumination{};
+  /// Of each tag the patches that were no inliers, bit row * kPatchesPerSide + column.
+  std::array<std::uint64_t, kMaxTags> left_out{};
   std::array<double, kBlurParameters> blur{};
 };
 
@@ -91,6 +93,7 @@ struct PhotometricFit {
   double residual = 0;           ///< RMS of whitened residuals: 1 when nothing but noise is left
   double residual_fraction = 0;  ///< RMS of residuals relative to the template's contrast
   double inlier_fraction = 0;    ///< of the template's pixels, those in accepted patches, 0..1
+  std::array<double, kMaxTags> tag_share{};  ///< likewise, of each tag's pixels
   std::uint8_t tags_held = 0;
   bool converged = false;
 };
@@ -120,8 +123,10 @@ class PhotometricAligner {
   Region region(const Eigen::Isometry3d& pose, int margin_px) const noexcept;
 
   /// What the motion would be if the patches' pixels were seen `shifts` away from where the pose
-  /// has them (image px, one for each patch): for the propagation of errors.
-  Vector6 motion_of(const Eigen::Isometry3d& pose, std::span<const Eigen::Vector2d> shifts);
+  /// has them (image px, one for each patch): for the propagation of errors. `only`: as one tag
+  /// alone tells it.
+  Vector6 motion_of(const Eigen::Isometry3d& pose, std::span<const Eigen::Vector2d> shifts,
+                    std::optional<std::size_t> only = {});
 
  private:
   using SharedVector = Eigen::Matrix<double, kSharedParameters, 1>;
@@ -141,7 +146,8 @@ class PhotometricAligner {
                     const PhotometricState& state) noexcept;
   double typical_residual() noexcept;
   double disputed(double typical) const noexcept;
-  void judge_patches(double typical, bool near) noexcept;
+  void judge_far(const PhotometricState& state) noexcept;
+  void judge_patches(double typical) noexcept;
   bool factorise() noexcept;
   /// The step's size, squared, in standard deviations, all shared parameters together; nothing
   /// where it leads nowhere.
@@ -161,10 +167,10 @@ class PhotometricAligner {
   SharedMatrix inverse_ = SharedMatrix::Zero();
 };
 
-/// What it costs not to know exactly where the tags sit: a displacement d is read with an error
-/// that grows with d. First-order propagation: error = (sum over axes j of d_j * slope_j) * (error
-/// of the tags' poses at rest). The tags' planes turn or shift while what they show in the picture
-/// at rest stays where it is.
+/// geometry_uncertainty.cpp. What it costs not to know exactly where the tags sit: a displacement d
+/// is read with an error that grows with d. First-order propagation: error = (sum over axes j of
+/// d_j * slope_j) * (error of the tags' poses at rest). The tags' planes turn or shift while what
+/// they show in the picture at rest stays where it is.
 class GeometryUncertainty {
  public:
   /// `tag_covariance`: of each tag's motion in the platform frame at rest (camera axes; m, rad; see
@@ -174,13 +180,23 @@ class GeometryUncertainty {
   void set(PhotometricAligner& aligner, const Eigen::Isometry3d& camera_T_platform,
            std::vector<Matrix6> tag_covariance, double scale_sigma);
 
-  /// Of a displacement (m, rad) read from the image. No heap.
+  /// Of a displacement (m, rad) read from the image, to which each tag contributed this share of
+  /// its pixels (all of them alike: as when all are seen). Between all tags and one alone the share
+  /// interpolates. No heap.
+  Matrix6 covariance(const Vector6& displacement,
+                     const std::array<double, kMaxTags>& tag_share) const noexcept;
+  /// All tags seen.
   Matrix6 covariance(const Vector6& displacement) const noexcept;
 
  private:
   /// Of each tag, per axis of displacement; columns: the tag's six errors, each by one standard
   /// deviation along a principal axis.
-  std::vector<std::array<Matrix6, 6>> slopes_;
+  using Slopes = std::vector<std::array<Matrix6, 6>>;
+
+  static Matrix6 spread(const Slopes& slopes, const Vector6& displacement) noexcept;
+
+  Slopes slopes_;
+  std::vector<Slopes> alone_;  ///< read from one tag alone, for each
   double scale_sigma_ = 0;
 };
 

@@ -272,7 +272,7 @@ struct Tracker::Impl {
     track.status = Status::ok;
     track.displacement = motion_between(reference.camera_T_platform, pose);
     track.covariance = displacement_covariance(fit.covariance, track.displacement) +
-                       geometry.covariance(track.displacement) + pose_covariance;
+                       geometry.covariance(track.displacement, fit.tag_share) + pose_covariance;
     if (state == TrackingState::held_by_picture) {
       // Supposing that the next frame comes after the same time as this one.
       track.wanted = aligner.region(predictor.predict(time + predictor.period()), kMargin_px);
