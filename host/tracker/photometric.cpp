@@ -140,8 +140,8 @@ void PhotometricAligner::view_patches(const Eigen::Isometry3d& pose, const RowMo
 
     const ProjectedPoint seen = project(template_.camera, at * patch.middle);
     Eigen::Matrix2d image_per_template;
-    image_per_template << project(template_.camera, at * patch.right).pixel - seen.pixel,
-        project(template_.camera, at * patch.below).pixel - seen.pixel;
+    image_per_template << seen.jacobian * (at.linear() * (patch.right - patch.middle)),
+        seen.jacobian * (at.linear() * (patch.below - patch.middle));
     const double area = image_per_template.determinant();
     const bool sensible = area > 0.1 && area < 10;
     const Eigen::Matrix2d back =
@@ -183,18 +183,19 @@ double PhotometricAligner::disputed(double typical) const noexcept {
 
 /// Far from the pose all residuals are large, and tell of whole tags only: one that looks much
 /// worse than the best would pull the fit away, and so would patches that were covered in the last
-/// frame.
-void PhotometricAligner::judge_far(const PhotometricState& state) noexcept {
+/// frame. True when other patches are inliers than before.
+bool PhotometricAligner::judge_far(const PhotometricState& state) noexcept {
   std::array<double, kMaxTags> squares{};
   std::array<double, kMaxTags> weights{};
-  for (std::size_t n = 0; n < sums_.size(); ++n) {
-    const NormalEquations& s = sums_[n];
+  const auto candidate = [&](std::size_t n) {
     const PixelPatch& patch = template_.patches[n];
-    const bool seen = s.inside >= kMinInside * static_cast<float>(patch.pixels);
-    inlier_[n] = seen && (state.left_out[patch.tag] & patch_bit(patch)) == 0 ? 1 : 0;
-    if (inlier_[n] == 0) continue;
-    squares[patch.tag] += s.squares;
-    weights[patch.tag] += s.weights;
+    return sums_[n].inside >= kMinInside * static_cast<float>(patch.pixels) &&
+           (state.left_out[patch.tag] & patch_bit(patch)) == 0;
+  };
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    if (!candidate(n)) continue;
+    squares[template_.patches[n].tag] += sums_[n].squares;
+    weights[template_.patches[n].tag] += sums_[n].weights;
   }
   std::array<double, kMaxTags> mean{};
   double best = 1e30;
@@ -203,8 +204,14 @@ void PhotometricAligner::judge_far(const PhotometricState& state) noexcept {
     mean[t] = squares[t] / weights[t];
     best = std::min(best, mean[t]);
   }
-  for (std::size_t n = 0; n < sums_.size(); ++n)
-    if (mean[template_.patches[n].tag] > squared(kWorstTag) * best) inlier_[n] = 0;
+  bool changed = false;
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    const bool inlier =
+        candidate(n) && mean[template_.patches[n].tag] <= squared(kWorstTag) * best;
+    changed = changed || inlier != (inlier_[n] != 0);
+    inlier_[n] = inlier ? 1 : 0;
+  }
+  return changed;
 }
 
 /// A covered or dazzled patch is left out, and so is a tag of which little is left.
@@ -328,11 +335,14 @@ PhotometricFit PhotometricAligner::align(const PixelWindow& image,
     if (!(typical > 0)) return fit;
     if (i == 0) first_typical = typical;
     if (i >= kFirstSteps && typical > first_typical) return fit;  // running away
+    // Far away a step need not be exact: the matrix of the first look serves all that follow with
+    // the same patches.
+    bool new_matrix = near || i == 0;
     if (!near)
-      judge_far(state);
+      new_matrix = judge_far(state) || new_matrix;
     else if (i < kJudgedSteps)
       judge_patches(typical);
-    if (!factorise()) return fit;
+    if (new_matrix && !factorise()) return fit;
     const std::optional<double> taken = step(fit, now);
     if (!taken) return fit;
     const double scale = std::max(1.0, typical);

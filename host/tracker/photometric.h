@@ -146,7 +146,7 @@ class PhotometricAligner {
                     const PhotometricState& state) noexcept;
   double typical_residual() noexcept;
   double disputed(double typical) const noexcept;
-  void judge_far(const PhotometricState& state) noexcept;
+  bool judge_far(const PhotometricState& state) noexcept;
   void judge_patches(double typical) noexcept;
   bool factorise() noexcept;
   /// The step's size, squared, in standard deviations, all shared parameters together; nothing
