@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstddef>
 #include <cstring>
 #include <utility>
 
@@ -62,6 +63,17 @@ bool somebody_listens(const sockaddr_un& address) {
 
 bool listens(const std::string& path) { return somebody_listens(address_of(path)); }
 
+bool connect_control(int socket, const std::string& path) {
+  const sockaddr_un address = address_of(path);
+  if (::connect(socket, generic(address), sizeof address) != 0) return false;
+  sockaddr_un own{};
+  socklen_t size = sizeof own;
+  if (::getsockname(socket, reinterpret_cast<sockaddr*>(&own), &size) != 0) return false;
+  if (size > sizeof own.sun_family) return true;
+  own.sun_family = AF_UNIX;  // alone, it asks for a name
+  return ::bind(socket, generic(own), sizeof own.sun_family) == 0;
+}
+
 ControlRequest parse_request(std::string_view bytes) noexcept {
   using Kind = ControlRequest::Kind;
   constexpr std::string_view kBlank = " \t\r\n";
@@ -116,22 +128,19 @@ std::string_view ControlSocket::asker() const noexcept {
   return {asker_.sun_path, std::min<std::size_t>(asker_size_, sizeof asker_) - sizeof(sa_family_t)};
 }
 
-void ControlSocket::answer(std::string_view text) noexcept {
-  if (asker_size_ <= sizeof(sa_family_t)) return;  // he has no address
+void ControlSocket::answer(std::string_view asker, std::string_view text) noexcept {
+  sockaddr_un address{};
+  if (asker.empty() || asker.size() > sizeof address.sun_path) return;  // he has no address
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, asker.data(), asker.size());
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + asker.size());
   // One who does not listen any more is not waited for.
-  [[maybe_unused]] const ssize_t sent =
-      ::sendto(socket_.get(), text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-               reinterpret_cast<const sockaddr*>(&asker_), asker_size_);
+  [[maybe_unused]] const ssize_t sent = ::sendto(
+      socket_.get(), text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL, generic(address), size);
 }
 
 ControlClient::ControlClient(const std::string& path) : path_(path), socket_(datagram_socket()) {
-  const sockaddr_un address = address_of(path_);
-  const sa_family_t family = AF_UNIX;  // alone, it asks for a name of the kernel's choice
-  sockaddr own{};
-  own.sa_family = family;
-  if (::bind(socket_.get(), &own, sizeof family) != 0 ||
-      ::connect(socket_.get(), generic(address), sizeof address) != 0)
-    fail();
+  if (!connect_control(socket_.get(), path_)) fail();
 }
 
 void ControlClient::fail() const {

@@ -59,7 +59,9 @@ class ControlSocket {
   /// Who had the last request, to tell askers apart; empty without address. Valid until the next.
   std::string_view asker() const noexcept;
   /// To whoever had the last request, if he listens. Never blocks.
-  void answer(std::string_view text) noexcept;
+  void answer(std::string_view text) noexcept { answer(asker(), text); }
+  /// To one who had a request earlier, as asker() gave him.
+  void answer(std::string_view asker, std::string_view text) noexcept;
 
  private:
   std::string path_;
@@ -71,6 +73,12 @@ class ControlSocket {
 
 /// Whether somebody listens there.
 bool listens(const std::string& path);
+
+/// Connects a datagram socket to whoever listens at `path` now, and then gives it a name of the
+/// kernel's choice, unless it has one. In this order: what is connected hears its peer alone, and
+/// before it has a name nobody can write to it. False: nobody listens; errno tells. Throws
+/// ConfigError if the path is too long.
+bool connect_control(int socket, const std::string& path);
 
 /// One who asks, the same for all his requests.
 class ControlClient {

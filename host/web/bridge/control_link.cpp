@@ -31,11 +31,13 @@ ControlAnswer control_answer(std::string_view bytes) {
 
 ControlLink::ControlLink(boost::asio::io_context& context, std::string path)
     : path_(std::move(path)), socket_(context), patience_(context) {
+  open();
+  connect_control(socket_.native_handle(), path_);  // says now that the path is too long
+}
+
+void ControlLink::open() {
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const sa_family_t family = AF_UNIX;  // alone, it asks for a name of the kernel's choice
-  sockaddr own{};
-  own.sa_family = family;
-  if (fd < 0 || ::bind(fd, &own, sizeof family) != 0)
+  if (fd < 0)
     throw ConfigError(std::string("web: no socket to be had: ") + std::strerror(errno) +
                       "; end other programs");
   socket_.assign(Protocol(), fd);
@@ -43,6 +45,12 @@ ControlLink::ControlLink(boost::asio::io_context& context, std::string path)
 }
 
 void ControlLink::ask(std::string request, Done done) {
+  if (requests_.size() >= kMostWaiting) {
+    boost::asio::post(socket_.get_executor(), [done = std::move(done)] {
+      done({false, "too many requests at once; try again"});
+    });
+    return;
+  }
   requests_.push_back({std::move(request), std::move(done)});
   if (!asking_) send();
 }
@@ -52,11 +60,15 @@ void ControlLink::send() {
   const auto still = [this, number = number_, here = std::weak_ptr(here_)] {
     return !here.expired() && number == number_;
   };
-  boost::system::error_code error;
-  for (std::size_t stale = 1; stale > 0 && !error;)  // answers that came too late
-    stale = socket_.receive(boost::asio::buffer(answer_), 0, error);
-  socket_.send_to(boost::asio::buffer(requests_.front().text), Protocol::endpoint(path_), 0, error);
-  if (error) {
+  // Anew for each request: another sensor may listen there by now.
+  bool sent = connect_control(socket_.native_handle(), path_);
+  if (sent) {
+    boost::system::error_code error;
+    while (!error) socket_.receive(boost::asio::buffer(answer_), 0, error);  // came too late
+    socket_.send(boost::asio::buffer(requests_.front().text), 0, error);
+    sent = !error;
+  }
+  if (!sent) {
     boost::asio::post(socket_.get_executor(), [this, still] {
       if (still()) finish({false, kNobody});
     });
@@ -68,8 +80,13 @@ void ControlLink::send() {
                         });
   patience_.after(kPatience, [this, still] {
     if (!still()) return;
-    socket_.cancel();
-    finish({false, kNobody});
+    socket_.close();  // the answer, should it come after all, is for a name that nobody has
+    try {
+      open();
+      finish({false, kNobody});
+    } catch (const ConfigError& e) {
+      finish({false, e.what()});
+    }
   });
 }
 

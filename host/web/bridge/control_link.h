@@ -30,9 +30,10 @@ class ControlLink {
  public:
   using Done = std::function<void(ControlAnswer)>;
   static constexpr std::chrono::seconds kPatience{2};
+  static constexpr std::size_t kMostWaiting = 64;  ///< more are refused
 
-  /// `path` of the desk's socket, where somebody may or may not listen. Throws ConfigError if the
-  /// system has no more descriptors.
+  /// `path` of the desk's socket, where somebody may or may not listen; nobody else's answers are
+  /// heard. Throws ConfigError if the system has no more descriptors, or the path is too long.
   ControlLink(boost::asio::io_context& context, std::string path);
 
   /// `done` is called exactly once, later; one request after the other.
@@ -45,6 +46,7 @@ class ControlLink {
     std::string text;
     Done done;
   };
+  void open();
   void send();
   void finish(ControlAnswer answer);
 
