@@ -443,11 +443,6 @@ void ProfileFiles::watch() {
                       "; raise fs.inotify.max_user_watches, or take ready-made ones");
 }
 
-Profile ProfileFiles::parse(const std::string& text, std::size_t profile) const {
-  const std::string file = file_of(profile);
-  return parse_profile(text, file.empty() ? profiles_[profile].name : file, defaults_);
-}
-
 std::vector<ProfileFiles::Change> ProfileFiles::reread() {
   std::array<char, 4096> events;
   bool any = false;

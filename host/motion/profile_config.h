@@ -81,8 +81,8 @@ class ProfileFiles {
       if (file.profile == profile) return file.folder + "/" + file.name;
     return {};
   }
-  /// What a text says that would stand in a profile's place. Throws ConfigError: the first fault.
-  Profile parse(const std::string& text, std::size_t profile) const;
+  /// What a profile's text leaves out.
+  const Profile& defaults() const noexcept { return defaults_; }
   /// Until its file is saved again.
   void replace(std::size_t profile, Profile by) { profiles_[profile] = std::move(by); }
 

@@ -47,6 +47,8 @@ ProfileManager::ProfileManager(ProfileFiles files, std::optional<ControlSocket> 
   add(events_, files_.fd());
   if (control_) {
     lapse_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
+    reader_ = std::make_unique<TrialReader>();
+    add(events_, reader_->fd());
     add(events_, control_->fd());
     add(events_, lapse_.get());
   }
@@ -138,8 +140,7 @@ void ProfileManager::take_requests() {
     const ControlRequest request = control_->next();
     if (request.kind == ControlRequest::Kind::none) return;
     if (asker_tries()) extend_trial();
-    control_->answer(granted(request));
-    if (request.kind == ControlRequest::Kind::attempt) return;  // a profile's text takes longest
+    if (const std::string answer = granted(request); !answer.empty()) control_->answer(answer);
   }
 }
 
@@ -210,29 +211,36 @@ std::string ProfileManager::show(std::string_view name) const {
   return text;
 }
 
-/// Answers what becomes of the text, as show() does; it may leave out things.
-std::string ProfileManager::attempt(const ControlRequest& request) {
-  if (control_->asker().empty()) return "error: who tries a profile needs an address\n";
-  if (trial_ && !asker_tries())
-    return "error: another page tries profile " + trial_->profile.name + "; leave that one first\n";
-  const std::optional<std::size_t> found = find(request.name);
-  if (!found) return unknown(request.name);
-  try {
-    Profile tried = files_.parse(std::string(request.text), *found);
-    tried.name = files_.profiles()[*found].name;
-    std::string answer = "ok: " + files_.file_of(*found) + "\n" + profile_text(tried);
-    if (answer.size() > ControlSocket::kMaxAnswer) return "error: too long to be tried\n";
-    trial_ = {*found, std::move(tried), std::string(control_->asker())};
-    apply();
-    extend_trial();
-    return answer;
-  } catch (const ConfigError& e) {
-    return "error: " + std::string(e.what()) + "\n";
-  }
+std::string ProfileManager::another_tries() const {
+  return "error: another page tries profile " + trial_->profile.name + "; leave that one first\n";
 }
 
-bool ProfileManager::asker_tries() const noexcept {
-  return trial_ && !trial_->owner.empty() && trial_->owner == control_->asker();
+/// Is answered when the text has been read.
+std::string ProfileManager::attempt(const ControlRequest& request) {
+  if (control_->asker().empty()) return "error: who tries a profile needs an address\n";
+  if (trial_ && !asker_tries()) return another_tries();
+  const std::optional<std::size_t> found = find(request.name);
+  if (!found) return unknown(request.name);
+  const bool taken = reader_->read({.asker = std::string(control_->asker()),
+                                    .profile = *found,
+                                    .name = files_.profiles()[*found].name,
+                                    .file = files_.file_of(*found),
+                                    .text = std::string(request.text),
+                                    .defaults = files_.defaults()});
+  return taken ? "" : "error: another text is being read; try again\n";
+}
+
+void ProfileManager::take_reading() {
+  std::optional<TrialReader::Reading> reading = reader_->take();
+  if (!reading) return;
+  if (trial_ && !tries(reading->asker)) {
+    reading->answer = another_tries();
+  } else if (reading->read) {
+    trial_ = {reading->profile, *std::move(reading->read), reading->asker};
+    apply();
+    extend_trial();
+  }
+  control_->answer(reading->asker, reading->answer);
 }
 
 void ProfileManager::extend_trial() noexcept {

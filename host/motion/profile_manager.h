@@ -23,6 +23,7 @@
 #include "host/motion/gestures.h"
 #include "host/motion/profile_config.h"
 #include "host/motion/shaping.h"
+#include "host/motion/trial_reader.h"
 #include "host/wrench/zero.h"
 
 namespace tagwrench {
@@ -77,6 +78,7 @@ class ProfileManager {
   /// Changed files, requests, the focus.
   void service() noexcept {
     if (files_.fd() >= 0) take_files();
+    if (reader_) take_reading();
     if (control_) take_requests();
     if (trial_) take_lapse();
     if (focus_) take_focus();
@@ -100,6 +102,7 @@ class ProfileManager {
   void apply() noexcept;
   void take_files();
   void take_requests();
+  void take_reading();
   void take_focus();
   void follow_focus(bool told, std::string_view program);
   void take_program() noexcept;
@@ -109,14 +112,19 @@ class ProfileManager {
   std::string attempt(const ControlRequest& request);
   std::optional<std::size_t> find(std::string_view name) const noexcept;
   std::string unknown(std::string_view name) const;
-  bool asker_tries() const noexcept;
+  bool asker_tries() const noexcept { return tries(control_->asker()); }
+  bool tries(std::string_view asker) const noexcept {
+    return trial_ && !asker.empty() && trial_->owner == asker;
+  }
+  std::string another_tries() const;
   void extend_trial() noexcept;
   void end_trial() noexcept;
 
   ProfileFiles files_;
   std::optional<ControlSocket> control_;
   std::unique_ptr<FocusWatch> focus_;
-  UniqueFd lapse_;   ///< timer: a trial's end
+  UniqueFd lapse_;  ///< timer: a trial's end
+  std::unique_ptr<TrialReader> reader_;
   UniqueFd events_;  ///< epoll of them all
   std::size_t current_ = 0;
   std::optional<Trial> trial_;

@@ -20,10 +20,13 @@ class Trial : public test::ProfileFolder {
   }
   std::string asks(ControlClient& client, const std::string& request) {
     auto answer = std::async(std::launch::async, [&] { return client.ask(request); });
-    pollfd waiting{profiles_->poll_fd(), POLLIN, 0};
-    EXPECT_EQ(::poll(&waiting, 1, 10'000), 1) << "it is not woken";
-    profiles_->service();
+    while (answer.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+      if (woken(50)) profiles_->service();
     return answer.get();
+  }
+  bool woken(int patience_ms) const {
+    pollfd waiting{profiles_->poll_fd(), POLLIN, 0};
+    return ::poll(&waiting, 1, patience_ms) == 1;
   }
   double translation() const { return profiles_->profile().shaping.translation; }
 
@@ -60,6 +63,32 @@ TEST_F(Trial, IsInForceAtOnceUntilItIsTakenBack) {
   EXPECT_EQ(translation(), 1);
   EXPECT_NEAR(push(), before, 1e-3);
   EXPECT_FALSE(parse_live(asks(page, "live"))->on_trial);
+}
+
+TEST_F(Trial, IsReadBesideTheFrameLoop) {
+  ControlClient page(path("control"));
+  auto answer =
+      std::async(std::launch::async, [&] { return page.ask("try mine\nrotation: 0.5\n"); });
+  ASSERT_TRUE(woken(10'000));
+  profiles_->service();  // takes the text, and does not read it
+  EXPECT_EQ(profiles_->profile().shaping.rotation, 1);
+  ASSERT_TRUE(woken(10'000));
+  profiles_->service();
+  EXPECT_TRUE(answer.get().starts_with("ok:"));
+  EXPECT_EQ(profiles_->profile().shaping.rotation, 0.5);
+}
+
+TEST_F(Trial, ASecondTextWaitsUntilTheFirstHasBeenTaken) {
+  TrialReader reader;
+  TrialReader::Text text{"a", 0, "mine", "", "rotation: 0.5\n", default_profile(sensor_)};
+  EXPECT_TRUE(reader.read(text));
+  EXPECT_FALSE(reader.read(text));
+  pollfd waiting{reader.fd(), POLLIN, 0};
+  ASSERT_EQ(::poll(&waiting, 1, 10'000), 1);
+  EXPECT_FALSE(reader.read(text)) << "or what was read would be lost";
+  EXPECT_EQ(reader.take()->read->shaping.rotation, 0.5);
+  EXPECT_FALSE(reader.take());
+  EXPECT_TRUE(reader.read(text));
 }
 
 TEST_F(Trial, OfAMistakeChangesNothingAndSaysTheLine) {
