@@ -62,7 +62,7 @@ void check_board(const RunOptions& options, std::span<const OutputSpec> outputs)
 }
 
 /// In the browser of the desktop, where there is one; the shell leaves it to itself, and Ctrl-C in
-/// our terminal too.
+/// our terminal too. Every user of the machine can read the address, in the list of processes.
 void open_in_browser(const std::string& url) {
   if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
   std::string shell = "sh", option = "-c", command = "xdg-open \"$0\" >/dev/null 2>&1 </dev/null &",
@@ -94,23 +94,22 @@ std::unique_ptr<WebBridge> open_web(const RunOptions& options, std::span<const O
   const OutputSpec* spec = find_output(outputs, OutputKind::pages);
   web.server = parse_web("--output web", spec == nullptr ? "" : spec->argument);
   web.server.pages = options.web.pages.empty() ? built_pages() : fs::path(options.web.pages);
-  bool token_made = false;
-  if (!options.web.token_file.empty()) {
-    const WebToken token = web_token(options.web.token_file);
-    web.server.token = token.text;
-    token_made = token.made;
-  }
+  if (!options.web.token_file.empty()) web.server.token = web_token(options.web.token_file);
   web.recordings = options.web.recordings.empty() ? usual_recording_folder()
                                                   : fs::absolute(options.web.recordings);
   if (const std::string folder = config_folder(); !folder.empty())
     web.own_profiles = fs::path(folder) / "profiles";
   auto bridge = std::make_unique<WebBridge>(web, stop.get());
-  log_info("pages: {}{}", token_made ? bridge->url_with_token() : bridge->url(),
-           web.server.token.empty() || token_made
-               ? ""
-               : fmt::format("#token=... (the token is in {})", options.web.token_file));
+  if (web.server.token.empty()) {
+    log_info("pages: {}", bridge->url());
+    if (::geteuid() == 0 && std::getenv("SUDO_UID") != nullptr)
+      log_info("pages: for root alone; run it as yourself, or give --web-token FILE");
+  } else {
+    log_info("pages: {}#token={}", bridge->url(),
+             token_for_people(web.server.token, options.web.token_file));
+  }
   bridge->start();
-  if (options.web.open) open_in_browser(bridge->url_with_token());
+  if (options.web.open) open_in_browser(bridge->local_url());
   return bridge;
 }
 

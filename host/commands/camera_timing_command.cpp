@@ -204,10 +204,8 @@ int run_with_screen(const TimingOptions& o) {
   options.pages = built_pages();
   std::string token_text;
   if (!o.web_token.empty()) {
-    const WebToken token = web_token(o.web_token);
-    options.token = token.text;
-    token_text = token.made ? "&token=" + token.text
-                            : fmt::format("&token=... (the token is in {})", o.web_token);
+    options.token = web_token(o.web_token);
+    token_text = "&token=" + token_for_people(options.token, o.web_token);
   }
   PagePatch page(options);
   const Input input = open_input({o.sensor, o.source, false});

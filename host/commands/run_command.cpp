@@ -161,8 +161,8 @@ void run_command(command_line::Command program) {
       "--open", o->web.open,
       "pages as with --output web, but beside the usual outputs, and open in the browser");
   verb.add_option("--web-token", o->web.token_file,
-                  "file with the token that pages need on an address that others reach;\n"
-                  "made where it is not there");
+                  "file with the token that other computers, and other users of this one, need\n"
+                  "for pages; made where it is not there");
   verb.add_option("--recordings", o->web.recordings,
                   "folder of what pages record; without it ~/.local/share/tagwrench/recordings");
   verb.add_option("--web-pages", o->web.pages).hidden();

@@ -65,7 +65,7 @@ class WebBridge final : private PageRequestHandler {
   void start();
   /// Fit for logs; and to be opened in a browser.
   std::string url() const { return server_.url(); }
-  std::string url_with_token() const { return server_.url_with_token(); }
+  std::string local_url() const { return server_.local_url(); }
   /// `parts`: those of the run; the bridge adds its own.
   std::unique_ptr<WebOutput> begin_run(const RunFacts& facts, WebOutput::Parts parts);
   /// Readable when the run shall end: a signal, or a job wants the camera.

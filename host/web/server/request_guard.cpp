@@ -111,6 +111,11 @@ bool is_word(std::string_view word) {
                      [](char c) { return (c >= 'a' && c <= 'z') || c == '_'; });
 }
 
+/// By a name that nobody else can give to his own page, as a DNS name could be.
+bool is_this_computer(const WebRequest& request) noexcept {
+  return is_loopback_host(request.host) || is_address_host(request.host, request.our_address);
+}
+
 }  // namespace
 
 bool is_host(std::string_view host) noexcept {
@@ -130,6 +135,13 @@ bool is_loopback_host(std::string_view host) noexcept {
   if (!is_host(host)) return false;
   const std::string_view name = host_name(host);
   return same_letters(name, "localhost") || name == "[::1]" || is_loopback_number(name);
+}
+
+bool is_address_host(std::string_view host, std::string_view address) noexcept {
+  if (address.empty() || !is_host(host)) return false;
+  std::string_view name = host_name(host);
+  if (name.front() == '[') name = name.substr(1, name.size() - 2);
+  return same_letters(name, address);
 }
 
 bool is_own_origin(std::string_view origin, std::string_view host) noexcept {
@@ -188,9 +200,14 @@ std::optional<std::string> from_base64url(std::string_view text, std::size_t mos
   return bytes;
 }
 
+bool RequestGuard::knows(const WebRequest& request, std::string_view token) const noexcept {
+  if (request.our_user && is_this_computer(request)) return true;
+  return !token_.empty() && is_token(token, token_);
+}
+
 Refusal RequestGuard::page(const WebRequest& request) const noexcept {
-  const bool known = token_.empty() ? is_loopback_host(request.host) : is_host(request.host);
-  return known ? Refusal::none : Refusal::host;
+  if (!(token_.empty() ? is_this_computer(request) : is_host(request.host))) return Refusal::host;
+  return token_.empty() && !request.our_user ? Refusal::user : Refusal::none;
 }
 
 Refusal RequestGuard::file(const WebRequest& request) const noexcept {
@@ -199,18 +216,15 @@ Refusal RequestGuard::file(const WebRequest& request) const noexcept {
                        request.fetch_site != "none";
   if (foreign || (!request.origin.empty() && !is_own_origin(request.origin, request.host)))
     return Refusal::origin;
-  if (!token_.empty() && !is_token(bearer_token(request.authorization), token_))
-    return Refusal::token;
-  return Refusal::none;
+  return knows(request, bearer_token(request.authorization)) ? Refusal::none : Refusal::token;
 }
 
 Refusal RequestGuard::socket(const WebRequest& request) const {
   if (const Refusal refusal = page(request); refusal != Refusal::none) return refusal;
   if (!is_own_origin(request.origin, request.host)) return Refusal::origin;
   if (!offers_protocol(request.protocols, kProtocol)) return Refusal::protocol;
-  if (!token_.empty() && !is_token(protocol_token(request.protocols).value_or(""), token_))
-    return Refusal::token;
-  return Refusal::none;
+  return knows(request, protocol_token(request.protocols).value_or("")) ? Refusal::none
+                                                                        : Refusal::token;
 }
 
 std::string SitePath::text() const {

@@ -24,7 +24,9 @@ struct WebRequest {
   std::string_view authorization;
   std::string_view protocols;  ///< Sec-WebSocket-Protocol
   std::string_view if_none_match;
-  bool upgrade = false;  ///< to a WebSocket
+  bool upgrade = false;          ///< to a WebSocket
+  bool our_user = false;         ///< a program of ours, or of root's, holds the other end
+  std::string_view our_address;  ///< a number: where the connection arrived
 };
 
 enum class Refusal : std::uint8_t {
@@ -32,6 +34,7 @@ enum class Refusal : std::uint8_t {
   host,      ///< not this computer's name: another site's, that was made to point here
   origin,    ///< another site's page asks
   token,     ///< none, or the wrong one
+  user,      ///< another user of this computer, or nobody knows who; and there is no token
   protocol,  ///< does not speak ours
   path,      ///< would leave the folder
   crowd,     ///< too many pages or connections
@@ -43,6 +46,8 @@ enum class Refusal : std::uint8_t {
 bool is_host(std::string_view host) noexcept;
 /// localhost, [::1] or an address 127.x.x.x, at any port: a tunnel has its own.
 bool is_loopback_host(std::string_view host) noexcept;
+/// The number `address`, at any port; an IPv6 one in brackets.
+bool is_address_host(std::string_view host, std::string_view address) noexcept;
 /// "http://" and the very host.
 bool is_own_origin(std::string_view origin, std::string_view host) noexcept;
 
@@ -62,16 +67,20 @@ class RequestGuard {
   static constexpr std::string_view kProtocol = "tagwrench.v1";
   static constexpr std::string_view kTokenProtocol = "tagwrench.token.";
 
-  /// Without a token, none is needed, and Host must be a loopback one.
+  /// Whoever runs the bridge needs no token on this computer, under a name that nobody can give to
+  /// another's page: a loopback one, or the number where the connection arrived. Everybody else
+  /// needs it; without one, nobody else is served at all, and Host must be such a name.
   explicit RequestGuard(std::string token) : token_(std::move(token)) {}
 
-  /// Anybody's plain page: it holds no secret.
+  /// A plain page holds no secret: with a token, anybody may have it.
   Refusal page(const WebRequest& request) const noexcept;
   /// What the bridge has written: recordings, the certificate.
   Refusal file(const WebRequest& request) const noexcept;
   Refusal socket(const WebRequest& request) const;
 
  private:
+  bool knows(const WebRequest& request, std::string_view token) const noexcept;
+
   std::string token_;
 };
 

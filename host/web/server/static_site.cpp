@@ -34,6 +34,9 @@ constexpr RefusalRow kRefusals[] = {
     {403, "This address is not served: open http://localhost:PORT/ of the bridge."},
     {403, "Pages of other sites may not ask."},
     {401, "The token is missing or wrong: open the address that the bridge printed."},
+    {403,
+     "This sensor is another user's: open it as the user who runs the bridge, or with its "
+     "--web-token."},
     {400, "The WebSocket protocol here is tagwrench.v1: load the page again."},
     {400, "No such path."},
     {503, "Too many pages are open: close one."},

@@ -1,8 +1,10 @@
 #include "host/web/server/web_options.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/random.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -62,6 +64,8 @@ std::optional<std::string> make_token(const std::filesystem::path& file) {
 std::string read_token(const std::filesystem::path& file, int fd) {
   struct stat facts {};
   if (::fstat(fd, &facts) != 0 || !S_ISREG(facts.st_mode)) token_trouble(file, "is not a file");
+  if (facts.st_uid != ::geteuid() && facts.st_uid != 0)
+    token_trouble(file, "is another user's, who knows the token; name a file of yours");
   if ((facts.st_mode & 077) != 0)
     token_trouble(file, "others may read it; chmod 600, and better write a new one");
   std::array<char, kMax + 2> bytes;
@@ -101,16 +105,21 @@ std::filesystem::path built_pages() {
   return std::filesystem::is_directory(installed, error) ? installed : above / "web";
 }
 
-WebToken web_token(const std::filesystem::path& file) {
+std::string web_token(const std::filesystem::path& file) {
   UniqueFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!fd && errno == ENOENT) {
-    if (std::optional<std::string> made = make_token(file)) return {*std::move(made), true};
+    if (std::optional<std::string> made = make_token(file)) return *std::move(made);
     fd.reset(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   }
   if (!fd)
     token_trouble(
         file, std::string("cannot be read: ") + std::strerror(errno) + "; name a file of yours");
-  return {read_token(file, fd.get()), false};
+  return read_token(file, fd.get());
+}
+
+std::string token_for_people(const std::string& token, const std::filesystem::path& file) {
+  return ::isatty(STDERR_FILENO) == 1 ? token
+                                      : fmt::format("... (the token is in {})", file.string());
 }
 
 }  // namespace tagwrench

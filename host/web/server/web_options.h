@@ -12,8 +12,9 @@ namespace tagwrench {
 
 /// How long is waited for what a page, or whoever connects, owes.
 struct WebPatience {
-  Duration request = std::chrono::seconds(10);  ///< for a request, and for a piece of an answer to
-                                                ///< be taken
+  Duration header = std::chrono::seconds(4);  ///< for a request, once it has begun or is the first
+  Duration request = std::chrono::seconds(10);  ///< for the next request, and for a piece of an
+                                                ///< answer to be taken
   Duration unread = std::chrono::seconds(10);   ///< for a page's message to be taken
   Duration ping = std::chrono::seconds(5);      ///< from one ping to the next
   Duration silence = std::chrono::seconds(15);  ///< for anything to be heard from a page
@@ -39,14 +40,13 @@ std::filesystem::path built_pages();
 
 // The token that a page on another computer needs.
 
-struct WebToken {
-  std::string text;
-  bool made = false;  ///< now; it was not there
-};
-
-/// Of a file that its owner alone may read; made, with 43 random characters, where there is none.
-/// Throws ConfigError: others may read it, it is no token (16 to 128 letters, digits, '-', '_',
+/// Of a file of ours (or root's) that its owner alone may read; made, with 43 random characters,
+/// where there is none. Throws ConfigError: it is another's, others may read it, it is no token (16
+/// to 128 letters, digits, '-', '_',
 /// '.' and '~'), or it cannot be written.
-WebToken web_token(const std::filesystem::path& file);
+std::string web_token(const std::filesystem::path& file);
+
+/// On a terminal the token; where standard error is a log, which others may read, where it is.
+std::string token_for_people(const std::string& token, const std::filesystem::path& file);
 
 }  // namespace tagwrench

@@ -19,6 +19,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/log.h"
+#include "host/web/server/peer_user.h"
 
 namespace tagwrench {
 namespace {
@@ -31,6 +32,7 @@ using boost::beast::error_code;
 constexpr std::uint32_t kMaxHeader = 8192;
 constexpr std::size_t kPiece = 64 * 1024;
 constexpr Duration kLinger = std::chrono::seconds(1);
+constexpr std::size_t kSubnet_bytes = 8;    // of an IPv6 address: one household's, all of it
 constexpr std::size_t kMaxTurnedAway = 16;  // at once; more are closed without a word
 constexpr Duration kCheckEvery = std::chrono::milliseconds(250);
 constexpr Duration kFarewell = std::chrono::milliseconds(700);
@@ -82,7 +84,35 @@ tcp::acceptor listener(asio::io_context& context, const WebOptions& options) {
 
 std::string_view view(boost::beast::string_view text) { return {text.data(), text.size()}; }
 
-WebRequest request_of(const HttpRequest& request) {
+/// Who counts as one: an IPv6 host may take any address of its subnet.
+std::string address_key(const asio::ip::address& address) {
+  if (address.is_v4() || address.to_v6().is_v4_mapped()) return address.to_string();
+  const auto bytes = address.to_v6().to_bytes();
+  return {reinterpret_cast<const char*>(bytes.data()), kSubnet_bytes};
+}
+
+/// Whose connection it is, as far as the kernel knows.
+struct Peer {
+  explicit Peer(tcp::socket& socket) {
+    error_code error;
+    const tcp::endpoint theirs = socket.remote_endpoint(error);
+    if (!error) address = address_key(theirs.address());
+    const tcp::endpoint ours = socket.local_endpoint(error);
+    if (!error) our_address = numeric(ours.address());
+    our_user = is_our_user(peer_user(socket.native_handle()));
+  }
+  static std::string numeric(const asio::ip::address& at) {
+    const bool mapped = at.is_v6() && at.to_v6().is_v4_mapped();
+    return mapped ? asio::ip::make_address_v4(asio::ip::v4_mapped, at.to_v6()).to_string()
+                  : at.to_string();
+  }
+
+  std::string address;
+  std::string our_address;
+  bool our_user = false;
+};
+
+WebRequest request_of(const HttpRequest& request, const Peer& peer) {
   return {.method = view(request.method_string()),
           .target = view(request.target()),
           .host = view(request[http::field::host]),
@@ -91,7 +121,9 @@ WebRequest request_of(const HttpRequest& request) {
           .authorization = view(request[http::field::authorization]),
           .protocols = view(request[http::field::sec_websocket_protocol]),
           .if_none_match = view(request[http::field::if_none_match]),
-          .upgrade = boost::beast::websocket::is_upgrade(request)};
+          .upgrade = boost::beast::websocket::is_upgrade(request),
+          .our_user = peer.our_user,
+          .our_address = peer.our_address};
 }
 
 /// What helps to see who it was; never what may hold a token.
@@ -106,17 +138,10 @@ std::string_view telling_part(Refusal refusal, const WebRequest& request) {
 /// One connection that asks for files, or becomes a page. Everything has its time.
 class WebServer::Connection : public std::enable_shared_from_this<Connection> {
  public:
-  Connection(tcp::socket socket, WebServer& server) : socket_(std::move(socket)), server_(server) {}
+  Connection(tcp::socket socket, Peer peer, WebServer& server)
+      : socket_(std::move(socket)), peer_(std::move(peer)), server_(server) {}
 
-  void serve() {
-    deadline_ = std::chrono::steady_clock::now() + server_.patience_;
-    parser_.emplace();
-    parser_->header_limit(kMaxHeader);
-    http::async_read(socket_, incoming_, *parser_,
-                     [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
-                       self->handle(error);
-                     });
-  }
+  void serve() { read_request(server_.patience_.header); }
   /// One answer to whatever it asks, and good-bye.
   void turn_away(Refusal refusal) {
     turned_away_ = true;
@@ -129,19 +154,41 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
     error_code ignored;
     socket_.close(ignored);  // whatever waits for it ends with an error
   }
+  /// Closed, and forgotten.
+  void end() {
+    if (std::exchange(ended_, true)) return;
+    drop();
+    server_.connections_.erase(this);
+  }
   bool is_turned_away() const noexcept { return turned_away_; }
+  /// Has not asked for anything, this time.
+  bool is_idle() const noexcept { return idle_; }
+  TimePoint idle_since() const noexcept { return idle_since_; }
+  const Peer& peer() const noexcept { return peer_; }
 
  private:
   using Parser = http::request_parser<http::empty_body>;
 
+  void read_request(Duration patience) {
+    idle_ = true;
+    idle_since_ = std::chrono::steady_clock::now();
+    deadline_ = idle_since_ + patience;
+    parser_.emplace();
+    parser_->header_limit(kMaxHeader);
+    http::async_read(socket_, incoming_, *parser_,
+                     [self = shared_from_this()](const error_code& error, std::size_t /*size*/) {
+                       self->handle(error);
+                     });
+  }
   void handle(const error_code& error) {
+    idle_ = false;
     if (ended_ || error == http::error::end_of_stream || error == asio::error::operation_aborted)
       return end();
     if (error) return failed(error);
     handle_request();
   }
   void handle_request() {
-    const WebRequest request = request_of(parser_->get());
+    const WebRequest request = request_of(parser_->get(), peer_);
     keep_ = parser_->get().keep_alive();
     if (request.target != "/ws") {
       WebAnswer answer = server_.site_.answer(request);
@@ -191,7 +238,7 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
     send(outgoing_.size());
   }
   void send(std::size_t size) {
-    deadline_ = std::chrono::steady_clock::now() + server_.patience_;
+    deadline_ = std::chrono::steady_clock::now() + server_.patience_.request;
     asio::async_write(socket_, asio::buffer(outgoing_.data(), size),
                       [self = shared_from_this()](const error_code& error, std::size_t /*sent*/) {
                         self->sent(error);
@@ -211,7 +258,7 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
     if (file_left_ > 0) return send_file();
     file_ = {};
     outgoing_ = {};
-    if (keep_) return serve();
+    if (keep_) return read_request(server_.patience_.request);
     linger();
   }
   /// Closed at once, what it is still sending would make the kernel throw away the answer.
@@ -229,13 +276,9 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
           error ? self->end() : self->discard();
         });
   }
-  void end() {
-    if (std::exchange(ended_, true)) return;
-    drop();
-    server_.connections_.erase(this);
-  }
 
   tcp::socket socket_;
+  Peer peer_;
   WebServer& server_;
   boost::beast::flat_buffer incoming_{kMaxHeader + 1024};
   std::optional<Parser> parser_;
@@ -245,6 +288,8 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
   bool keep_ = false;  ///< for the next request
   bool turned_away_ = false;
   bool ended_ = false;
+  bool idle_ = false;
+  TimePoint idle_since_{};
   TimePoint deadline_{};
 };
 
@@ -256,7 +301,7 @@ WebServer::WebServer(const WebOptions& options)
       endpoint_(acceptor_.local_endpoint()),
       retry_(context_),
       checks_(context_),
-      patience_(options.patience.request) {
+      patience_(options.patience) {
   hub_.on_misbehaviour = [this](Refusal refusal) { refused(refusal, {}); };
 }
 
@@ -318,16 +363,48 @@ void WebServer::accept() {
 void WebServer::take(tcp::socket socket) {
   const auto away = std::count_if(connections_.begin(), connections_.end(),
                                   [](const auto& one) { return one.first->is_turned_away(); });
-  const auto turned_away = static_cast<std::size_t>(away);
-  const bool room = connections_.size() - turned_away + hub_.pages() < kMaxConnections;
-  if (!room) refused(Refusal::crowd, {});
-  if (!room && turned_away >= kMaxTurnedAway) return;
-  const auto connection = std::make_shared<Connection>(std::move(socket), *this);
+  Peer peer(socket);
+  Refusal refusal = Refusal::none;
+  if (token_.empty() && !peer.our_user)
+    refusal = Refusal::user;  // nothing of his is looked at
+  else if (!make_room(peer.address, peer.our_user))
+    refusal = Refusal::crowd;
+  if (refusal != Refusal::none) refused(refusal, {});
+  if (refusal != Refusal::none && static_cast<std::size_t>(away) >= kMaxTurnedAway) return;
+  const auto connection = std::make_shared<Connection>(std::move(socket), std::move(peer), *this);
   connections_.emplace(connection.get(), connection);
-  if (room)
+  if (refusal == Refusal::none)
     connection->serve();
   else
-    connection->turn_away(Refusal::crowd);
+    connection->turn_away(refusal);
+}
+
+/// Where there is no room, whoever has been asking for nothing for longest makes it. So those who
+/// never finish a request starve nobody who does.
+bool WebServer::make_room(const std::string& address, bool our_user) {
+  std::size_t all = hub_.pages(), his = 0;
+  Connection* longest = nullptr;
+  Connection* longest_of_his = nullptr;
+  const auto longer = [](const Connection* one, const Connection* than) {
+    return than == nullptr || one->idle_since() < than->idle_since();
+  };
+  for (const auto& [key, connection] : connections_) {
+    if (connection->is_turned_away()) continue;
+    const bool same = connection->peer().address == address;
+    ++all;
+    if (same) ++his;
+    if (!connection->is_idle()) continue;
+    if (longer(connection.get(), longest)) longest = connection.get();
+    if (same && longer(connection.get(), longest_of_his)) longest_of_his = connection.get();
+  }
+  if (!our_user && his >= kMaxPerAddress)
+    longest = longest_of_his;
+  else if (all < kMaxConnections)
+    return true;
+  if (longest == nullptr) return false;
+  refused(Refusal::crowd, {});
+  longest->end();
+  return true;
 }
 
 void WebServer::check() {
@@ -340,6 +417,10 @@ void WebServer::check() {
 void WebServer::leave() {
   if (hub_.pages() == 0 || std::chrono::steady_clock::now() > until_) return context_.stop();
   checks_.after(std::chrono::milliseconds(10), [this] { leave(); });
+}
+
+std::string WebServer::local_url() const {
+  return endpoint_.address().is_unspecified() ? fmt::format("http://localhost:{}/", port()) : url();
 }
 
 std::string WebServer::url() const {

@@ -29,6 +29,7 @@ namespace tagwrench {
 class WebServer {
  public:
   static constexpr std::size_t kMaxConnections = 64;
+  static constexpr std::size_t kMaxPerAddress = 24;  ///< of another computer
 
   /// Binds and listens, in no thread yet. Throws ConfigError: a bad address, or one without token.
   explicit WebServer(const WebOptions& options);
@@ -48,8 +49,8 @@ class WebServer {
   std::uint16_t port() const noexcept { return endpoint_.port(); }
   /// Without the token: fit for logs.
   std::string url() const;
-  /// To be opened in a browser: a token goes in the fragment, which no browser sends.
-  std::string url_with_token() const { return token_.empty() ? url() : url() + "#token=" + token_; }
+  /// For a browser of this computer and this user, who needs no token.
+  std::string local_url() const;
   /// For descriptors and timers of those who answer. Its handlers run in the server's thread.
   boost::asio::io_context& context() noexcept { return context_; }
 
@@ -101,6 +102,7 @@ class WebServer {
   void run() noexcept;
   void accept();
   void take(boost::asio::ip::tcp::socket socket);
+  bool make_room(const std::string& address, bool our_user);
   void refused(Refusal refusal, std::string_view detail);
   void check();
   void leave();
@@ -113,7 +115,7 @@ class WebServer {
   boost::asio::ip::tcp::endpoint endpoint_;
   ServerTimer retry_;
   ServerTimer checks_;
-  Duration patience_;
+  WebPatience patience_;
   TimePoint until_{};
   RefusalLog log_;
   std::map<const Connection*, std::shared_ptr<Connection>> connections_;

@@ -16,6 +16,7 @@ WebRequest socket_request() {
   request.origin = "http://localhost:8137";
   request.protocols = "tagwrench.v1";
   request.upgrade = true;
+  request.our_user = true;
   return request;
 }
 
@@ -118,6 +119,7 @@ TEST(WebGuard, FilesNeedTheTokenAsBearer) {
   const RequestGuard guard(kGuardToken);
   WebRequest request = socket_request();
   request.target = "/files/recordings/a.twr";
+  request.our_user = false;
   EXPECT_EQ(guard.file(request), Refusal::token);
   request.authorization = "Bearer 0123456789abcdef";
   EXPECT_EQ(guard.file(request), Refusal::none);
@@ -141,6 +143,41 @@ TEST(WebGuard, FilesAreNotForOtherSites) {
   request.fetch_site = "";
   request.origin = "http://evil.example";
   EXPECT_EQ(guard.file(request), Refusal::origin);
+}
+
+TEST(WebGuard, WithoutATokenAnotherUserOfThisComputerGetsNothing) {
+  const RequestGuard guard("");
+  WebRequest request = socket_request();
+  request.our_user = false;
+  EXPECT_EQ(guard.page(request), Refusal::user);
+  EXPECT_EQ(guard.file(request), Refusal::user);
+  EXPECT_EQ(guard.socket(request), Refusal::user);
+}
+
+TEST(WebGuard, OurUserNeedsNoTokenUnderANameOfThisComputer) {
+  const RequestGuard guard(kGuardToken);
+  WebRequest request = socket_request();
+  EXPECT_EQ(guard.socket(request), Refusal::none);
+  EXPECT_EQ(guard.file(request), Refusal::none);
+  request.our_address = "192.0.2.7";
+  request.host = "192.0.2.7:8137";
+  request.origin = "http://192.0.2.7:8137";
+  EXPECT_EQ(guard.socket(request), Refusal::none);
+  request.our_address = "192.0.2.8";
+  EXPECT_EQ(guard.socket(request), Refusal::token);
+  request.host = "evil.example";  // whose owner lets it point here, for a page of his
+  request.origin = "http://evil.example";
+  EXPECT_EQ(guard.socket(request), Refusal::token);
+  EXPECT_EQ(RequestGuard("").page(request), Refusal::host);
+}
+
+TEST(WebGuard, AnAddressIsAHostAtAnyPort) {
+  EXPECT_TRUE(is_address_host("192.0.2.7", "192.0.2.7"));
+  EXPECT_TRUE(is_address_host("192.0.2.7:80", "192.0.2.7"));
+  EXPECT_TRUE(is_address_host("[2001:DB8::1]:80", "2001:db8::1"));
+  for (const char* host : {"192.0.2.70", "192.0.2.7.evil.example", "[192.0.2.7", "", "2001:db8::1"})
+    EXPECT_FALSE(is_address_host(host, "192.0.2.7")) << host;
+  EXPECT_FALSE(is_address_host("", ""));
 }
 
 TEST(WebGuard, TokensAreComparedWhole) {

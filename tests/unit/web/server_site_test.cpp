@@ -21,6 +21,7 @@ class WebSite : public testing::Test {
 
   WebAnswer get(std::string_view target, std::string_view method = "GET") {
     WebRequest request{};
+    request.our_user = true;
     request.method = method;
     request.target = target;
     request.host = "localhost:8137";

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 
@@ -25,22 +26,19 @@ std::string token_fault(const std::filesystem::path& file) {
 
 TEST(WebToken, IsMadeOnceForItsOwnerAlone) {
   TemporaryFolder folder;
-  const WebToken made = web_token(folder / "token");
-  EXPECT_TRUE(made.made);
-  EXPECT_EQ(made.text.size(), 43U);
+  const std::string made = web_token(folder / "token");
+  EXPECT_EQ(made.size(), 43U);
   EXPECT_EQ(std::filesystem::status(folder / "token").permissions(),
             perms::owner_read | perms::owner_write);
-  const WebToken again = web_token(folder / "token");
-  EXPECT_FALSE(again.made);
-  EXPECT_EQ(again.text, made.text);
-  EXPECT_NE(web_token(folder / "other").text, made.text);
+  EXPECT_EQ(web_token(folder / "token"), made);
+  EXPECT_NE(web_token(folder / "other"), made);
 }
 
 TEST(WebToken, MayBeWrittenByHand) {
   TemporaryFolder folder;
   folder.write("token", "a-token.of_mine~16\r\n");
   std::filesystem::permissions(folder / "token", perms::owner_read);
-  EXPECT_EQ(web_token(folder / "token").text, "a-token.of_mine~16");
+  EXPECT_EQ(web_token(folder / "token"), "a-token.of_mine~16");
 }
 
 TEST(WebToken, ThatOthersMayReadIsRefused) {
@@ -48,6 +46,15 @@ TEST(WebToken, ThatOthersMayReadIsRefused) {
   folder.write("token", "0123456789abcdef");
   std::filesystem::permissions(folder / "token", perms::owner_all | perms::group_read);
   EXPECT_NE(token_fault(folder / "token").find("chmod 600"), std::string::npos);
+}
+
+TEST(WebToken, OfAnotherUserIsRefused) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file to another user";
+  TemporaryFolder folder;
+  folder.write("token", "0123456789abcdef");
+  std::filesystem::permissions(folder / "token", perms::owner_read);
+  ASSERT_EQ(::chown((folder / "token").c_str(), 12345, 12345), 0);
+  EXPECT_NE(token_fault(folder / "token").find("another user's"), std::string::npos);
 }
 
 TEST(WebToken, ThatIsNoneIsRefused) {
@@ -117,14 +124,23 @@ TEST(WebServerSetup, WhatIsNoAddressOfThisComputerIsSaid) {
   EXPECT_NE(server_fault(options).find("cannot listen"), std::string::npos);
 }
 
-TEST(WebServerSetup, TheTokenIsInTheUrlsFragmentAlone) {
+TEST(WebServerSetup, TheTokenIsInNoAddress) {
   WebOptions options;
   options.port = 0;
   options.token = "0123456789abcdef";
   const WebServer server(options);
   const std::string url = "http://127.0.0.1:" + std::to_string(server.port()) + '/';
   EXPECT_EQ(server.url(), url);
-  EXPECT_EQ(server.url_with_token(), url + "#token=0123456789abcdef");
+  EXPECT_EQ(server.local_url(), url) << "what every user may read in the list of processes";
+}
+
+TEST(WebServerSetup, AtAnyAddressTheOwnBrowserIsSentToLocalhost) {
+  WebOptions options;
+  options.port = 0;
+  options.address = "0.0.0.0";
+  options.token = "0123456789abcdef";
+  const WebServer server(options);
+  EXPECT_EQ(server.local_url(), "http://localhost:" + std::to_string(server.port()) + '/');
 }
 
 }  // namespace

@@ -1,0 +1,140 @@
+#include "host/web/server/peer_user.h"
+
+#include <arpa/inet.h>
+#include <linux/inet_diag.h>
+#include <linux/netlink.h>
+#include <linux/sock_diag.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstring>
+
+#include "host/core/os/uninterrupted.h"
+#include "host/core/os/unique_fd.h"
+
+namespace tagwrench {
+namespace {
+
+constexpr uid_t kHiddenUser = 65534;      // of whom a user namespace does not tell the number
+constexpr timeval kPatience{0, 200'000};  // the kernel answers within the call
+
+/// As sock_diag wants it: address and port in network order.
+struct Endpoint {
+  std::array<std::uint32_t, 4> address{};
+  std::uint16_t port = 0;
+  std::uint8_t family = AF_UNSPEC;
+
+  bool operator==(const Endpoint&) const = default;
+};
+
+/// An IPv4 address within IPv6 (::ffff:a.b.c.d) as the IPv4 address: either end may speak of it
+/// either way.
+Endpoint endpoint_of(std::uint8_t family, const void* address, std::uint16_t port) noexcept {
+  Endpoint out{.port = port, .family = family};
+  if (family == AF_INET) {
+    std::memcpy(out.address.data(), address, sizeof(in_addr));
+    return out;
+  }
+  in6_addr six{};
+  std::memcpy(&six, address, sizeof six);
+  std::memcpy(out.address.data(), &six, sizeof six);
+  if (IN6_IS_ADDR_V4MAPPED(&six)) {
+    out.family = AF_INET;
+    out.address = {out.address[3], 0, 0, 0};
+  }
+  return out;
+}
+
+Endpoint endpoint_of(const sockaddr_storage& from) noexcept {
+  if (from.ss_family == AF_INET) {
+    sockaddr_in in{};
+    std::memcpy(&in, &from, sizeof in);
+    return endpoint_of(AF_INET, &in.sin_addr, in.sin_port);
+  }
+  if (from.ss_family != AF_INET6) return {};
+  sockaddr_in6 in{};
+  std::memcpy(&in, &from, sizeof in);
+  return endpoint_of(AF_INET6, &in.sin6_addr, in.sin6_port);
+}
+
+template <typename Ask>
+Endpoint endpoint(int socket, const Ask& ask) noexcept {
+  sockaddr_storage found{};
+  socklen_t size = sizeof found;
+  if (ask(socket, reinterpret_cast<sockaddr*>(&found), &size) != 0) return {};
+  return endpoint_of(found);
+}
+
+struct Request {
+  nlmsghdr head{};
+  inet_diag_req_v2 ask{};
+};
+
+Request request_for(const Endpoint& theirs, const Endpoint& ours) noexcept {
+  Request request;
+  request.head.nlmsg_len = sizeof request;
+  request.head.nlmsg_type = SOCK_DIAG_BY_FAMILY;
+  request.head.nlmsg_flags = NLM_F_REQUEST;
+  request.ask.sdiag_family = theirs.family;
+  request.ask.sdiag_protocol = IPPROTO_TCP;
+  request.ask.idiag_states = ~0U;
+  inet_diag_sockid& id = request.ask.id;
+  id.idiag_sport = theirs.port;  // as the other end sees it: its own comes first
+  id.idiag_dport = ours.port;
+  std::memcpy(id.idiag_src, theirs.address.data(), sizeof id.idiag_src);
+  std::memcpy(id.idiag_dst, ours.address.data(), sizeof id.idiag_dst);
+  id.idiag_cookie[0] = id.idiag_cookie[1] = INET_DIAG_NOCOOKIE;
+  return request;
+}
+
+/// Where there is no such connection, the kernel tells of a socket that listens there.
+bool is_connection(const inet_diag_msg& answer, const Endpoint& theirs,
+                   const Endpoint& ours) noexcept {
+  if (answer.idiag_family != AF_INET && answer.idiag_family != AF_INET6) return false;
+  const inet_diag_sockid& id = answer.id;
+  return endpoint_of(answer.idiag_family, id.idiag_src, id.idiag_sport) == theirs &&
+         endpoint_of(answer.idiag_family, id.idiag_dst, id.idiag_dport) == ours;
+}
+
+}  // namespace
+
+std::optional<uid_t> peer_user(int socket) noexcept {
+  const Endpoint theirs = endpoint(socket, ::getpeername);
+  const Endpoint ours = endpoint(socket, ::getsockname);
+  if (theirs.family == AF_UNSPEC || theirs.family != ours.family) return {};
+  const UniqueFd kernel(::socket(AF_NETLINK, SOCK_DGRAM | SOCK_CLOEXEC, NETLINK_SOCK_DIAG));
+  if (!kernel) return {};
+  ::setsockopt(kernel.get(), SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
+  const Request request = request_for(theirs, ours);
+  sockaddr_nl to{};
+  to.nl_family = AF_NETLINK;
+  if (::sendto(kernel.get(), &request, sizeof request, 0, reinterpret_cast<const sockaddr*>(&to),
+               sizeof to) != sizeof request)
+    return {};
+  std::array<char, 4096> bytes{};
+  sockaddr_nl from{};
+  socklen_t from_size = sizeof from;
+  const ssize_t size = uninterrupted([&] {
+    return ::recvfrom(kernel.get(), bytes.data(), bytes.size(), 0,
+                      reinterpret_cast<sockaddr*>(&from), &from_size);
+  });
+  nlmsghdr head{};
+  inet_diag_msg answer{};
+  if (from.nl_pid != 0 || size < static_cast<ssize_t>(NLMSG_LENGTH(sizeof answer))) return {};
+  std::memcpy(&head, bytes.data(), sizeof head);
+  std::memcpy(&answer, bytes.data() + NLMSG_HDRLEN, sizeof answer);
+  if (head.nlmsg_type != SOCK_DIAG_BY_FAMILY || !is_connection(answer, theirs, ours)) return {};
+  // What its program has closed belongs to nobody any more, and reads as if it were root's.
+  if (answer.idiag_inode == 0) return {};
+  return answer.idiag_uid;
+}
+
+bool is_our_user(std::optional<uid_t> user) noexcept {
+  if (!user || *user == kHiddenUser) return false;
+  return *user == 0 || *user == ::geteuid();
+}
+
+}  // namespace tagwrench
