@@ -550,6 +550,7 @@ SpnavSockets inherited_spnav(const std::string& path, int programs, int bridge) 
       throw ConfigError("spnav socket {}: {} is no listening socket", path, fd);
     ::fcntl(fd, F_SETFD, FD_CLOEXEC);
     ::fcntl(fd, F_SETFL, O_NONBLOCK);
+    ::listen(fd, kWaiting);  // again, by us: whoever connects learns who is here now
   }
   sockets.programs_file = file_number(path);
   sockets.bridge_file = file_number(bridge_path(path));

@@ -1,11 +1,15 @@
 #include "host/output/spnav_output.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <exception>
 #include <span>
@@ -23,6 +27,7 @@ using std::chrono::steady_clock;
 constexpr std::size_t kMaxPrograms = 128;
 constexpr int kAttempts = 3;
 constexpr milliseconds kStartTime{10'000};  // of a daemon on a busy machine
+constexpr milliseconds kLookEvery{500};     // whether it is stopped
 constexpr Duration kBetweenAttempts = std::chrono::seconds(1);
 // As the pipeline has them: a move that is so late is missing, a camera that is so slow is lost.
 constexpr Duration kGrace = milliseconds(60);
@@ -35,6 +40,23 @@ SpnavHello hello_of(const SpnavOptions& options) noexcept {
   hello.device.product = options.product;
   options.name.copy(hello.device.name.data(), hello.device.name.size() - 1);
   return hello;
+}
+
+/// Of the process at the other end, if it is stopped, by a signal or a debugger: it will not answer
+/// however long one waits. Else 0.
+pid_t stopped_peer(int link) noexcept {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (::getsockopt(link, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 || peer.pid <= 0) return 0;
+  std::array<char, 512> text{};
+  std::snprintf(text.data(), text.size(), "/proc/%d/stat", peer.pid);
+  const UniqueFd file(::open(text.data(), O_RDONLY | O_CLOEXEC));
+  const ssize_t got = file ? ::read(file.get(), text.data(), text.size()) : 0;
+  const std::string_view stat(text.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
+  const std::size_t name_end = stat.rfind(") ");  // proc(5): pid (name) state
+  const bool whole = name_end != std::string_view::npos && name_end + 2 < stat.size();
+  const char state = whole ? stat[name_end + 2] : ' ';
+  return state == 'T' || state == 't' ? peer.pid : 0;
 }
 
 /// Without heap, and cut where there is no more room.
@@ -99,9 +121,15 @@ void SpnavOutput::await_greeting() {
   const TimePoint until = steady_clock::now() + kStartTime;
   for (TimePoint now; link_ && !welcome_ && (now = steady_clock::now()) < until;) {
     pollfd entry{link_.get(), POLLIN, 0};
-    const auto left = std::chrono::ceil<milliseconds>(until - now).count();
-    if (::poll(&entry, 1, static_cast<int>(left)) > 0) service();
+    const auto left = std::min(std::chrono::ceil<milliseconds>(until - now), kLookEvery);
+    const bool answered = ::poll(&entry, 1, static_cast<int>(left.count())) > 0;
+    if (answered) service();
     if (other_bridge_) return;
+    if (const pid_t stopped = answered ? 0 : stopped_peer(link_.get()); stopped != 0) {
+      throw ConfigError(
+          "spnav socket {}: its daemon (process {}) is stopped; let it go on with `kill -CONT {}`",
+          path_, stopped, stopped);
+    }
   }
 }
 

@@ -35,7 +35,7 @@ struct SpnavOptions {
 class SpnavOutput : public Output {
  public:
   /// Throws ConfigError: no place for the socket, another server has it, another bridge feeds its
-  /// daemon, the daemon cannot be started.
+  /// daemon, the daemon cannot be started or is stopped (SIGSTOP).
   explicit SpnavOutput(const SpnavOptions& options);
   ~SpnavOutput() override;
 

@@ -170,6 +170,21 @@ TEST_F(SpnavOutputTest, AStoppedBridgeIsNeutralUntilItGoesOn) {
   EXPECT_TRUE(program->wait_for_motion({500, 0, 0, 0, 0, 0}));
 }
 
+TEST_F(SpnavOutputTest, AStoppedDaemonIsToldByItsNumber) {
+  { const SpnavOutput first(options_at(folder_.socket())); }
+  const pid_t daemon = daemon_of(folder_.socket());
+  ASSERT_GT(daemon, 0);
+  ::kill(daemon, SIGSTOP);
+  std::string fault = "none";
+  try {
+    const SpnavOutput second(options_at(folder_.socket()));
+  } catch (const ConfigError& e) {
+    fault = e.what();
+  }
+  ::kill(daemon, SIGCONT);
+  EXPECT_NE(fault.find("kill -CONT " + std::to_string(daemon)), std::string::npos) << fault;
+}
+
 TEST_F(SpnavOutputTest, AKilledDaemonIsReplaced) {
   SpnavOutput output(options_at(folder_.socket()));
   const pid_t first = daemon_of(folder_.socket());
