@@ -22,6 +22,7 @@
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/termination.h"
+#include "host/core/printable.h"
 #include "host/sensor/measured_files.h"
 #include "host/tracker/rotation.h"
 
@@ -68,7 +69,7 @@ int stopped() {
 bool print(const std::vector<InSituFinding>& findings) {
   bool fine = true;
   for (const InSituFinding& finding : findings) {
-    std::cout << text(finding) << '\n';
+    std::cout << printable(text(finding)) << '\n';
     // One tag alone cannot be compared, ever: that is no fault of today.
     const bool by_design = finding.subject == Subject::tags && finding.fault == Fault::not_known;
     fine = fine && (finding.fine() || by_design);

@@ -14,6 +14,7 @@
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/printable.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tools/design/geometry.h"
 #include "host/tracker/target.h"
@@ -167,7 +168,7 @@ int check_hardware(const std::string& file) {
   const hardware::Geometry g = hardware::geometry(p);
   const auto complaints = hardware::complaints(p, g);
   for (const hardware::Complaint& c : complaints)
-    std::cout << fmt::format("{}: {}: {}\n", file, c.parameter, c.message);
+    std::cout << printable(fmt::format("{}: {}: {}", file, c.parameter, c.message)) << '\n';
   if (!complaints.empty()) return 2;
   const Vector6 range = hardware::range(p, g);
   std::cout << fmt::format(

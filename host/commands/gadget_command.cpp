@@ -5,6 +5,7 @@
 #include "host/commands/commands.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
+#include "host/core/printable.h"
 #include "host/output/gadget_output.h"
 #include "host/output/gadget_tree.h"
 #include "host/output/hid_outputs.h"
@@ -111,24 +112,30 @@ int take_down(const GadgetCommandOptions& o) {
   return 0;
 }
 
+/// Names in it are those of other programs and of the hardware.
+template <typename... Args>
+void print_line(fmt::format_string<Args...> format, Args&&... args) {
+  fmt::print("{}\n", printable(fmt::format(format, std::forward<Args>(args)...)));
+}
+
 int show_status(const GadgetCommandOptions& o) {
   GadgetFiles files;
   const GadgetTree tree(files, o.places.gadgets());
   const std::vector<GadgetFound> gadgets = tree.all();
   const std::vector<Controller> ports = controllers(files, o.places, gadgets);
   for (const Controller& one : ports) {
-    fmt::print("controller {}: {}, {}, {}\n", one.name, one.state, one.speed,
+    print_line("controller {}: {}, {}, {}", one.name, one.state, one.speed,
                one.owner.empty() ? "free" : "has " + one.owner);
   }
   for (const GadgetFound& gadget : gadgets) {
     if (!gadget.name() || !gadget.face) {
-      fmt::print("gadget {}: not whole, or of another program\n", gadget.folder);
+      print_line("gadget {}: not whole, or of another program", gadget.folder);
       continue;
     }
     const std::string node =
         gadget_node(files, o.places, tree.function(*gadget.name(), *gadget.face)).value_or("");
-    fmt::print("gadget {}: {}, serial {}, {}, {}\n", gadget.folder, described(gadget),
-               gadget.serial, gadget.udc.empty() ? "not bound" : "on " + gadget.udc,
+    print_line("gadget {}: {}, serial {}, {}, {}", gadget.folder, described(gadget), gadget.serial,
+               gadget.udc.empty() ? "not bound" : "on " + gadget.udc,
                node.empty() ? "no node" : o.places.devices + "/" + node);
   }
   std::fflush(stdout);

@@ -11,6 +11,7 @@
 #include <iterator>
 
 #include "host/core/axis_names.h"
+#include "host/core/printable.h"
 
 namespace tagwrench {
 namespace {
@@ -234,6 +235,8 @@ std::size_t format_plain_line(Screen& line, const Sample& sample, const Terminal
 TerminalOutput::TerminalOutput(const TerminalOptions& options)
     : options_(options), sink_(options.fd, "terminal", false), live_(is_terminal(sink_.fd())) {
   options_.color = color_wanted(options.color);
+  options_.source = printable(options_.source);
+  for (std::string& device : options_.devices) device = printable(device);
 }
 
 TerminalOutput::~TerminalOutput() {
@@ -242,8 +245,7 @@ TerminalOutput::~TerminalOutput() {
 
 bool TerminalOutput::notice(std::string_view line) noexcept {
   if (!live_) return false;
-  notice_size_ = std::min(line.size(), notice_.size());
-  std::memcpy(notice_.data(), line.data(), notice_size_);
+  notice_size_ = write_printable(notice_, line);
   draw(last_, std::chrono::steady_clock::now());  // no sample may follow for a long time
   return true;
 }

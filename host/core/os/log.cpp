@@ -6,12 +6,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
 #include <string>
 
 #include "host/core/os/unique_fd.h"
+#include "host/core/printable.h"
 
 namespace tagwrench {
 namespace {
@@ -53,9 +55,10 @@ bool write_soon(int fd, std::string_view text, std::chrono::milliseconds patienc
 }
 
 void log_info(std::string_view line) noexcept {
-  std::string text = "tagwrench: ";
-  for (const char c : line) text += c == '\n' || c == '\r' ? ' ' : c;
-  text += '\n';
+  std::string flat(line);
+  std::replace_if(
+      flat.begin(), flat.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  const std::string text = "tagwrench: " + printable(flat) + '\n';
   write_soon(STDERR_FILENO, text, std::chrono::milliseconds(20));
 }
 

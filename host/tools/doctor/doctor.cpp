@@ -299,13 +299,6 @@ bool listed_member(gid_t id) {
   return std::find(groups.begin(), groups.end(), id) != groups.end();
 }
 
-std::string printable(std::string_view text) {
-  std::string out(text.substr(0, 80));
-  std::replace_if(
-      out.begin(), out.end(), [](unsigned char c) { return c < ' ' || c == 127; }, '?');
-  return out;
-}
-
 unsigned hex_after(std::string_view line, std::string_view key) {
   const auto at = line.find(key);
   if (at == std::string_view::npos) return 0;
@@ -465,7 +458,7 @@ std::vector<InputDevice> other_6dof_devices(std::string_view text) {
       std::string_view name = line.substr(8);
       if (name.starts_with('"')) name.remove_prefix(1);
       if (name.ends_with('"')) name.remove_suffix(1);
-      device.name = printable(name);
+      device.name = printable(name.substr(0, 80));
       if (is_6dof(device)) found.push_back(device);
     }
   }

@@ -15,6 +15,8 @@
 #include <string_view>
 #include <vector>
 
+#include "host/core/printable.h"
+
 namespace tagwrench {
 
 /// Writes one line a finding: "ok" works, "--" is not there and not needed, "!!" is missing, with
@@ -46,7 +48,7 @@ class Report {
   explicit Report(std::ostream& out) : out_(out) {}
   void line(Mark mark, std::string_view text) {
     static constexpr std::array<std::string_view, 3> kMarks = {"ok", "--", "!!"};
-    out_ << kMarks[static_cast<std::size_t>(mark)] << "  " << text << '\n';
+    out_ << kMarks[static_cast<std::size_t>(mark)] << "  " << printable(text) << '\n';
   }
   template <class First, class... Rest>
   void line(Mark mark, fmt::format_string<First, Rest...> text, First&& first, Rest&&... rest) {

@@ -84,5 +84,17 @@ TEST(WriteSoon, AReaderThatHasGoneIsNoSignal) {
   EXPECT_FALSE(write_soon(socket.ours.get(), "line\n", kSoon));
 }
 
+TEST(Log, ALineOfOthersIsOneLineThatNoTerminalObeys) {
+  const Stream stream = a_pipe();
+  const UniqueFd before(::dup(STDERR_FILENO));
+  ::dup2(stream.ours.get(), STDERR_FILENO);
+  log_info("camera: \x1b]0;pwned\x07 of\ntwo lines");
+  ::dup2(before.get(), STDERR_FILENO);
+  std::string heard(200, '\0');
+  heard.resize(static_cast<std::size_t>(
+      std::max<ssize_t>(0, ::read(stream.theirs.get(), heard.data(), heard.size()))));
+  EXPECT_EQ(heard, "tagwrench: camera: \\x1b]0;pwned\\x07 of two lines\n");
+}
+
 }  // namespace
 }  // namespace tagwrench
