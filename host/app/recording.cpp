@@ -16,6 +16,7 @@
 #include "host/core/config_error.h"
 #include "host/core/count_text.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/sensor/measured_files.h"
 

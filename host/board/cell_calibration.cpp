@@ -17,6 +17,7 @@
 #include "host/core/os/atomic_file.h"
 #include "host/core/os/unique_fd.h"
 #include "host/core/os/user_folders.h"
+#include "host/core/printable.h"
 
 namespace tagwrench::link {
 namespace {
@@ -64,14 +65,6 @@ struct Source {
 [[noreturn]] void not_readable(const std::string& path, const std::string& why) {
   throw ConfigError("{}: cannot be read: {}; make it readable, or give another file with --cells",
                     path, why);
-}
-
-/// A stranger's words: no control codes to a terminal.
-std::string printable(const std::string& text) {
-  std::string out = text.substr(0, kMaxShown);
-  for (char& c : out)
-    if (c < 0x20 || c > 0x7E) c = '?';
-  return text.size() > kMaxShown ? out + "..." : out;
 }
 
 double number(const Source& source, const json& cell, const char* key) {
@@ -215,7 +208,7 @@ CellCalibrations load_cells(const std::string& path, const std::string& board_id
     throw ConfigError(
         "{}: belongs to the board {}, this one is {}; calibrate this board's cells, or give "
         "another --cells",
-        path, printable(owner.get<std::string>()), board_id);
+        path, printable(owner.get<std::string>().substr(0, kMaxShown)), board_id);
   }
   const json cells = root.value("cells", json());
   if (!cells.is_array()) refuse(source, "\"cells\" is missing");

@@ -14,6 +14,7 @@
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/core/printable.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tools/design/geometry.h"

@@ -19,6 +19,7 @@
 #include "host/core/json/json_text.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/sensor/sensor_config.h"
 
 namespace tagwrench {

@@ -138,7 +138,9 @@ std::string sensor_of(const record::Head& head, const std::string& name) {
 bool is_recording(const std::filesystem::path& file) {
   constexpr std::string_view kMagic("SQLite format 3\0", 16);
   std::array<char, 16> start{};
-  std::ifstream in(file, std::ios::binary);
+  std::error_code error;  // a pipe would be waited for
+  std::ifstream in;
+  if (std::filesystem::is_regular_file(file, error)) in.open(file, std::ios::binary);
   return in.read(start.data(), start.size()) && std::string_view(start.data(), 16) == kMagic;
 }
 

@@ -44,7 +44,9 @@ FileSha256 sha256_of_file(const std::filesystem::path& path) {
   const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
                                                                         &EVP_MD_CTX_free);
   if (!context || EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) != 1) no_sha256();
-  std::ifstream file(path, std::ios::binary);
+  std::error_code error;  // a pipe or a device may never end
+  std::ifstream file;
+  if (std::filesystem::is_regular_file(path, error)) file.open(path, std::ios::binary);
   std::vector<char> part(kPart);
   FileSha256 out;
   while (file.read(part.data(), kPart), file.gcount() > 0) {

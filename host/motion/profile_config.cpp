@@ -10,10 +10,10 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 
 #include "host/core/config_error.h"
+#include "host/core/os/text_file.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/motion/focus_watch.h"
 #include "host/wrench/estimate.h"
@@ -307,18 +307,7 @@ std::string gestures_text(const GestureOptions& gestures) {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxFile = 65536;
-
-/// One byte more of a file that is too long.
-std::optional<std::string> read_start(const std::string& path) {
-  std::error_code none;
-  if (!fs::is_regular_file(path, none)) return {};  // a pipe would be waited for
-  std::ifstream in(path, std::ios::binary);
-  std::string text(kMaxFile + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad() || (!in.eof() && in.fail())) return {};
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  return text;
-}
+constexpr std::size_t kMostRead = 4 * kMaxFile;  // and is then said to be too long
 
 std::vector<std::string> yaml_files(const std::string& folder) {
   std::vector<std::string> found;
@@ -412,11 +401,10 @@ ProfileFiles::ProfileFiles(const std::vector<std::string>& chosen, Profile defau
 }
 
 void ProfileFiles::take(const std::string& path) {
-  const std::optional<std::string> text = read_start(path);
-  if (!text) throw ConfigError(path + ": cannot be read; give --profile a file of yours");
-  Profile profile = checked(*text, path);
+  const std::string text = read_text(path, kMaxFile);
+  Profile profile = checked(text, path);
   const fs::path whole = fs::absolute(path);
-  files_.push_back({whole.parent_path(), whole.filename(), *text, profiles_.size()});
+  files_.push_back({whole.parent_path(), whole.filename(), std::move(text), profiles_.size()});
   profiles_.push_back(std::move(profile));
 }
 
@@ -456,7 +444,7 @@ std::vector<ProfileFiles::Change> ProfileFiles::reread() {
 
 std::optional<ProfileFiles::Change> ProfileFiles::look_again(File& file) {
   const std::string path = file.folder + "/" + file.name;
-  std::optional<std::string> text = read_start(path);
+  std::optional<std::string> text = text_of_file(path, kMostRead);
   if (!text || *text == file.text) return {};
   file.text = std::move(*text);
   try {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/os/text_file.h"
 #include "host/core/os/timer.h"
 #include "host/core/parse.h"
 
@@ -142,10 +143,7 @@ std::vector<Duration> frame_times(const std::string& dir, const std::vector<std:
   const fs::path path = fs::path(dir) / "frames.csv";
   std::error_code error;
   if (fs::exists(path, error)) {
-    std::ifstream file(path, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (!file) throw ConfigError("{}: cannot be read; check its permissions", path.string());
-    return parse_frame_times(text, path.string(), names);
+    return parse_frame_times(read_text(path), path.string(), names);
   }
   std::vector<Duration> times(names.size());
   for (std::size_t i = 0; i < times.size(); ++i) times[i] = static_cast<int>(i) * kDefaultPeriod;

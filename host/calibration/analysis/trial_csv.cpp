@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "host/core/config_error.h"
+#include "host/core/os/text_file.h"
 #include "host/core/parse.h"
 
 namespace tagwrench::study {
@@ -17,18 +18,6 @@ namespace {
 constexpr std::string_view kSeparators = ";\t,";
 constexpr std::size_t kRowsToTell = 20;  // the separator by
 constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
-
-std::string load(const std::filesystem::path& file) {
-  std::error_code error;
-  if (std::filesystem::is_directory(file, error))
-    throw ConfigError("{}: a folder; name a CSV file", file.string());
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw ConfigError("{}: cannot be read; check the name", file.string());
-  const auto size = std::filesystem::file_size(file, error);
-  if (!error && size > kMaxBytes)
-    throw ConfigError("{}: larger than 1 GB; cut it into pieces", file.string());
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 struct Line {
   std::string_view text;
@@ -222,7 +211,7 @@ std::optional<double> parse_number(std::string_view text) noexcept {
 }
 
 DelimitedText::DelimitedText(const std::filesystem::path& file, char separator, std::size_t skip)
-    : name_(file.string()), text_(load(file)) {
+    : name_(file.string()), text_(read_text(file, kMaxBytes)) {
   std::string_view rest = text_;
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (rest.starts_with(kByteOrderMark)) rest.remove_prefix(kByteOrderMark.size());
@@ -411,7 +400,9 @@ std::string trial_to_csv(const Trial& trial) {
 Trial read_trial(const std::filesystem::path& file) { return TrialReader(file).read(); }
 
 bool is_trial_file(const std::filesystem::path& file) {
-  std::ifstream in(file);
+  std::error_code error;  // a pipe would be waited for
+  std::ifstream in;
+  if (std::filesystem::is_regular_file(file, error)) in.open(file);
   std::string line;
   return std::getline(in, line) && line.starts_with("# " + std::string(kFormat));
 }

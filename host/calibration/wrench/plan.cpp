@@ -7,13 +7,12 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
-#include <sstream>
 
 #include "host/core/algebra/decompositions.h"
 #include "host/core/config_error.h"
 #include "host/core/count_text.h"
+#include "host/core/os/text_file.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/tracker/rotation.h"
 
@@ -59,6 +58,7 @@ std::string task(const WrenchPlan& plan, const PlanStep& step) {
 }
 
 constexpr double kMilli = 1e-3;
+constexpr std::uint64_t kMaxPlan_bytes = 4U << 20;
 constexpr double kDegree = std::numbers::pi / 180;
 
 Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
@@ -238,16 +238,11 @@ std::string plan_text(const std::string& name_or_file) {
     if (plan.name == name_or_file) return plan.text;
     names += (names.empty() ? "" : ", ") + plan.name;
   }
-  std::error_code error;
-  std::ifstream file;
-  if (!std::filesystem::is_directory(name_or_file, error))
-    file.open(name_or_file, std::ios::binary);
-  std::ostringstream text;
-  if (!file.is_open() || !(text << file.rdbuf())) {
-    throw ConfigError("--plan {}: neither a ready-made plan ({}) nor a file that can be read",
-                      name_or_file, names);
+  try {
+    return read_text(name_or_file, kMaxPlan_bytes);
+  } catch (const ConfigError& e) {
+    throw ConfigError("--plan {}: not a ready-made plan ({}); {}", name_or_file, names, e.what());
   }
-  return text.str();
 }
 
 void set_hanging(const WrenchPlan& plan, int step, const Vector6& displacement,

@@ -2,28 +2,42 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "host/core/config_error.h"
-#include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
 namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::string_view kMark = ".tagwrench-";  // of temporary names, which begin with a dot
+constexpr std::string_view kRandom = "XXXXXX";
+constexpr std::size_t kMostOfName = 200;  // of the target's: a name has at most 255 bytes
+
 /// What the path means after symbolic links; the path itself where there is nothing yet.
 fs::path resolved(const fs::path& path) {
   std::error_code error;
   const fs::path real = fs::weakly_canonical(path, error);
   return error ? path : real;
+}
+
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+/// Of a temporary name for the target, but for its random end.
+std::string stem_of(const fs::path& target) {
+  return fmt::format(".{}{}", target.filename().string().substr(0, kMostOfName), kMark);
 }
 
 template <class Error>
@@ -34,54 +48,46 @@ template <class Error>
                   path.string(), std::strerror(errno)));
 }
 
-/// A temporary file that goes away unless it has been renamed.
-class Temporary {
- public:
-  explicit Temporary(const fs::path& target)
-      : target_(target),
-        name_(target.string() + ".XXXXXX"),
-        file_(::mkostemp(name_.data(), O_CLOEXEC)) {
-    if (!file_) cannot_write<ConfigError>(target_);
-  }
-  Temporary(const Temporary&) = delete;
-  Temporary& operator=(const Temporary&) = delete;
-  ~Temporary() {
-    if (!renamed_ && file_) ::unlink(name_.c_str());
-  }
+bool is_locked_by_us(int fd) noexcept { return ::flock(fd, LOCK_EX | LOCK_NB) == 0; }
 
-  void keep_mode_of_target() {
-    struct stat old {};
-    if (::stat(target_.c_str(), &old) == 0) {
-      // Another's file stays another's where we may; the mode comes last, chown clears bits of it.
-      [[maybe_unused]] const int ignored = ::fchown(file_.get(), old.st_uid, old.st_gid);
-      if (::fchmod(file_.get(), old.st_mode & 07777) != 0)
-        cannot_write<std::runtime_error>(target_);
-      return;
-    }
-    const mode_t mask = ::umask(0);
-    ::umask(mask);
-    ::fchmod(file_.get(), 0666 & ~mask);
+/// Temporary files and folders of a writer that was killed: ours, and nobody holds their lock.
+void remove_left_over(const fs::path& target) noexcept {
+  const std::string stem = stem_of(target);
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_of(target), error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(stem) || name.size() != stem.size() + kRandom.size()) continue;
+    const UniqueFd file(
+        ::open(entry->path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    struct stat facts {};
+    const bool left_over = file && ::fstat(file.get(), &facts) == 0 &&
+                           (S_ISREG(facts.st_mode) || S_ISDIR(facts.st_mode)) &&
+                           facts.st_uid == ::geteuid() && is_locked_by_us(file.get());
+    std::error_code ignored;
+    if (left_over) fs::remove_all(entry->path(), ignored);
   }
-  void write(std::string_view text) {
-    while (!text.empty()) {
-      const ssize_t written = ::write(file_.get(), text.data(), text.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) cannot_write<std::runtime_error>(target_);
-      text.remove_prefix(static_cast<std::size_t>(written));
-    }
-  }
-  void take_the_name() {
-    if (::fsync(file_.get()) != 0 || ::rename(name_.c_str(), target_.c_str()) != 0)
-      cannot_write<std::runtime_error>(target_);
-    renamed_ = true;
-  }
+}
 
- private:
-  fs::path target_;
-  std::string name_;
-  UniqueFd file_;
-  bool renamed_ = false;
-};
+/// Whether what we have locked still has its name: another writer may have taken it for a left-over
+/// before that.
+bool has_name(int fd) noexcept {
+  struct stat facts {};
+  return ::fstat(fd, &facts) == 0 && facts.st_nlink > 0;
+}
+
+std::string name_for(const fs::path& target) {
+  return (folder_of(target) / stem_of(target)).string() + std::string(kRandom);
+}
+
+void write_all(int fd, std::string_view bytes, const fs::path& target) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) cannot_write<std::runtime_error>(target);
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
 
 }  // namespace
 
@@ -95,31 +101,112 @@ void check_replaceable(const fs::path& path) {
     throw ConfigError("{}: is write-protected ({}); chmod u+w it, or name another file with --out",
                       path.string(), std::strerror(errno));
   }
-  const fs::path folder = real.has_parent_path() ? real.parent_path() : fs::path(".");
-  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+  if (::access(folder_of(real).c_str(), W_OK | X_OK) != 0) {
     throw ConfigError("{}: its folder cannot be written ({}); name another file with --out",
                       path.string(), std::strerror(errno));
   }
 }
 
+NewFile::NewFile(const fs::path& path) : target_(resolved(path)) {
+  remove_left_over(target_);
+  while (!file_) {
+    std::string name = name_for(target_);
+    file_.reset(::mkostemp(name.data(), O_CLOEXEC));  // 0600, O_EXCL
+    if (!file_) cannot_write<ConfigError>(target_);
+    ::flock(file_.get(), LOCK_EX);
+    if (has_name(file_.get()))
+      name_ = name;
+    else
+      file_.reset();
+  }
+}
+
+NewFile::NewFile(NewFile&& other) noexcept
+    : target_(std::move(other.target_)),
+      name_(std::exchange(other.name_, {})),
+      file_(std::move(other.file_)) {}
+
+NewFile::~NewFile() {
+  if (!name_.empty()) ::unlink(name_.c_str());
+}
+
+void NewFile::write(std::string_view bytes) { write_all(file_.get(), bytes, target_); }
+
+void NewFile::keep_mode_of_target() {
+  struct stat old {};
+  if (::stat(target_.c_str(), &old) == 0) {
+    // Another's file stays another's where we may; the mode comes last, chown clears bits of it.
+    [[maybe_unused]] const int ignored = ::fchown(file_.get(), old.st_uid, old.st_gid);
+    if (::fchmod(file_.get(), old.st_mode & 07777) != 0) cannot_write<std::runtime_error>(target_);
+    return;
+  }
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  ::fchmod(file_.get(), 0666 & ~mask);
+}
+
+void NewFile::take_the_name(Existing existing) {
+  keep_mode_of_target();
+  if (::fsync(file_.get()) != 0) cannot_write<std::runtime_error>(target_);
+  const unsigned flags = existing == Existing::refused ? RENAME_NOREPLACE : 0;
+  if (::renameat2(AT_FDCWD, name_.c_str(), AT_FDCWD, target_.c_str(), flags) != 0) {
+    if (errno == EEXIST)
+      throw std::runtime_error(
+          fmt::format("{}: is there already; give another name, or --force", target_.string()));
+    cannot_write<std::runtime_error>(target_);
+  }
+  name_.clear();
+  sync_folder_of(target_);
+}
+
+NewFolder::NewFolder(const fs::path& path) : target_(resolved(path)) {
+  remove_left_over(target_);
+  while (!folder_) {
+    std::string name = name_for(target_);
+    if (::mkdtemp(name.data()) == nullptr) cannot_write<ConfigError>(target_);
+    folder_.reset(::open(name.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW));
+    if (!folder_) cannot_write<ConfigError>(target_);
+    ::flock(folder_.get(), LOCK_EX);
+    if (has_name(folder_.get()))
+      name_ = name;
+    else
+      folder_.reset();
+  }
+}
+
+NewFolder::~NewFolder() {
+  std::error_code ignored;
+  if (!name_.empty()) fs::remove_all(name_, ignored);
+}
+
+void NewFolder::add(const std::string& name, std::string_view text,
+                    std::span<const std::uint8_t> bytes) {
+  const UniqueFd file(::openat(folder_.get(), name.c_str(),
+                               O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+  if (!file) cannot_write<std::runtime_error>(target_);
+  write_all(file.get(), text, target_);
+  write_all(file.get(), {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, target_);
+}
+
+void NewFolder::take_the_name() {
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  if (::fchmod(folder_.get(), 0777 & ~mask) != 0 || ::syncfs(folder_.get()) != 0 ||
+      ::rename(name_.c_str(), target_.c_str()) != 0)
+    cannot_write<std::runtime_error>(target_);
+  name_.clear();
+  sync_folder_of(target_);
+}
+
 void write_atomically(const fs::path& path, std::string_view text) {
-  Temporary file(resolved(path));
-  file.keep_mode_of_target();
+  NewFile file(path);
   file.write(text);
   file.take_the_name();
 }
 
-std::string read_text(const fs::path& path) {
-  std::error_code error;
-  std::ifstream file;
-  if (!fs::is_directory(path, error)) file.open(path, std::ios::binary);
-  std::ostringstream text;
-  if (!file.is_open() || !(text << file.rdbuf())) {
-    throw ConfigError(
-        "{}: cannot be read; check the path and that it is a readable, non-empty file",
-        path.string());
-  }
-  return text.str();
+void sync_folder_of(const fs::path& path) noexcept {
+  const UniqueFd folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder) ::fsync(folder.get());
 }
 
 }  // namespace tagwrench

@@ -3,17 +3,17 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/os/text_file.h"
 
 namespace tagwrench {
 namespace {
 
 /// In the units that files are written in; squares and products of such numbers stay finite.
 constexpr double kMax = 1e12;
+constexpr std::uint64_t kMaxBytes = 4U << 20;  // of a file, which a person writes
 
 std::string joined(const std::vector<std::string_view>& names) {
   std::string out;
@@ -37,19 +37,18 @@ YamlReader::YamlReader(YAML::Node node, std::string file, std::string path)
     : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)) {}
 
 YamlReader YamlReader::from_file(const std::string& path) {
-  std::ifstream in(path);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) {
-    throw ConfigError(
-        "{}: cannot be read; check the path and that it is a readable, non-empty file", path);
-  }
-  return from_text(text.str(), path);
+  return from_text(read_text(path, kMaxBytes), path);
 }
 
 YamlReader YamlReader::from_text(const std::string& text, const std::string& name) {
   YAML::Node root;
   try {
-    root = YAML::Load(text);
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1)
+      throw ConfigError(
+          "{}:{}: a second document begins here, behind '---', and only one is read; remove it",
+          name, documents[1].Mark().line + 1);
+    if (!documents.empty()) root = documents.front();
   } catch (const YAML::Exception& e) {
     throw ConfigError("{}:{}: not YAML: {}; check indentation, colons and brackets there", name,
                       e.mark.line + 1, e.msg);

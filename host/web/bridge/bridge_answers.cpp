@@ -8,6 +8,7 @@
 #include "host/calibration/wrench/plan.h"
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/motion/profile_config.h"
 #include "host/sensor/sensor_config.h"
 #include "host/web/bridge/web_bridge.h"

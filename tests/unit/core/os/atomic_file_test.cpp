@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "host/core/config_error.h"
+#include "host/core/os/text_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace tagwrench {
@@ -76,6 +77,78 @@ TEST_F(AtomicFile, IsCheckedBeforeTheWork) {
   EXPECT_THROW(check_replaceable(folder_), ConfigError);
   EXPECT_THROW(check_replaceable("/dev/null"), ConfigError);
   EXPECT_THROW(read_text(folder_), ConfigError);
+}
+
+TEST_F(AtomicFile, IsWrittenUnderANameThatNobodyCanForesee) {
+  const fs::path file = folder_ / "out.csv";
+  const NewFile first(file);
+  const NewFile second(file);
+  EXPECT_NE(first.temporary(), second.temporary());
+  EXPECT_TRUE(first.temporary().filename().string().starts_with(".out.csv.tagwrench-"));
+  struct stat now {};
+  ::stat(first.temporary().c_str(), &now);
+  EXPECT_EQ(now.st_mode & 0777, 0600U) << "until it has its name";
+}
+
+TEST_F(AtomicFile, OfAKilledWriterIsRemovedByTheNextAndOneThatIsWrittenStays) {
+  const fs::path file = folder_ / "out.csv";
+  const fs::path left = folder_ / ".out.csv.tagwrench-abcdef";
+  const fs::path folder_left = folder_ / ".out.csv.tagwrench-ghijkl";
+  const fs::path foreign = folder_ / ".out.csv.tagwrench-abcdefg";
+  for (const fs::path& one : {left, foreign}) write_atomically(one, "half");
+  fs::create_directory(folder_left);
+  write_atomically(folder_left / "000000.png", "half");
+  NewFile other(file);  // another writer, who lives
+  write_atomically(file, "whole");
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_FALSE(fs::exists(folder_left));
+  EXPECT_TRUE(fs::exists(foreign)) << "it is no name of ours";
+  EXPECT_TRUE(fs::exists(other.temporary()));
+  other.take_the_name();
+  EXPECT_EQ(read_text(file), "");
+}
+
+TEST_F(AtomicFile, ALinkAtALeftOversNameLeadsNowhere) {
+  write_atomically(folder_ / "precious", "mine");
+  fs::create_symlink(folder_ / "precious", folder_ / ".out.csv.tagwrench-abcdef");
+  write_atomically(folder_ / "out.csv", "new");
+  EXPECT_EQ(read_text(folder_ / "precious"), "mine");
+}
+
+TEST_F(AtomicFile, ThatIsRefusedLeavesWhatIsThere) {
+  const fs::path file = folder_ / "out.csv";
+  NewFile late(file);
+  late.write("late");
+  write_atomically(file, "first");
+  EXPECT_THROW(late.take_the_name(NewFile::Existing::refused), std::runtime_error);
+  EXPECT_EQ(read_text(file), "first");
+}
+
+TEST_F(AtomicFile, AFolderAppearsWhole) {
+  const fs::path place = folder_ / "frames";
+  {
+    NewFolder given_up(place);
+    given_up.add("000000.pgm", "P5");
+  }
+  EXPECT_EQ(files(), 0U);
+  NewFolder made(place);
+  made.add("000000.pgm", "P5");
+  EXPECT_THROW(made.add("000000.pgm", "P5"), std::runtime_error);
+  EXPECT_FALSE(fs::exists(place));
+  made.take_the_name();
+  EXPECT_EQ(read_text(place / "000000.pgm"), "P5");
+}
+
+TEST_F(AtomicFile, OnlyRegularFilesOfBoundedSizeAreRead) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THROW(read_text(pipe), ConfigError);  // would be waited for
+  EXPECT_THROW(read_text("/dev/zero"), ConfigError);
+  EXPECT_EQ(text_of_file(pipe), std::nullopt);
+  write_atomically(folder_ / "a", "12345");
+  EXPECT_EQ(read_text(folder_ / "a", 5), "12345");
+  EXPECT_THROW(read_text(folder_ / "a", 4), ConfigError);
+  EXPECT_FALSE(read_text("/proc/self/status").empty()) << "which tells no size";
 }
 
 }  // namespace
