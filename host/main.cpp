@@ -46,9 +46,12 @@ void end_blas_threads() noexcept {
 }
 
 /// A closed standard stream would give its number to the next file that is opened, a device's say.
+/// Standard output is not to be written to then: what was asked for would be lost without a word.
 void open_standard_streams() {
-  for (int fd = 0; fd <= 2; ++fd)
-    if (::fcntl(fd, F_GETFD) < 0 && ::open("/dev/null", O_RDWR) != fd) std::abort();
+  for (int fd = 0; fd <= 2; ++fd) {
+    const int how = fd == STDOUT_FILENO ? O_RDONLY : O_RDWR;
+    if (::fcntl(fd, F_GETFD) < 0 && ::open("/dev/null", how) != fd) std::abort();
+  }
 }
 
 }  // namespace

@@ -24,6 +24,7 @@
 #include "host/core/config_error.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/core/sha256.h"
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/sensor_config.h"
@@ -325,8 +326,20 @@ Subject subject_of(const CertificateOptions& o) {
     throw ConfigError("{}: does not say which data it was made of; name FILE.data.csv",
                       file.string());
   }
+  // A calibration may have ended between its files: then what it was made of is the one before.
   const fs::path data = file.parent_path() / fs::path(record.data_file).filename();
-  if (sha256_hex(read_text(data)) != record.data_sha256) {
+  const auto is_its = [&](const fs::path& one) {
+    return sha256_hex(text_of_file(one).value_or("")) == record.data_sha256;
+  };
+  const fs::path before = fs::path(data) += ".before";
+  if (!is_its(data) && is_its(before)) {
+    log_info("{}: is of a later calibration, which ended half-way; taking {}", data.string(),
+             before.string());
+    subject.data.push_back(before);
+    return subject;
+  }
+  if (!is_its(data)) {
+    read_text(data);  // says what is wrong with it
     throw ConfigError(
         "{}: is not the data that {} was made of (SHA-256 differs); find those or calibrate again",
         data.string(), file.string());

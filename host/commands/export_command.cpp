@@ -9,7 +9,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
@@ -22,6 +21,7 @@
 #include "host/core/config_error.h"
 #include "host/core/count_text.h"
 #include "host/core/log.h"
+#include "host/core/os/atomic_file.h"
 #include "host/output/line_outputs.h"
 #include "host/recording/reader.h"
 #include "host/source/replay.h"
@@ -45,48 +45,43 @@ struct ExportOptions {
 class ExportFile {
  public:
   /// Throws ConfigError: it exists and is not to be replaced, or cannot be written.
-  ExportFile(const std::string& path, bool force) : path_(path), out_(&file_) {
-    if (path == "-") {
-      out_ = &std::cout;
-      return;
-    }
+  ExportFile(const std::string& path, bool force) : path_(path), force_(force) {
+    if (path == "-") return;
     std::error_code error;
     if (!force && fs::exists(fs::symlink_status(path, error)))
       throw ConfigError("{}: exists; choose another name, or replace it with --force", path);
-    partial_ = path + ".partial";
-    file_.open(partial_, std::ios::binary | std::ios::trunc);
-    if (!file_)
-      throw ConfigError("{}: cannot be written; choose a file in a folder of yours", path);
-  }
-  ExportFile(const ExportFile&) = delete;
-  ExportFile& operator=(const ExportFile&) = delete;
-  /// What was not finished is not there.
-  ~ExportFile() {
-    if (partial_.empty()) return;
-    file_.close();
-    std::error_code ignored;
-    fs::remove(partial_, ignored);
+    file_.emplace(path);
   }
 
-  std::ostream& out() { return *out_; }
   /// Throws std::runtime_error: the disk is full.
+  void add(std::string_view text) {
+    waiting_ += text;
+    if (waiting_.size() >= kPiece) flush();
+  }
+  /// Throws as add().
   void finish() {
-    out_->flush();
-    if (!*out_) {
-      throw std::runtime_error(fmt::format("{}: cannot be written; free some space on the disk",
-                                           path_ == "-" ? "standard output" : path_));
-    }
-    if (partial_.empty()) return;
-    file_.close();
-    fs::rename(partial_, path_);
-    partial_.clear();
+    flush();
+    if (file_)
+      file_->take_the_name(force_ ? NewFile::Existing::replaced : NewFile::Existing::refused);
+    if (!file_ && !std::cout.flush())
+      throw std::runtime_error("standard output: cannot be written; free some space on the disk");
   }
 
  private:
+  static constexpr std::size_t kPiece = 64 * 1024;
+
+  void flush() {
+    if (file_)
+      file_->write(waiting_);
+    else
+      std::cout << waiting_;
+    waiting_.clear();
+  }
+
   std::string path_;
-  std::string partial_;
-  std::ofstream file_;
-  std::ostream* out_;
+  bool force_;
+  std::optional<NewFile> file_;
+  std::string waiting_;
 };
 
 std::int64_t ns(TimePoint time) { return time.time_since_epoch().count(); }
@@ -98,9 +93,9 @@ void export_rows(const ExportOptions& o, const std::string& path, std::string_vi
   if (path.empty()) return;
   record::RecordingReader reader(o.recording);
   ExportFile file(path, o.force);
-  file.out() << header;
+  file.add(header);
   std::uint64_t count = 0;
-  for (Record record; reader.next(record); ++count) file.out() << line(record);
+  for (Record record; reader.next(record); ++count) file.add(line(record));
   file.finish();
   if (path != "-") log_info("{} in {}", count_text(count, one), path);
 }
@@ -255,7 +250,7 @@ std::size_t export_tags(const std::string& recording, const std::string& path, b
     }
     for (const auto* both_tags : {&position, &smooth})
       for (std::size_t i = 0; i < 3; ++i) append(0.5 * ((*both_tags)[0][i] + (*both_tags)[1][i]));
-    file.out() << line << ";" << kWeight << " \n";
+    file.add(fmt::format("{};{} \n", line, kWeight));
   }
   if (rows == 0)
     throw ConfigError("{}: the tags were never held in it; there is nothing to export", recording);
@@ -281,7 +276,7 @@ std::size_t export_reference(const std::string& recording, const std::string& pa
                                 : reading.counts[i];
       line += fmt::format("; {:.1f}", counts);
     }
-    file->out() << line << "\n";
+    file->add(line + "\n");
   }
   if (file) file->finish();
   return rows;
@@ -328,52 +323,7 @@ Picture picture_of(const RawFrame& raw, const Frame& frame) {
   return picture;
 }
 
-void write(const fs::path& path, const std::string& header, const std::uint8_t* bytes,
-           std::size_t count) {
-  std::ofstream file(path, std::ios::binary);
-  file << header;
-  file.write(reinterpret_cast<const char*>(bytes), static_cast<std::streamsize>(count));
-  file.close();
-  if (!file) {
-    throw std::runtime_error(
-        fmt::format("{}: cannot be written; free some space on the disk", path.string()));
-  }
-}
-
-/// Beside its final place until all is there.
-class PartialFolder {
- public:
-  explicit PartialFolder(const fs::path& final_place) : final_(final_place) {
-    std::error_code error;
-    if (fs::exists(final_, error) &&
-        !(fs::is_directory(final_, error) && fs::is_empty(final_, error)))
-      throw ConfigError("{}: exists; give --frames an empty or a new folder", final_.string());
-    std::string name = final_.string() + ".partial-XXXXXX";
-    if (::mkdtemp(name.data()) == nullptr) {
-      throw ConfigError("{}: cannot be made: {}; give --frames a folder of yours", final_.string(),
-                        std::strerror(errno));
-    }
-    path_ = name;
-    fs::permissions(path_, fs::perms(0755), error);
-  }
-  PartialFolder(const PartialFolder&) = delete;
-  PartialFolder& operator=(const PartialFolder&) = delete;
-  ~PartialFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-  void finish() {
-    fs::rename(path_, final_);
-    path_.clear();
-  }
-
- private:
-  fs::path final_;
-  fs::path path_;
-};
-
-/// "build/frames/" has no name that ".partial" could be put behind.
+/// "build/frames/" has no name that another one could be made of.
 fs::path without_slash(const std::string& folder) {
   const fs::path path = fs::path(folder).lexically_normal();
   return path.has_filename() ? path : path.parent_path();
@@ -384,7 +334,11 @@ fs::path without_slash(const std::string& folder) {
 void export_frames(const std::string& recording, const std::string& folder) {
   RecordingSource source(std::make_unique<record::RecordingReader>(recording), /*fast=*/true);
   const record::Head& head = source.recording().head();
-  PartialFolder partial(without_slash(folder));
+  const fs::path place = without_slash(folder);
+  std::error_code error;
+  if (fs::exists(place, error) && !(fs::is_directory(place, error) && fs::is_empty(place, error)))
+    throw ConfigError("{}: exists; give --frames an empty or a new folder", folder);
+  NewFolder files(place);
   std::string times = "file,t_ns\n";
   std::size_t count = 0;
   Frame frame;
@@ -395,12 +349,12 @@ void export_frames(const std::string& recording, const std::string& folder) {
     source.complete(frame);
     const Picture picture = picture_of(source.raw(), frame);
     const std::string name = fmt::format("{:06}{}", count++, picture.extension);
-    write(partial.path() / name, picture.header, picture.bytes.data(), picture.bytes.size());
+    files.add(name, picture.header, picture.bytes);
     times += fmt::format("{},{}\n", name, frame.capture_time.time_since_epoch().count());
   }
-  write(partial.path() / "frames.csv", times, nullptr, 0);
-  write_recorded_sensor(head, partial.path());
-  partial.finish();
+  files.add("frames.csv", times);
+  write_recorded_sensor(head, files.temporary());
+  files.take_the_name();
   log_info("{} in {}{}", count_text(static_cast<std::uint64_t>(count), "frame"), folder,
            head.keep == record::Keep::region
                ? ", black where nothing was kept: replay the recording itself for samples"

@@ -10,7 +10,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -24,6 +23,7 @@
 #include "host/commands/commands.h"
 #include "host/core/config_error.h"
 #include "host/core/log.h"
+#include "host/core/os/atomic_file.h"
 #include "host/core/os/termination.h"
 #include "host/motion/control_socket.h"
 #include "host/motion/profile_config.h"
@@ -124,12 +124,7 @@ void write_pages(command_line::Command program, const std::string& folder) {
   fs::create_directories(folder, error);
   for (const ManPage& page : man_pages(program, TAGWRENCH_VERSION)) {
     const fs::path path = fs::path(folder) / (page.name + ".1");
-    std::ofstream file(path);
-    file << page.text;
-    file.close();
-    if (!file)
-      throw ConfigError("{}: cannot be written; choose a folder of yours with --out",
-                        path.string());
+    write_atomically(path, page.text);
   }
 }
 

@@ -94,6 +94,9 @@ void TextSink::adopt(int fd) {
   struct stat about {};
   if (fstat(fd, &about) != 0)
     throw ConfigError("{}: not open: {}; redirect it somewhere", label_, std::strerror(errno));
+  if ((::fcntl(fd, F_GETFL) & O_ACCMODE) == O_RDONLY)
+    throw std::runtime_error(
+        fmt::format("{}: is closed, or open for reading only; redirect it somewhere", label_));
   if (S_ISREG(about.st_mode)) kind_ = Kind::file;
   if (S_ISSOCK(about.st_mode)) kind_ = Kind::socket;
   if (kind_ == Kind::stream) {

@@ -111,9 +111,10 @@ void put(Statement& statement, const auto&... values) {
   statement.execute();
 }
 
-/// The file must be new: nobody's data is overwritten, and of two writers one is refused.
+/// The file must be new: nobody's data is overwritten, and of two writers one is refused. What a
+/// camera saw is for its owner alone.
 std::filesystem::path created(const std::filesystem::path& path) {
-  const UniqueFd file(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
+  const UniqueFd file(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
   if (file) return path;
   if (errno == EEXIST) {
     throw ConfigError("{}: exists, and a recording replaces nothing; choose another name",

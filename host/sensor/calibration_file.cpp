@@ -12,7 +12,7 @@
 #include "host/core/axis_names.h"
 #include "host/core/config_error.h"
 #include "host/core/json/json_text.h"
-#include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 
 namespace tagwrench {
 namespace {
@@ -41,25 +41,21 @@ constexpr std::uintmax_t kMaxFile = 16 << 20;  // a quadratic model has 0.4 MB
 constexpr double kMax = 1e12;                  // of any number, SI ...
 constexpr double kMaxCovariance = 1e24;        // ... but its square: of N/m^2, 1 N at 1 um
 
+std::string text_of(const std::filesystem::path& path) {
+  try {
+    return read_text(path, kMaxFile);
+  } catch (const ConfigError& e) {
+    throw ConfigError(
+        "{}; run `tagwrench calibrate wrench`, or remove wrench.calibration to use springs",
+        e.what());
+  }
+}
+
 /// Every access checks; every complaint names the file.
 class CalibrationReader {
  public:
   explicit CalibrationReader(const std::filesystem::path& path) : path_(path.string()) {
-    std::error_code error;  // a pipe or a device may never end
-    std::ifstream in;
-    if (std::filesystem::is_regular_file(path, error)) {
-      if (std::filesystem::file_size(path, error) > kMaxFile)
-        fail("is too large to be a calibration");
-      in.open(path, std::ios::binary);
-    }
-    if (!in.is_open()) {
-      fail(
-          "cannot be read; run `tagwrench calibrate wrench`, or remove wrench.calibration to use "
-          "springs");
-    }
-    std::ostringstream text;
-    if (!(text << in.rdbuf())) fail("cannot be read; it is empty, or no file");
-    root_ = parse_json(text.str());
+    root_ = parse_json(text_of(path));
     if (!root_.is_object())
       fail("is not a JSON object; it was cut short or is another kind of file");
     if (root_.value("format", json()) != kCalibrationFormat) {
@@ -416,7 +412,7 @@ CalibrationFacts load_calibration(const std::string& path, const CameraModel& ca
   return facts;
 }
 
-void save_calibration(const std::filesystem::path& path, const Calibration& calibration) {
+std::string calibration_text(const Calibration& calibration) {
   const WrenchModel& model = calibration.model;
   ordered_json out{{"format", kCalibrationFormat},
                    {"sensor", sensor_json(calibration.sensor)},
@@ -433,7 +429,7 @@ void save_calibration(const std::filesystem::path& path, const Calibration& cali
   }
   add_record(calibration.record, out);
   // Texts of people may hold anything; what is no UTF-8 is replaced.
-  write_atomically(path, dump_json(out, 1) + "\n");
+  return dump_json(out, 1) + "\n";
 }
 
 }  // namespace tagwrench

@@ -68,8 +68,8 @@ struct Calibration {
 /// Throws ConfigError if it cannot be read or is not such a file.
 Calibration read_calibration(const std::filesystem::path& path);
 
-/// Replaces the file as a whole or not at all. Throws std::runtime_error.
-void save_calibration(const std::filesystem::path& path, const Calibration& calibration);
+/// What read_calibration() reads.
+std::string calibration_text(const Calibration& calibration);
 
 /// What people are told of a calibration that is in force.
 struct CalibrationFacts {

@@ -15,6 +15,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/core/png/png.h"
 #include "host/core/sha256.h"
 #include "host/core/yaml/yaml_reader.h"
@@ -96,14 +97,6 @@ fs::path linked_to(const fs::path& sensor) {
 
 [[noreturn]] void no_pose(const YamlReader& node) {
   node.fail("position_mm", "is missing; run `tagwrench calibrate target`");
-}
-
-std::optional<std::string> bytes_of(const fs::path& path) {
-  std::error_code error;  // a pipe or a device may never end
-  std::ifstream in;
-  if (fs::is_regular_file(path, error)) in.open(path, std::ios::binary);
-  if (!in.is_open()) return {};
-  return std::string(std::istreambuf_iterator<char>(in), {});
 }
 
 std::string list(const Eigen::Vector3d& v, int digits) {
@@ -252,13 +245,13 @@ ZeroFile read_zero_file(const fs::path& file) {
   return out;
 }
 
-ReferenceImage read_measured_picture(const fs::path& folder, const PictureName& name,
-                                     const CameraModel& camera) {
+MeasuredPicture read_measured_picture(const fs::path& folder, const PictureName& name,
+                                      const CameraModel& camera) {
   for (const char* which : {"", kBefore}) {
     const fs::path file = folder / (name.file + which);
-    if (sha256_hex(bytes_of(file).value_or("")) != name.sha256) continue;
-    ReferenceImage picture = load_reference_image(file, camera);
-    picture.frames = name.frames;
+    if (sha256_hex(text_of_file(file).value_or("")) != name.sha256) continue;
+    MeasuredPicture picture{load_reference_image(file, camera), *which != '\0'};
+    picture.image.frames = name.frames;
     return picture;
   }
   std::error_code error;
@@ -382,7 +375,7 @@ void set_aside(const fs::path& file) {
 }
 
 ReferenceImage load_reference_image(const fs::path& path, const CameraModel& camera) {
-  const std::optional<std::string> text = bytes_of(path);
+  const std::optional<std::string> text = text_of_file(path);
   if (!text) refuse(path, "cannot be read as a file");
   const std::vector<std::uint8_t> bytes(text->begin(), text->end());
   check_header(path, bytes, camera);

@@ -80,10 +80,15 @@ CameraFile read_camera_file(const std::filesystem::path& file);
 TargetFile read_target_file(const std::filesystem::path& file);
 ZeroFile read_zero_file(const std::filesystem::path& file);
 
+struct MeasuredPicture {
+  ReferenceImage image;
+  bool before = false;  ///< it lies in NAME.before: a measurement ended between its files
+};
+
 /// The picture that target.yaml names, or, where that is another one, the picture before it: a
 /// measurement may have ended between the two. Throws ConfigError.
-ReferenceImage read_measured_picture(const std::filesystem::path& folder, const PictureName& name,
-                                     const CameraModel& camera);
+MeasuredPicture read_measured_picture(const std::filesystem::path& folder, const PictureName& name,
+                                      const CameraModel& camera);
 
 /// Throws ConfigError where the stamp tells that another sensor.yaml of the same folder is meant.
 void check_owner(const std::filesystem::path& file, const MeasuredStamp& stamp,

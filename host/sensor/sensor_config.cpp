@@ -112,13 +112,20 @@ struct Measured {
     }
     to.target.scale_sigma = file.target.scale_sigma;
     to.rest.camera_T_platform = file.rest;
+    std::string unfinished;
     to.rest.appearance.reset();
     if (file.picture) {
-      to.rest.appearance = read_measured_picture(folder, *file.picture, to.camera);
+      MeasuredPicture picture = read_measured_picture(folder, *file.picture, to.camera);
+      to.rest.appearance = std::move(picture.image);
       to.rest.frames = file.picture->frames;
+      if (picture.before)
+        unfinished = fmt::format(
+            "a later measurement ended half-way, and {} is its picture; run "
+            "`tagwrench calibrate target` again",
+            shown(file.picture->file.c_str()));
     }
     if (file.readout) to.camera.readout = *file.readout;
-    to.target_from = {shown(kMeasuredTarget), file.stamp.date};
+    to.target_from = {shown(kMeasuredTarget), file.stamp.date, unfinished};
   }
 
   /// Its path alone.
@@ -435,6 +442,8 @@ std::vector<std::string> in_force(const SensorConfig& sensor) {
   const bool placed = sensor.rest.camera_T_platform.has_value();
   lines.push_back(placed ? line("target", sensor.target_from.file, sensor.target_from.date)
                          : "target: sensor.yaml; its rest is learned at every start");
+  if (!sensor.target_from.unfinished.empty())
+    lines.push_back("target: " + sensor.target_from.unfinished);
   lines.push_back(sensor.calibration.empty()
                       ? "wrench: sensor.yaml's springs"
                       : line("wrench", sensor.wrench_from.file, sensor.wrench_from.date));

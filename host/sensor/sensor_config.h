@@ -57,6 +57,7 @@ struct ReferenceLine {
 struct InForce {
   std::string file = "sensor.yaml";  ///< or one of measured/, or another that sensor.yaml names
   std::string date;                  ///< YYYY-MM-DD; empty: not told
+  std::string unfinished{};          ///< what a measurement that was killed has left; empty: none
 };
 
 struct SensorConfig {

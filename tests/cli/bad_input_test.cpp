@@ -1,5 +1,6 @@
 // Bad input gets one clear line and the right exit status, and nothing half-written.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
@@ -52,6 +53,40 @@ class BadInput : public testing::Test {
 TEST_F(BadInput, NoSuchCamera) {
   expect_refused(run_source("v4l2:/dev/video99"), 2, {"/dev/video99", "no such"});
   EXPECT_FALSE(wrote_output());
+}
+
+TEST_F(BadInput, ASensorThatIsAPipeOrADeviceIsNotWaitedFor) {
+  const std::string pipe = temporary_ / "sensor.yaml";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& file : {pipe, std::string("/dev/zero")}) {
+    expect_refused(run_bridge({"run", "--source", "sim", "--sensor", file}), 2,
+                   {file, "not a regular file"});
+    expect_refused(run_bridge({"run", "--source", "sim", "--profile", file}), 2, {file});
+    expect_refused(run_bridge({"run", "--source", "sim:" + file}), 2, {file});
+    expect_refused(run_bridge({"run", "--source", "recording:" + file}), 2, {file});
+  }
+}
+
+TEST_F(BadInput, ASecondDocumentIsNotPassedOver) {
+  write_file(temporary_ / "two.yaml", read_file(render(1) / "sensor.yaml") + "---\ncamera: {}\n");
+  expect_refused(run_bridge({"run", "--source", "sim", "--sensor", temporary_ / "two.yaml"}), 2,
+                 {"two.yaml:", "a second document"});
+}
+
+TEST_F(BadInput, AKeyThatATerminalWouldObeyIsSpeltOut) {
+  write_file(temporary_ / "evil.yaml", "camera: {width: 640, \"\\e]0;pwned\\a\": 1}\n");
+  const Outcome refused =
+      run_bridge({"run", "--source", "sim", "--sensor", temporary_ / "evil.yaml"});
+  EXPECT_EQ(refused.err.find('\x1b'), std::string::npos) << refused.err;
+  EXPECT_EQ(refused.err.find('\a'), std::string::npos) << refused.err;
+}
+
+TEST_F(BadInput, StandardOutputThatIsClosedIsNotWrittenToInVain) {
+  const std::string command = "exec \"$0\" run --source sim --frames 3 --output jsonl:- >&-";
+  const Outcome closed =
+      Bridge({"-c", command, TAGWRENCH_PROGRAM}, "/dev/null", "/bin/sh").finish();
+  EXPECT_EQ(closed.status, 1) << closed.err;
+  EXPECT_NE(closed.err.find("standard output: is closed"), std::string::npos) << closed.err;
 }
 
 TEST_F(BadInput, NodeThatIsNoCamera) {

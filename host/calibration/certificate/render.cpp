@@ -23,6 +23,7 @@
 
 #include "host/calibration/certificate/certificate.h"
 #include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
 #include "host/core/os/unique_fd.h"
 
 extern char** environ;
@@ -287,41 +288,20 @@ namespace fs = std::filesystem;
 /// One file on its way to its name.
 struct Arrival {
   fs::path path;
-  std::string temporary{};  ///< empty when it has its name
-  std::string old{};        ///< what had the name before, under another one
+  NewFile file{path};
+  std::string old{};  ///< what had the name before, under another one
   bool named = false;
 };
-
-void write_temporary(const NamedText& file, Arrival& arrival) {
-  const fs::path folder = file.path.has_parent_path() ? file.path.parent_path() : fs::path(".");
-  std::string name = (folder / fmt::format(".{}-XXXXXX", file.path.filename().string())).string();
-  const UniqueFd fd(::mkostemp(name.data(), O_CLOEXEC));
-  if (!fd) fail(file.path);
-  arrival.temporary = name;
-  for (std::string_view text = file.text; !text.empty();) {
-    const ssize_t n = ::write(fd.get(), text.data(), text.size());
-    if (n < 0 && errno != EINTR) fail(file.path);
-    if (n > 0) text.remove_prefix(static_cast<std::size_t>(n));
-  }
-  const mode_t mask = ::umask(0);
-  ::umask(mask);
-  if (::fchmod(fd.get(), 0666 & ~mask) != 0 || ::fsync(fd.get()) != 0) fail(file.path);
-}
 
 void take_the_name(Arrival& arrival, bool replace) {
   const fs::path& path = arrival.path;
   if (replace && fs::exists(fs::symlink_status(path))) {
     if (!fs::is_regular_file(path)) fail(path, "is no regular file, which alone is replaced");
-    const std::string aside = arrival.temporary + ".old";
+    const std::string aside = arrival.file.temporary().string() + ".old";
     if (::rename(path.c_str(), aside.c_str()) != 0) fail(path);
     arrival.old = aside;
   }
-  if (::renameat2(AT_FDCWD, arrival.temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) !=
-      0) {
-    if (errno == EEXIST) fail(path, "is there already; give another name, or --force");
-    fail(path);
-  }
-  arrival.temporary.clear();
+  arrival.file.take_the_name(NewFile::Existing::refused);
   arrival.named = true;
 }
 
@@ -405,12 +385,11 @@ void write_together(const std::vector<NamedText>& files, bool replace) {
   std::vector<Arrival> arrivals;
   try {
     for (const NamedText& file : files)
-      write_temporary(file, arrivals.emplace_back(Arrival{file.path}));
+      arrivals.emplace_back(Arrival{file.path}).file.write(file.text);
     for (Arrival& arrival : arrivals) take_the_name(arrival, replace);
   } catch (...) {
     // As if nothing had been.
     for (const Arrival& arrival : arrivals) {
-      if (!arrival.temporary.empty()) ::unlink(arrival.temporary.c_str());
       if (!arrival.old.empty())
         ::rename(arrival.old.c_str(), arrival.path.c_str());
       else if (arrival.named)

@@ -11,6 +11,7 @@
 #include "host/core/config_error.h"
 #include "host/core/json/json_text.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/core/sha256.h"
 #include "host/wrench/zero.h"
 
@@ -263,14 +264,13 @@ void write_calibration(const CalibrationFiles& files, const WrenchData& data,
   const std::string csv = study::trial_to_csv(data.trial);
   calibration.record.data_file = files.data.filename().string();
   calibration.record.data_sha256 = sha256_hex(csv);
-  const fs::path fresh = fs::path(files.calibration) += ".new";
   std::error_code none;
   fs::create_directory(files.calibration.parent_path(), none);  // who writes says what is wrong
-  save_calibration(fresh, calibration);
+  NewFile fresh(files.calibration);
+  fresh.write(calibration_text(calibration));
   try {
-    read_calibration(fresh);
+    read_calibration(fresh.temporary());
   } catch (const ConfigError& unusable) {
-    fs::remove(fresh, none);
     throw ConfigError(
         "calibration: what came of these steps cannot be used ({}); the calibration in force "
         "stays; take the steps again, with --force",
@@ -281,7 +281,7 @@ void write_calibration(const CalibrationFiles& files, const WrenchData& data,
   if (fs::exists(files.data, none))
     write_atomically(fs::path(files.data) += ".before", read_text(files.data));
   write_atomically(files.data, csv);
-  fs::rename(fresh, files.calibration);
+  fresh.take_the_name();
 }
 
 std::vector<std::string> describe(const WrenchPlan& plan, const WrenchData& data,

@@ -242,7 +242,8 @@ constexpr int kMaxFrames = 1'000'000;         // names have six digits
 }
 
 void write_file(const fs::path& path, const void* data, std::size_t size) {
-  const UniqueFd file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  const UniqueFd file(
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
   if (!file) cannot_write(path, std::strerror(errno));
   const char* next = static_cast<const char*>(data);
   while (size > 0) {
@@ -386,7 +387,7 @@ void export_folder(const Scenario& scenario, const fs::path& dir, int frames) {
   std::error_code ignored;
   fs::remove_all(partial, ignored);
   try {
-    fs::create_directory(partial);
+    if (!fs::create_directory(partial)) cannot_write(partial, "something is in the way");
     write_all(scenario, partial, frames);
     for (const fs::path& path : earlier)
       fs::remove_all(path == partial ? fs::path() : path, ignored);

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
 #include "host/core/sha256.h"
 #include "host/sensor/calibration_file.h"
 
@@ -74,7 +75,7 @@ class CalibrationRecordFile : public testing::Test {
     return "(accepted)";
   }
   void change(const std::function<void(nlohmann::json&)>& alter) {
-    save_calibration(path_, example(FeatureKind::linear));
+    write_atomically(path_, calibration_text(example(FeatureKind::linear)));
     nlohmann::json json = nlohmann::json::parse(text());
     alter(json);
     std::ofstream(path_) << json;
@@ -89,7 +90,7 @@ class CalibrationRecordFile : public testing::Test {
 TEST_F(CalibrationRecordFile, EveryNumberComesBackToTheBit) {
   for (int kind = 0; kind < kFeatureKinds; ++kind) {
     const Calibration c = example(static_cast<FeatureKind>(kind));
-    save_calibration(path_, c);
+    write_atomically(path_, calibration_text(c));
     const Calibration back = read_calibration(path_);
     EXPECT_EQ(back.model.K, c.model.K);
     EXPECT_EQ(back.model.B, c.model.B);
@@ -116,15 +117,15 @@ TEST_F(CalibrationRecordFile, EveryNumberComesBackToTheBit) {
 TEST_F(CalibrationRecordFile, ACurvatureThatIsHardlyKnownIsRead) {
   Calibration c = example(FeatureKind::quadratic);
   c.model.parameter_covariance(50, 50) = 1e13;  // (N/m^2)^2: 3 N at 1 mm
-  save_calibration(path_, c);
+  write_atomically(path_, calibration_text(c));
   EXPECT_EQ(complaint(), "(accepted)");
   c.model.parameter_covariance(50, 50) = 1e25;
-  save_calibration(path_, c);
+  write_atomically(path_, calibration_text(c));
   EXPECT_NE(complaint().find("which no sensor has"), std::string::npos);
 }
 
 TEST_F(CalibrationRecordFile, ATargetThatWasCalibratedAnewIsAnother) {
-  save_calibration(path_, example(FeatureKind::linear));
+  write_atomically(path_, calibration_text(example(FeatureKind::linear)));
   ASSERT_EQ(complaint(), "(accepted)");
   const auto refused = [&] { return complaint().find("calibrated anew since; run `tagwrench"); };
   TargetDescription was = target_;
@@ -139,7 +140,7 @@ TEST_F(CalibrationRecordFile, ATargetThatWasCalibratedAnewIsAnother) {
 }
 
 TEST_F(CalibrationRecordFile, AnotherLensIsAnotherSensor) {
-  save_calibration(path_, example(FeatureKind::linear));
+  write_atomically(path_, calibration_text(example(FeatureKind::linear)));
   camera_.fx_px = 806;
   EXPECT_NE(complaint().find("its lens (fx,fy,cx,cy) is [805,805,319.5,239.5], sensor.yaml has"),
             std::string::npos);
@@ -171,9 +172,10 @@ TEST_F(CalibrationRecordFile, RefusesWhatIsNoModelNamingTheKey) {
 }
 
 TEST_F(CalibrationRecordFile, AnInterruptedWriteLeavesTheOldOne) {
-  save_calibration(path_, example(FeatureKind::linear));
+  write_atomically(path_, calibration_text(example(FeatureKind::linear)));
   const std::string before = text();
-  EXPECT_THROW(save_calibration(path_ / "below", example(FeatureKind::creep)), std::exception);
+  EXPECT_THROW(write_atomically(path_ / "below", calibration_text(example(FeatureKind::creep))),
+               std::exception);
   EXPECT_EQ(text(), before);
 }
 

@@ -9,6 +9,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/core/sha256.h"
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/sensor_config.h"
@@ -106,7 +107,7 @@ class MeasuredFiles : public testing::Test {
     out.model.range.setOnes();
     out.record.date = "2026-05-03T10:00:00Z";
     write_measured(measured(kMeasuredWrench), "");
-    save_calibration(measured(kMeasuredWrench), out);
+    write_atomically(measured(kMeasuredWrench), calibration_text(out));
   }
   void measure_zero() const {
     const SensorConfig now = load(WrenchCalibration::zero_that_fits);
@@ -248,7 +249,11 @@ TEST_F(MeasuredFiles, AMeasurementThatEndsBetweenPictureAndTargetLeavesTheOldPai
     level_ = level;
     measure_target();
     write_atomically(measured(kMeasuredTarget), target);  // as if it had not come so far
-    EXPECT_EQ(load().rest.appearance->level[7], 50.0F);
+    const SensorConfig now = load();
+    EXPECT_EQ(now.rest.appearance->level[7], 50.0F);
+    EXPECT_NE(in_force(now)[2].find("ended half-way, and measured/rest.png is its picture"),
+              std::string::npos)
+        << in_force(now)[2];
   }
 }
 

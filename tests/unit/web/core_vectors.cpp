@@ -24,7 +24,7 @@
 #include <vector>
 
 #include "host/app/scenario_config.h"
-#include "host/core/os/atomic_file.h"
+#include "host/core/os/text_file.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/simulator/simulator_source.h"
 #include "host/tracker/tracker.h"
