@@ -73,6 +73,9 @@ int main(int argc, char** argv) {
     for (const auto declare : kCommands) declare(program);
     if (!program.parse(argc, argv)) return 0;
     return program.action()();
+  } catch (const DamagedFile& e) {
+    log_info(e.what());
+    return kFailed;
   } catch (const ConfigError& e) {
     log_info(e.what());
     return kUnusable;

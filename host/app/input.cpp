@@ -75,7 +75,7 @@ Input open_images(const InputOptions& options, const std::string& folder) {
 }
 
 Input open_recording(const InputOptions& options, const std::string& file) {
-  auto recording = std::make_unique<record::RecordingReader>(file);
+  auto recording = std::make_unique<record::RecordingReader>(file, options.if_damaged);
   Input input;
   if (!given_sensor(options, input)) {
     input.recorded = recording->head();
@@ -180,6 +180,11 @@ void check_size(const Input& input) {
       "{}: frames are {}x{}, but sensor.yaml's camera is {}x{}; give the --sensor made for this "
       "mode, or ask the camera for that size",
       format.description, format.width, format.height, camera.width_px, camera.height_px);
+}
+
+void check_whole(const FrameSource& source, record::IfDamaged if_damaged) {
+  if (if_damaged == record::IfDamaged::refuse && source.damaged())
+    throw DamagedFile("{}; take a copy that is whole; nothing was written", source.unusable());
 }
 
 void check_appearance(const Input& input) {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "host/core/os/unique_fd.h"
-#include "host/recording/schema.h"
+#include "host/recording/reader.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/frame_source.h"
 #include "host/source/simulator/bench.h"
@@ -30,6 +30,7 @@ struct InputOptions {
   std::string source;  ///< SRC
   bool fast = false;   ///< sources that are not live run as fast as they can, no frame dropped
   WrenchCalibration calibration = WrenchCalibration::use;
+  record::IfDamaged if_damaged = record::IfDamaged::refuse;
 };
 
 /// A source and the sensor that it shows.
@@ -58,6 +59,18 @@ void check_size(const Input& input);
 
 /// Throws ConfigError unless the picture of the sensor at rest, where one is given, shows its tags.
 void check_appearance(const Input& input);
+
+/// Of the option --despite-damage.
+inline constexpr const char* kDespiteDamage = "--despite-damage";
+inline constexpr const char* kDespiteDamageHelp =
+    "what can be read of a recording that is damaged is taken";
+inline record::IfDamaged if_damaged(bool despite) {
+  return despite ? record::IfDamaged::take : record::IfDamaged::refuse;
+}
+
+/// After all has been read, before anything is written: throws DamagedFile if the source was
+/// damaged, and is not to be taken all the same.
+void check_whole(const FrameSource& source, record::IfDamaged if_damaged);
 
 enum class Next : std::uint8_t { frame, nothing, end, stopped };
 

@@ -277,7 +277,8 @@ int Instrument::end(const RunReport& report) {
   log_info(summary(report, input_.sensor));
   say_zero(zero_, zero_limits_.range, zero_limits_.band);
   if (const std::string unusable = input_.source->unusable(); !unusable.empty()) log_info(unusable);
-  return recorded ? 0 : 1;
+  const bool whole = session_.options.despite_damage || !input_.source->damaged();
+  return recorded && whole ? 0 : 1;
 }
 
 }  // namespace tagwrench

@@ -253,7 +253,9 @@ std::optional<Input> open_run_input(const RunOptions& options, ServiceWatch* wat
     return wait_for_camera([&] { return try_camera(options); }, watch);
   }
   if (options.source.empty()) return find_input(options);
-  return open_input({options.sensor, options.source, options.fast});
+  InputOptions input{options.sensor, options.source, options.fast};
+  input.if_damaged = if_damaged(options.despite_damage);
+  return open_input(input);
 }
 
 RunOptions with_own_sensor(RunOptions options) {

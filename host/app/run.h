@@ -34,6 +34,7 @@ struct RunOptions {
   std::optional<long> frames;
   std::optional<double> seconds;
   bool fast = false;
+  bool despite_damage = false;          ///< of a recording: what can be read of it is taken
   bool wait = false;                    ///< for a camera, instead of showing the simulated sensor
   std::string board;                    ///< its port; empty: there is none
   bool no_zero_tracking = false;        ///< the zero stays what sensor.yaml says

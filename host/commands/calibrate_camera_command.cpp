@@ -297,6 +297,7 @@ std::unique_ptr<ViewCollector> look_at_camera(const CalibrateCameraOptions& opti
     guide.say(taken, *collector, wanted);
     tell_events(events, *collector, wanted, frame, taken == ViewResult::yes);
   }
+  check_whole(source, record::IfDamaged::refuse);
   return collector;
 }
 

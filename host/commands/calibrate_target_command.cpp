@@ -33,6 +33,7 @@ struct CalibrateTargetOptions {
   std::optional<long> frames;     ///< use no more than this, the rest included
   std::optional<double> seconds;  ///< alike, by the frames' own time
   int events = -1;                ///< descriptor, see Events
+  bool despite_damage = false;
 };
 
 /// Says what to do, and every two seconds how far it is.
@@ -128,8 +129,9 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   const MeasuredSensor measured(options.sensor, options.out,
                                 {kMeasuredTarget, kMeasuredPicture, kMeasuredZero});
   const UniqueFd stop = termination_fd();
-  const Input input =
-      open_input({options.sensor, options.source, true, WrenchCalibration::without_target});
+  const record::IfDamaged damaged = if_damaged(options.despite_damage);
+  const Input input = open_input(
+      {options.sensor, options.source, true, WrenchCalibration::without_target, damaged});
   check_size(input);
   const SensorConfig& sensor = input.sensor;
   Events events(options.events);
@@ -137,6 +139,7 @@ int calibrate_target(const CalibrateTargetOptions& options) {
   log_info("source: " + input.source->format().description);
   log_info("hands off until {} frames at rest are taken", sensor.rest.frames);
   if (!watch(*input.source, options, stop, record, events)) return stopped_unwritten();
+  check_whole(*input.source, damaged);
   check_record(record, sensor.target, sensor.rest);
 
   log_info("adjusting to {} pictures", record.keyframes().size());
@@ -181,6 +184,7 @@ void calibrate_target_command(command_line::Command family) {
   verb.add_option("--out", o->out,
                   "a new sensor.yaml to make, in another folder; what is found goes into measured/ "
                   "beside it, without --out beside --sensor");
+  verb.add_flag(kDespiteDamage, o->despite_damage, kDespiteDamageHelp);
   verb.add_option("--frames", o->frames, "use no more than N frames")
       .check(command_line::range(1, 2'000'000'000));
   verb.add_option(

@@ -43,6 +43,7 @@ struct CalibrateWrenchOptions : ReferenceInstrumentOptions {
   std::string keep = "raw";  ///< of it
   bool resume = false;
   bool force = false;
+  bool despite_damage = false;
   bool require_all = false;
   bool list_plans = false;
   std::string show_plan;          ///< name; printed to standard output
@@ -389,12 +390,13 @@ int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFile
   check_replay_options(options);
   check_measurable(measured_folder(options.sensor), {kMeasuredZero});
   check_files(files, options);
-  record::RecordingReader recording(parse_source(options.source).argument);
+  const record::IfDamaged damaged = if_damaged(options.despite_damage);
+  record::RecordingReader recording(parse_source(options.source).argument, damaged);
   const RecordedCalibration recorded = calibration_in(recording.head());
   const WrenchPlan plan = plan_of_recording(options, recorded);
   const std::vector<AcceptedStep> steps = accepted_steps(recording, plan);
-  Input input =
-      open_input({options.sensor, options.source, /*fast=*/true, WrenchCalibration::ignore});
+  Input input = open_input(
+      {options.sensor, options.source, /*fast=*/true, WrenchCalibration::ignore, damaged});
   const SensorConfig& sensor = input.sensor;
   check_sensor(input);
   const SensorConfig then =
@@ -409,8 +411,10 @@ int calibrate_again(const CalibrateWrenchOptions& options, const CalibrationFile
   if (const std::string missing = not_recorded(steps, plan); !missing.empty())
     log_info("not in the recording: " + missing);
 
+  std::vector<StepRecord> records = replay_steps(input, recording, steps, plan);
+  check_whole(*input.source, damaged);
   fit_and_write(options, subject, plan,
-                {.records = replay_steps(input, recording, steps, plan),
+                {.records = std::move(records),
                  .reference = recorded.reference,
                  .gain_sigma = recorded.gain_sigma,
                  .notes = options.notes.empty() ? recorded.notes : options.notes,
@@ -475,6 +479,7 @@ void calibrate_wrench_command(command_line::Command family) {
       .check(command_line::one_of({"raw", "region"}))
       .capture_default_str()
       .needs(record);
+  verb.add_flag(kDespiteDamage, o->despite_damage, kDespiteDamageHelp);
   verb.add_flag("--resume", o->resume, "go on with a calibration that was stopped");
   verb.add_flag("--force", o->force, "begin anew, whatever is there");
   verb.add_flag(

@@ -16,6 +16,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "host/app/input.h"
 #include "host/app/recording.h"
 #include "host/commands/commands.h"
 #include "host/core/config_error.h"
@@ -39,6 +40,7 @@ struct ExportOptions {
   std::string references;
   std::string events;
   bool force = false;
+  bool despite_damage = false;
 };
 
 /// A text file that appears when it is complete, or standard output (`-`).
@@ -86,16 +88,28 @@ class ExportFile {
 
 std::int64_t ns(TimePoint time) { return time.time_since_epoch().count(); }
 
+/// The next record; false after the last, and at the first that is damaged, which is said. It was
+/// asked for then: export_all() refuses a damaged recording.
+template <class Record>
+bool next_whole(record::RecordingReader& reader, Record& record) {
+  try {
+    return reader.next(record);
+  } catch (const DamagedFile& e) {
+    log_info("{}; what stands before that is exported", e.what());
+    return false;
+  }
+}
+
 /// All records of a type, a line each. What the file holds now is told, but of standard output.
 template <class Record, class Line>
 void export_rows(const ExportOptions& o, const std::string& path, std::string_view header,
                  std::string_view one, const Line& line) {
   if (path.empty()) return;
-  record::RecordingReader reader(o.recording);
+  record::RecordingReader reader(o.recording, record::IfDamaged::take);
   ExportFile file(path, o.force);
   file.add(header);
   std::uint64_t count = 0;
-  for (Record record; reader.next(record); ++count) file.add(line(record));
+  for (Record record; next_whole(reader, record); ++count) file.add(line(record));
   file.finish();
   if (path != "-") log_info("{} in {}", count_text(count, one), path);
 }
@@ -207,7 +221,7 @@ double seconds(TimePoint time, TimePoint start) {
 double angle_between(double from, double to) { return std::remainder(to - from, 360.0); }
 
 std::size_t export_tags(const std::string& recording, const std::string& path, bool force) {
-  record::RecordingReader reader(recording);
+  record::RecordingReader reader(recording, record::IfDamaged::take);
   const SensorConfig sensor = recorded_sensor(reader.head(), recording, WrenchCalibration::ignore);
   if (sensor.target.tags.size() != 2) {
     throw ConfigError(
@@ -220,7 +234,7 @@ std::size_t export_tags(const std::string& recording, const std::string& path, b
   std::array<TagPose, 2> first;
   std::array<Vector3, 2> smooth{};
   const auto& times = reader.frame_times();
-  for (record::TrackRecord record; reader.next(record);) {
+  for (record::TrackRecord record; next_whole(reader, record);) {
     if (record.track.status != Status::ok || record.track.corner_count != 2) continue;
     std::array<Vector3, 2> position{};
     std::array<TagPose, 2> pose;
@@ -259,12 +273,12 @@ std::size_t export_tags(const std::string& recording, const std::string& path, b
 }
 
 std::size_t export_reference(const std::string& recording, const std::string& path, bool force) {
-  record::RecordingReader reader(recording);
+  record::RecordingReader reader(recording, record::IfDamaged::take);
   if (reader.frame_times().empty()) return 0;
   const TimePoint start = reader.frame_times().front();
   std::optional<ExportFile> file;
   std::size_t rows = 0;
-  for (record::ReferenceRecord reading; reader.next(reading);) {
+  for (record::ReferenceRecord reading; next_whole(reader, reading);) {
     if (reading.axes != 6) continue;
     if (!file) file.emplace(path, force);
     ++rows;
@@ -331,8 +345,11 @@ fs::path without_slash(const std::string& folder) {
 
 /// JPEG, PNG and PGM files come out as they went in, everything else as PGM. Throws ConfigError if
 /// the folder is there and not empty.
-void export_frames(const std::string& recording, const std::string& folder) {
-  RecordingSource source(std::make_unique<record::RecordingReader>(recording), /*fast=*/true);
+void export_frames(const ExportOptions& o) {
+  const std::string& recording = o.recording;
+  const std::string& folder = o.frames;
+  RecordingSource source(
+      std::make_unique<record::RecordingReader>(recording, record::IfDamaged::take), /*fast=*/true);
   const record::Head& head = source.recording().head();
   const fs::path place = without_slash(folder);
   std::error_code error;
@@ -352,6 +369,7 @@ void export_frames(const std::string& recording, const std::string& folder) {
     files.add(name, picture.header, picture.bytes);
     times += fmt::format("{},{}\n", name, frame.capture_time.time_since_epoch().count());
   }
+  check_whole(source, if_damaged(o.despite_damage));
   files.add("frames.csv", times);
   write_recorded_sensor(head, files.temporary());
   files.take_the_name();
@@ -368,8 +386,10 @@ int export_all(const ExportOptions& o) {
     throw ConfigError(
         "export: nothing was asked for; give --csv, --paper, --frames, --references or --events");
   }
-  if (const record::RecordingReader reader(o.recording); !reader.unclosed().empty())
+  if (const record::RecordingReader reader(o.recording, if_damaged(o.despite_damage));
+      !reader.unclosed().empty())
     log_info("{} {}", o.recording, reader.unclosed());
+  if (!o.frames.empty()) export_frames(o);  // first: it may find that pixels are damaged
   LineBuffer line{};
   export_rows<Sample>(o, o.csv, kCsvHeader, "sample",
                       [&](const Sample& sample) { return csv_line(line, sample); });
@@ -378,7 +398,6 @@ int export_all(const ExportOptions& o) {
   export_rows<record::EventRecord>(o, o.events, "id,t_ns,kind,step,value,text\n", "event",
                                    event_line);
   if (!o.paper.empty()) export_paper(o.recording, o.paper, o.force);
-  if (!o.frames.empty()) export_frames(o.recording, o.frames);
   return 0;
 }
 
@@ -397,6 +416,7 @@ void export_command(command_line::Command program) {
   verb.add_option("--references", o->references, "readings of load cells and six-axis sensors");
   verb.add_option("--events", o->events, "marks, notes, news of the board, as CSV");
   verb.add_flag("--force", o->force, "files that exist are replaced");
+  verb.add_flag(kDespiteDamage, o->despite_damage, kDespiteDamageHelp);
   verb.runs([o] { return export_all(*o); });
 }
 

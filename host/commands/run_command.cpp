@@ -50,6 +50,7 @@ void add_course(command_line::Command verb, RunOptions& o) {
   verb.add_option("--seconds", o.seconds, "end after S seconds").check(command_line::seconds());
   verb.add_flag("--fast", o.fast,
                 "sources that are not live run as fast as they can, no frame dropped");
+  verb.add_flag(kDespiteDamage, o.despite_damage, kDespiteDamageHelp);
   verb.add_flag("--no-zero-tracking", o.no_zero_tracking,
                 "the zero does not follow what reads while nobody touches the sensor");
   verb.add_option("--board", o.board,

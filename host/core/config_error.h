@@ -17,4 +17,10 @@ class ConfigError : public std::runtime_error {
       : runtime_error(fmt::format(text, std::forward<First>(first), std::forward<Rest>(rest)...)) {}
 };
 
+/// What is to be read is damaged; main() exits with 1.
+class DamagedFile : public ConfigError {
+ public:
+  using ConfigError::ConfigError;
+};
+
 }  // namespace tagwrench

@@ -310,7 +310,8 @@ struct RecordingReader::Cursors {
   bool trouble_waits = false;  ///< likewise `troubles`
 };
 
-RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path) {
+RecordingReader::RecordingReader(const std::filesystem::path& path, IfDamaged if_damaged)
+    : path_(path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
     throw ConfigError("{}: no such file; give one that `tagwrench record --out` made",
@@ -325,6 +326,7 @@ RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path
     check_size();
     read_head();
     check_times();
+    if (if_damaged == IfDamaged::refuse) check_pages();
   } catch (const DatabaseError& e) {
     if (e.code == SQLITE_NOTADB) {
       throw ConfigError("{}: is not a recording; give a file that `tagwrench record --out` made",
@@ -342,7 +344,7 @@ RecordingReader::RecordingReader(const std::filesystem::path& path) : path_(path
 RecordingReader::~RecordingReader() = default;
 
 void RecordingReader::damaged(const std::string& what) const {
-  throw ConfigError(
+  throw DamagedFile(
       "{0}: is damaged: {1}; take a copy that is whole, or `sqlite3 {0} .recover` for what is left",
       path_.string(), what);
 }
@@ -436,7 +438,7 @@ void RecordingReader::check_times() {
   while (rows.step()) {
     const TimePoint time = time_point(rows.integer(1));
     if (!times_.empty() && time <= times_.back()) {
-      throw ConfigError(
+      throw DamagedFile(
           "{}: is damaged: time runs backwards: frame {} has t_ns {}, and the one before it {}; "
           "take a copy that is whole",
           path_.string(), rows.integer(0), time.time_since_epoch().count(),
@@ -444,6 +446,42 @@ void RecordingReader::check_times() {
     }
     times_.push_back(time);
   }
+}
+
+/// SQLite notices a page that is wrong only when it comes to it, which may be in the middle of what
+/// is made of the recording.
+void RecordingReader::check_pages() {
+  std::string found;
+  try {
+    Statement check(cursors_->database, "PRAGMA quick_check(1)");
+    if (check.step() && check.text(0) == "ok") return;
+    found = "its pages do not fit together";
+  } catch (const DatabaseError& e) {
+    found = e.what();
+  }
+  throw DamagedFile(
+      "{}: is damaged: {}; {}; take a copy that is whole, or `tagwrench export --despite-damage` "
+      "for "
+      "what there is",
+      path_.string(), found, readable_part());
+}
+
+/// "312 of 3000 frames, 12.4 of 120 s, can be read".
+std::string RecordingReader::readable_part() const {
+  std::size_t frames = 0;
+  try {
+    RecordingReader again(path_, IfDamaged::take);
+    for (Entry entry; again.next(entry);)
+      if (entry.kind == Entry::Kind::frame) ++frames;
+  } catch (const ConfigError&) {  // as far as it goes
+  }
+  const auto seconds = [this](std::size_t count) {
+    const TimePoint first = times_.empty() ? TimePoint{} : times_.front();
+    const TimePoint last = count == 0 ? first : times_[std::min(count, times_.size()) - 1];
+    return std::chrono::duration<double>(last - first).count();
+  };
+  return fmt::format("{} of {} frames, {:.4g} of {:.4g} s, can be read", frames, times_.size(),
+                     seconds(frames), seconds(times_.size()));
 }
 
 template <class Read>

@@ -54,12 +54,20 @@ struct TrackRecord {
   Track track;
 };
 
+/// What becomes of a recording whose head and times can be read, and something else cannot.
+enum class IfDamaged : std::uint8_t {
+  refuse,
+  take,  ///< what can be read, as far as it goes
+};
+
 class RecordingReader {
  public:
-  /// A recording that was left open, by a crash say, is closed first where that can be. Throws
-  /// ConfigError, one line: no such file, not a recording, of another version, damaged, or with
-  /// times that run backwards.
-  explicit RecordingReader(const std::filesystem::path& path);
+  /// A recording that was left open, by a crash say, is closed first where that can be. All pages
+  /// of the file are looked at. Throws ConfigError, one line: no such file, not a recording, of
+  /// another version; DamagedFile: damaged, with how much of it can be read, or with times that run
+  /// backwards.
+  explicit RecordingReader(const std::filesystem::path& path,
+                           IfDamaged damaged = IfDamaged::refuse);
   ~RecordingReader();
   RecordingReader(const RecordingReader&) = delete;
   RecordingReader& operator=(const RecordingReader&) = delete;
@@ -75,7 +83,7 @@ class RecordingReader {
   const std::vector<TimePoint>& frame_times() const noexcept { return times_; }
 
   // Each walks through its rows in the order of events, from the first; false after the last.
-  // They throw ConfigError where the file is damaged.
+  // They throw DamagedFile where the file is damaged.
 
   bool next(Entry& entry);
   bool next(TrackRecord& track);
@@ -92,6 +100,8 @@ class RecordingReader {
   void check_size();
   void read_head();
   void check_times();
+  void check_pages();
+  std::string readable_part() const;
   /// What `read` gives of the cursors. Throws ConfigError where the file is damaged.
   template <class Read>
   auto whole(Read read) const;

@@ -105,6 +105,8 @@ class FrameSource {
   /// One line about the frames that were delivered but could not be used; empty if there were
   /// none.
   virtual std::string unusable() const { return {}; }
+  /// What the source reads is not as it was written: numbers that come of it are not all there.
+  virtual bool damaged() const { return false; }
 
   /// One line about the last disconnected or reconnected status.
   virtual std::string detail() const { return {}; }
@@ -125,6 +127,7 @@ class RegionSource final : public FrameSource {
   int poll_fd() const noexcept override { return inner_->poll_fd(); }
   CameraLight* camera_light() noexcept override { return inner_->camera_light(); }
   std::string unusable() const override { return inner_->unusable(); }
+  bool damaged() const override { return inner_->damaged(); }
   std::string detail() const override { return inner_->detail(); }
   bool change_setting(std::uint32_t id, std::int64_t value) noexcept override {
     return inner_->change_setting(id, value);

@@ -359,7 +359,7 @@ ReadStatus RecordingSource::read(Frame& frame) noexcept {
     if (status == ReadStatus::frame) {
       passed_ = 0;
     } else {
-      ++unusable_;
+      ++(entry_.raw.bytes.empty() ? without_pixels_ : damaged_frames_);
       passed_ += entry_.dropped + 1;
     }
   }
@@ -408,10 +408,15 @@ bool RecordingSource::complete(Frame& frame) noexcept {
 RawFrame RecordingSource::raw() const noexcept { return entry_.crop ? RawFrame{} : entry_.raw; }
 
 std::string RecordingSource::unusable() const {
-  if (!damage_.empty()) return damage_;
-  if (unusable_ == 0) return {};
-  return fmt::format("{}: {} frames have no pixels or damaged ones, and were skipped",
-                     recording_->path().string(), unusable_);
+  const std::string file = recording_->path().string();
+  if (!damage_.empty())
+    return fmt::format("{}; {} of {} frames were read", damage_, frame_,
+                       recording_->frame_times().size());
+  if (damaged_frames_ > 0)
+    return fmt::format("{}: is damaged: {} of {} frames cannot be decoded, and were skipped", file,
+                       damaged_frames_, recording_->frame_times().size());
+  if (without_pixels_ == 0) return {};
+  return fmt::format("{}: {} frames have no pixels, and were skipped", file, without_pixels_);
 }
 
 }  // namespace tagwrench

@@ -99,6 +99,7 @@ class RecordingSource final : public FrameSource {
   RawFrame raw() const noexcept override;
   std::string detail() const override { return detail_; }
   std::string unusable() const override;
+  bool damaged() const override { return !damage_.empty() || damaged_frames_ > 0; }
 
   const record::RecordingReader& recording() const noexcept { return *recording_; }
 
@@ -122,7 +123,8 @@ class RecordingSource final : public FrameSource {
   TimePoint first_{};
   Region wanted_;
   std::uint32_t passed_ = 0;  ///< frames that were skipped since the last one
-  std::uint64_t unusable_ = 0;
+  std::uint64_t without_pixels_ = 0;
+  std::uint64_t damaged_frames_ = 0;
   std::string damage_;
   std::string detail_;
 };

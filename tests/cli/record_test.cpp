@@ -1,6 +1,7 @@
 // Recording as users do it: record, replay, export; and what is left when the program is killed.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -269,6 +270,75 @@ TEST_F(Record, AFullDiskEndsItWithOneAndTheRestIsReadable) {
   const Outcome exported = run_bridge({"export", file("r.twr"), "--csv", file("out.csv")});
   EXPECT_EQ(exported.status, 0);
   EXPECT_NE(exported.err.find("was not closed"), std::string::npos) << exported.err;
+}
+
+class DamagedRecord : public Record {
+ protected:
+  /// A recording with some pages in the middle, where its frames are, written over.
+  DamagedRecord() {
+    EXPECT_EQ(record(small(), {"--frames", "60"}).status, 0);
+    std::string bytes = read_file(file("r.twr"));
+    const std::size_t middle = bytes.size() / 2 / 4096 * 4096;
+    std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(middle), 3 * 4096, 'x');
+    write_file(folder_ / "r.twr", bytes);
+    fs::remove(file("live.jsonl"));
+  }
+  void expect_refused(const Outcome& outcome) const {
+    EXPECT_EQ(outcome.status, 1) << outcome.err;
+    EXPECT_EQ(lines_in(outcome.err), 1U) << outcome.err;
+    EXPECT_NE(outcome.err.find("r.twr: is damaged: "), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find(" of 60 frames, "), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("--despite-damage"), std::string::npos) << outcome.err;
+  }
+};
+
+TEST_F(DamagedRecord, EndsWithOneAndNothingIsMadeOfIt) {
+  expect_refused(replay());
+  expect_refused(run_bridge({"export", file("r.twr"), "--csv", file("out.csv"), "--frames",
+                             file("frames"), "--events", file("events.csv")}));
+  ASSERT_EQ(
+      run_bridge({"sim", "--scenario", file("small.yaml"), "--out", file("sim"), "--frames", "1"})
+          .status,
+      0);
+  expect_refused(run_bridge({"calibrate", "target", "--sensor", file("sim/sensor.yaml"), "--source",
+                             "recording:" + file("r.twr")}));
+  expect_refused(run_bridge({"analyze", file("r.twr")}));
+  for (const char* made : {"replay.jsonl", "out.csv", "events.csv", "frames", "sim/measured"})
+    EXPECT_FALSE(fs::exists(file(made))) << made;
+}
+
+TEST_F(DamagedRecord, IsTakenAsFarAsItGoesWhenThatIsAskedFor) {
+  const Outcome ran = replay({"--fast", "--despite-damage"});
+  EXPECT_EQ(ran.status, 0) << ran.err;
+  EXPECT_NE(ran.err.find(" of 60 frames were read"), std::string::npos) << ran.err;
+  const std::size_t read = lines_in(read_file(file("replay.jsonl")));
+  EXPECT_GT(read, 5U);
+  EXPECT_LT(read, 60U);
+  const Outcome exported =
+      run_bridge({"export", file("r.twr"), "--frames", file("frames"), "--despite-damage"});
+  EXPECT_EQ(exported.status, 0) << exported.err;
+  EXPECT_EQ(lines_in(read_file(file("frames/frames.csv"))), read + 1);
+}
+
+TEST_F(Record, PixelsThatCannotBeDecodedEndItWithOne) {
+  write_file(folder_ / "jpeg.yaml", std::string(kSmall) + "compression: {file: jpeg}\n");
+  ASSERT_EQ(
+      run_bridge({"sim", "--scenario", file("jpeg.yaml"), "--out", file("jpegs"), "--frames", "40"})
+          .status,
+      0);
+  ASSERT_EQ(record("images:" + file("jpegs")).status, 0);
+  {
+    record::Database database(file("r.twr"), record::Database::Mode::write);
+    database.run(
+        "UPDATE frames SET bytes = zeroblob(length(bytes)) WHERE id = (SELECT max(id) FROM "
+        "frames)");
+  }
+  const Outcome ran = replay();
+  EXPECT_EQ(ran.status, 1) << ran.err;
+  EXPECT_NE(ran.err.find("1 of 40 frames cannot be decoded"), std::string::npos) << ran.err;
+  EXPECT_EQ(replay({"--fast", "--despite-damage"}).status, 0);
+  EXPECT_EQ(run_bridge({"export", file("r.twr"), "--frames", file("out")}).status, 1);
+  EXPECT_FALSE(fs::exists(file("out")));
 }
 
 TEST_F(Record, ALimitThatLetsNothingBeginLeavesNoFile) {
