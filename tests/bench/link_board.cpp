@@ -75,7 +75,7 @@ void bench_emulated_board(Table& table) {
              {fmt::format("{:.0f} s of 4 cells at 80/s, 2 ADC channels at 100 Hz, 50 time "
                           "exchanges/s; emulated at {:.1f} times real time",
                           f.seconds, f.seconds / f.wall_seconds)});
-  table.at_most("flash", f.flash_bytes, 32768.0 / 2, "bytes");
+  table.at_most("flash", f.flash_bytes, 27.0 * 1024, "bytes");
   table.at_most(
       fmt::format("RAM: static {}, deepest stack {}", f.static_ram_bytes, f.stack_used_bytes),
       f.static_ram_bytes + f.stack_used_bytes, 2048.0 / 2, "bytes");

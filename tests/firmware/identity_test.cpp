@@ -67,6 +67,60 @@ TEST_F(Identity, EveryStartHasAnotherBootId) {
   }
 }
 
+TEST_F(Identity, ResetsByTheWatchdogHaveOtherBootIdsAndWriteNothing) {
+  std::set<std::uint32_t> seen;
+  ASSERT_TRUE(client.greet());
+  const std::vector<std::uint8_t> before = board.core().eeprom();
+  for (int i = 0; i < 20; ++i) {
+    board.hang(i % 2 == 0);
+    board.advance_by(milliseconds(400));
+    const auto hello = client.greet();
+    ASSERT_TRUE(hello);
+    EXPECT_EQ(hello->reset_cause, link::ResetCause::watchdog);
+    EXPECT_TRUE(seen.insert(hello->boot_id).second) << "reset " << i;
+  }
+  EXPECT_EQ(board.core().eeprom(), before) << "a memory that bears 100,000 writes";
+}
+
+/// Bytes of the EEPROM that differ, by their address.
+std::vector<std::size_t> changed(const std::vector<std::uint8_t>& from,
+                                 const std::vector<std::uint8_t>& to) {
+  std::vector<std::size_t> at;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    if (from[i] != to[i]) at.push_back(i);
+  return at;
+}
+
+TEST_F(Identity, AStartWithPowerIsCountedOnceItHasLivedEachInItsOwnCells) {
+  constexpr std::size_t kSlot = 4;  // bytes
+  std::size_t last = 0;
+  for (int start = 0; start < 5; ++start) {
+    board.power_cycle();
+    const std::vector<std::uint8_t> before = board.core().eeprom();
+    client.run(seconds(4));
+    EXPECT_EQ(board.core().eeprom(), before) << "start " << start;
+    client.run(seconds(2));
+    const std::vector<std::size_t> cells = changed(before, board.core().eeprom());
+    ASSERT_FALSE(cells.empty()) << "start " << start;
+    EXPECT_GE(cells.front() / kSlot, last / kSlot + (start > 0 ? 1 : 0)) << "start " << start;
+    EXPECT_EQ(cells.back() / kSlot, cells.front() / kSlot) << "start " << start;
+    last = cells.back();
+  }
+}
+
+TEST_F(Identity, PowerThatGoesWhileAStartIsCountedCostsNoBootId) {
+  std::set<std::uint32_t> seen;
+  for (const int written_ms : {2, 5, 9, 12, 20, 0}) {  // a byte takes 3.4 ms
+    board.power_cycle();
+    const auto hello = client.greet();
+    ASSERT_TRUE(hello);
+    EXPECT_TRUE(seen.insert(hello->boot_id).second) << "before " << written_ms << " ms";
+    while (!board.core().eeprom_busy() && board.board_us() < 6e6) board.advance_by(milliseconds(1));
+    EXPECT_TRUE(board.core().eeprom_busy());
+    board.advance_by(milliseconds(written_ms));
+  }
+}
+
 TEST_F(Identity, SaysHowItWasReset) {
   ASSERT_TRUE(client.greet());
   board.press_reset();

@@ -47,6 +47,8 @@ void start_cells();
 void start_adc();
 void start_buttons();
 void start_eeprom();
+/// Counts this start in the EEPROM once it has lived for some seconds; in the background.
+void keep_start(uint32_t now_us);
 
 }  // namespace board
 }  // namespace tagwrench

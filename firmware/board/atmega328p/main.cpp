@@ -99,5 +99,6 @@ int main() {
   for (;;) {
     wdt_reset();
     app.poll(board::now_us());
+    board::keep_start(board::now_us());
   }
 }
