@@ -20,6 +20,8 @@
 #include "host/core/yaml/yaml_reader.h"
 #include "host/sensor/measured_files.h"
 
+// Not fuzzed: of the sensor in a recording fuzz.yaml_files has the parser.
+
 namespace tagwrench {
 namespace {
 

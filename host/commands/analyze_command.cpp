@@ -29,6 +29,8 @@
 #include "host/sensor/calibration_file.h"
 #include "host/sensor/sensor_config.h"
 
+// Not fuzzed: hashes of files alone; fuzz.tables has the data, fuzz.json_files calibrations.
+
 namespace tagwrench {
 namespace {
 

@@ -20,6 +20,8 @@
 #include "host/tools/design/geometry.h"
 #include "host/tracker/target.h"
 
+// Not fuzzed: compares a file with what is to be written.
+
 namespace tagwrench {
 namespace {
 

@@ -22,6 +22,8 @@
 #include "host/core/os/text_file.h"
 #include "host/sensor/sensor_config.h"
 
+// Not fuzzed: copies a sensor.yaml, of which fuzz.yaml_files has the parser.
+
 namespace tagwrench {
 namespace {
 

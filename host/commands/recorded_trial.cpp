@@ -13,6 +13,8 @@
 #include "host/recording/reader.h"
 #include "host/sensor/measured_files.h"
 
+// Not fuzzed: the first 16 bytes alone; fuzz.recordings has the rest.
+
 namespace tagwrench {
 namespace {
 

@@ -12,6 +12,8 @@
 
 #include "host/core/config_error.h"
 
+// Not fuzzed: bytes in, a hash out.
+
 namespace tagwrench {
 namespace {
 

@@ -24,6 +24,8 @@
 #include "host/core/os/uninterrupted.h"
 #include "host/output/hid_report.h"
 
+// Not fuzzed: messages of our own daemon, of fixed size, and its reports.
+
 namespace tagwrench {
 namespace {
 

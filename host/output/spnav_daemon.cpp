@@ -21,6 +21,8 @@
 #include "host/core/config_error.h"
 #include "host/core/os/user_folders.h"
 
+// Not fuzzed: fuzz.spnav_requests has the dialogue and the messages.
+
 namespace tagwrench {
 namespace {
 

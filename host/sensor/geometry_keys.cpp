@@ -22,8 +22,8 @@ Vector6 optional_pose_sigma(YamlReader& node, bool has_pose) {
               "there is no pose that it could belong to; give position_mm and rotation_rad too, or "
               "leave the sigmas out");
   }
-  sigma << vector3(node.numbers("position_sigma_mm", 3)) * kMm,
-      vector3(node.numbers("rotation_sigma_rad", 3));
+  sigma = six(node, "position_sigma_mm", "rotation_sigma_rad");
+  sigma.head<3>() *= kMm;
   for (int i = 0; i < 6; ++i)
     if (sigma[i] < 0)
       node.fail(i < 3 ? "position_sigma_mm" : "rotation_sigma_rad", "must not be negative");
@@ -74,6 +74,14 @@ std::optional<Eigen::Vector2d> fold(const CameraModel& camera) {
 }  // namespace
 
 Eigen::Vector3d vector3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
+
+Vector6 six(YamlReader& node, const char* first, const char* second) {
+  const Eigen::Vector3d head = vector3(node.numbers(first, 3));
+  const Eigen::Vector3d tail = vector3(node.numbers(second, 3));
+  Vector6 both;
+  both << head, tail;
+  return both;
+}
 
 bool both_or_neither(YamlReader& node, const char* a, const char* b, const char* or_else) {
   const bool there = node.has(a);

@@ -15,6 +15,9 @@
 namespace tagwrench {
 
 Eigen::Vector3d vector3(const std::vector<double>& v);
+/// The three numbers of one key, then those of the other, in the file's units. Both are read before
+/// any is stored: Eigen's comma would assert where the second is refused.
+Vector6 six(YamlReader& node, const char* first, const char* second);
 
 /// Whether they are there. Throws ConfigError where one is without the other; `or_else` ends its
 /// remedy.

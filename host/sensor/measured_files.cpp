@@ -238,7 +238,7 @@ ZeroFile read_zero_file(const fs::path& file) {
   check_format(root, kZeroFormat);
   ZeroFile out;
   out.stamp = read_stamp(root);
-  out.zero << vector3(root.numbers("zero_n", 3)), vector3(root.numbers("zero_nm", 3));
+  out.zero = six(root, "zero_n", "zero_nm");
   out.sensor_sha256 = root.text("sensor_sha256");
   out.wrench_sha256 = root.text("wrench_sha256");
   root.finish();

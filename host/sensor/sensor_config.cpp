@@ -273,7 +273,7 @@ ZeroConfig read_zero(YamlReader& node) {
   constexpr double kPercent = 0.01;
   ZeroConfig zero;
   if (both_or_neither(node, "zero_n", "zero_nm", ", or run `tagwrench zero`"))
-    zero.set << vector3(node.numbers("zero_n", 3)), vector3(node.numbers("zero_nm", 3));
+    zero.set = six(node, "zero_n", "zero_nm");
   zero.date = optional_date(node, "zero_date");
   zero.follow = node.boolean_or("zero_tracking", zero.follow);
   if (node.has("zero_band_percent")) zero.band = node.within("zero_band_percent", 0, 10) * kPercent;

@@ -21,6 +21,8 @@
 #include "host/core/parse.h"
 #include "host/source/v4l2_settings.h"
 
+// Not fuzzed: a process' name, for people; fuzz.pictures has the pictures.
+
 namespace tagwrench {
 namespace {
 

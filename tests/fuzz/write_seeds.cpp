@@ -1,10 +1,11 @@
-// write_seeds DIR: one example of every message kind as first inputs of the fuzzers, in DIR/frames,
-// DIR/messages, DIR/streams and DIR/board; recordings that are as they should be, in
-// DIR/recordings; and what pages send, in DIR/web.
+// write_seeds DIR PROJECT: one example of every message kind as first inputs of the fuzzers, in
+// DIR/frames, DIR/messages, DIR/streams and DIR/board; recordings that are as they should be, in
+// DIR/recordings; what pages send, in DIR/web; and files of every kind (file_seeds.h).
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 
+#include "tests/fuzz/file_seeds.h"
 #include "tests/fuzz/recording_rows.h"
 #include "tests/unit/protocol/messages.h"
 
@@ -90,8 +91,8 @@ void write_web(const std::filesystem::path& dir) {
 
 int main(int argc, char** argv) try {
   using namespace tagwrench::link;
-  if (argc != 2) {
-    std::cerr << "usage: write_seeds DIR\n";
+  if (argc != 3) {
+    std::cerr << "usage: write_seeds DIR PROJECT\n";
     return 2;
   }
   const std::filesystem::path dir = argv[1];
@@ -119,6 +120,7 @@ int main(int argc, char** argv) try {
   write(dir / "recordings" / "damaged",
         recording().change(6, 1).null().damage(100, 0).damage(3000, 0xff).bytes());
   write_web(dir / "web");
+  tagwrench::fuzz::write_file_seeds(dir, argv[2]);
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "write_seeds: " << error.what() << '\n';

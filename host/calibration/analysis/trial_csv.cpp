@@ -19,6 +19,10 @@ constexpr std::string_view kSeparators = ";\t,";
 constexpr std::size_t kRowsToTell = 20;  // the separator by
 constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
 
+bool is_column_name(std::string_view name) {
+  return !name.empty() && name.find_first_of(",;\t\r\n#") == std::string_view::npos;
+}
+
 struct Line {
   std::string_view text;
   std::size_t number;
@@ -145,6 +149,11 @@ class TrialReader {
       } else {
         (load ? loads_ : features_).values.push_back(i);
         if (!load) trial_.feature_names.push_back(name);
+        if (!is_column_name(name)) {
+          throw ConfigError(
+              "{}: column {} of the header has no name, or one with a separator in it; rename it",
+              text_.name(), i + 1);
+        }
       }
     }
     const auto whole = [](const Columns& c) {
@@ -345,7 +354,7 @@ std::string trial_to_csv(const Trial& trial) {
   if (!shapes_fit(trial))
     throw std::invalid_argument("a trial whose columns are not of one length");
   for (const std::string& name : trial.feature_names)
-    if (name.empty() || name.find_first_of(",;\t\r\n#") != std::string::npos)
+    if (!is_column_name(name))
       throw std::invalid_argument("a feature's name that cannot be a CSV column: " + name);
   std::string text = fmt::format("# {}\n# name: {}\n", kFormat, without_controls(trial.name, ' '));
   if (!trial.sensor.empty())

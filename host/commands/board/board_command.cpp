@@ -22,6 +22,7 @@
 
 #include "host/app/board/board_loop.h"
 #include "host/board/cell_calibration.h"
+#include "host/board/hex_image.h"
 #include "host/board/serial_port.h"
 #include "host/commands/board/board.h"
 #include "host/commands/commands.h"
@@ -29,11 +30,14 @@
 #include "host/core/config_error.h"
 #include "host/core/json/json_text.h"
 #include "host/core/log.h"
+#include "host/core/os/text_file.h"
 #include "host/core/os/uninterrupted.h"
 #include "host/core/parse.h"
 #include "host/output/line_outputs.h"
 
 extern char** environ;
+
+// Not fuzzed: fuzz.tables has the image.
 
 namespace tagwrench {
 namespace {
@@ -261,39 +265,11 @@ std::string find_image() {
       kImageName, looked);
 }
 
-enum class HexRecord : std::uint8_t { wrong, data, end };
-
-/// One line of Intel HEX: ":", then length, address (2), type, data and checksum in hex digits; all
-/// bytes together are 0 modulo 256 (Intel, "Hexadecimal Object File Format Specification", 1988).
-HexRecord hex_record(std::string_view line) {
-  if (line.ends_with('\r')) line.remove_suffix(1);
-  if (line.size() < 11 || line.size() % 2 == 0 || line[0] != ':') return HexRecord::wrong;
-  unsigned sum = 0;
-  std::array<unsigned, 4> head{};
-  for (std::size_t i = 0; i < line.size() / 2; ++i) {
-    const auto byte = parse_whole<unsigned>(line.substr(1 + 2 * i, 2), 16);
-    if (!byte) return HexRecord::wrong;
-    if (i < head.size()) head[i] = *byte;
-    sum += *byte;
-  }
-  if (sum % 256 != 0 || line.size() != 11 + 2 * head[0]) return HexRecord::wrong;
-  return head[3] == 1 ? HexRecord::end : HexRecord::data;
-}
-
-/// Half an image would be worse than none.
 void check_image(const std::string& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error))
     throw ConfigError("{}: there is no such file; give --image FILE.hex", path);
-  std::ifstream in(path);
-  HexRecord last = HexRecord::wrong;
-  if (fs::file_size(path, error) <= kMaxImageBytes) {
-    for (std::string line; std::getline(in, line);) {
-      last = hex_record(line);
-      if (last != HexRecord::data) break;
-    }
-  }
-  if (last != HexRecord::end)
+  if (!is_whole_hex_image(text_of_file(path, kMaxImageBytes).value_or("")))
     throw ConfigError(
         "{}: not an Intel HEX file of an ATmega328P, or not a whole one; give --image FILE.hex",
         path);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -19,6 +20,32 @@ std::string joined(const std::vector<std::string_view>& names) {
   std::string out;
   for (std::string_view name : names) out += (out.empty() ? "" : ", ") + std::string(name);
   return out;
+}
+
+bool is_marker(std::string_view line, std::string_view marker) {
+  return line.starts_with(marker) && (line.size() == 3 || line[3] == ' ' || line[3] == '\t');
+}
+
+/// The line, from 1, on which a second document begins; 0: none. By its markers, which at the
+/// beginning of a line are part of no text (YAML 1.2, 9.1.2): yaml-cpp 0.7 passes it over, and its
+/// LoadAll() finds documents without end in some texts.
+int second_document(std::string_view text) {
+  bool begun = false, ended = false;
+  for (int number = 1; !text.empty(); ++number) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    const std::size_t first = line.find_first_not_of(" \t");
+    if (is_marker(line, "...")) {
+      ended = begun;
+    } else if (is_marker(line, "---") ||
+               (first != std::string_view::npos && line[first] != '#' && line[0] != '%')) {
+      if (ended || (begun && is_marker(line, "---"))) return number;
+      begun = true;
+    }
+  }
+  return 0;
 }
 
 }  // namespace
@@ -41,14 +68,13 @@ YamlReader YamlReader::from_file(const std::string& path) {
 }
 
 YamlReader YamlReader::from_text(const std::string& text, const std::string& name) {
+  if (const int line = second_document(text); line > 0) {
+    throw ConfigError("{}:{}: a second document begins here, and only one is read; remove it", name,
+                      line);
+  }
   YAML::Node root;
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1)
-      throw ConfigError(
-          "{}:{}: a second document begins here, behind '---', and only one is read; remove it",
-          name, documents[1].Mark().line + 1);
-    if (!documents.empty()) root = documents.front();
+    root = YAML::Load(text);
   } catch (const YAML::Exception& e) {
     throw ConfigError("{}:{}: not YAML: {}; check indentation, colons and brackets there", name,
                       e.mark.line + 1, e.msg);

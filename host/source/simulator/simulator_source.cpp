@@ -23,6 +23,8 @@
 #include "host/core/png/png.h"
 #include "host/source/simulator/trajectory.h"
 
+// Not fuzzed: decodes what it has encoded.
+
 namespace tagwrench {
 namespace {
 

@@ -13,6 +13,8 @@
 #include "host/sensor/sensor_config.h"
 #include "host/web/bridge/web_bridge.h"
 
+// Not fuzzed: fuzz.yaml_files has profiles, fuzz.web_messages what pages ask.
+
 namespace tagwrench {
 namespace {
 

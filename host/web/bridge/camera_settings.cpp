@@ -17,6 +17,8 @@
 #include "host/core/os/uninterrupted.h"
 #include "host/tracker/picture_quality.h"
 
+// Not fuzzed: names out of /proc and /sys, for people, cut at a line's end.
+
 namespace tagwrench {
 namespace {
 

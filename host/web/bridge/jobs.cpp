@@ -20,6 +20,8 @@
 #include "host/core/os/termination.h"
 #include "host/core/os/unique_fd.h"
 
+// Not fuzzed: fuzz.desk_words has the lines of jobs.
+
 namespace tagwrench {
 namespace {
 

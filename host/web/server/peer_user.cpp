@@ -15,6 +15,8 @@
 #include "host/core/os/uninterrupted.h"
 #include "host/core/os/unique_fd.h"
 
+// Not fuzzed: one message of the kernel's, of fixed size.
+
 namespace tagwrench {
 namespace {
 

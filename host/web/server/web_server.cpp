@@ -21,6 +21,8 @@
 #include "host/core/log.h"
 #include "host/web/server/peer_user.h"
 
+// Not fuzzed: Boost.Beast parses HTTP; fuzz.web_messages has what it means.
+
 namespace tagwrench {
 namespace {
 
