@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/os/remedy.h"
 #include "host/core/os/uninterrupted.h"
 #include "host/core/os/user_folders.h"
 #include "host/core/parse.h"
@@ -36,8 +37,8 @@ const sockaddr* generic(const sockaddr_un& address) {
 UniqueFd datagram_socket() {
   UniqueFd made(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!made)
-    throw ConfigError(std::string("tagwrench control: no socket to be had: ") +
-                      std::strerror(errno) + "; end other programs");
+    throw ConfigError("tagwrench control: no socket to be had: {}; {}", std::strerror(errno),
+                      remedy_for(errno, "end other programs"));
   return made;
 }
 

@@ -13,6 +13,7 @@
 #include <iterator>
 
 #include "host/core/config_error.h"
+#include "host/core/os/remedy.h"
 #include "host/core/os/text_file.h"
 #include "host/core/yaml/yaml_reader.h"
 #include "host/motion/focus_watch.h"
@@ -418,17 +419,20 @@ Profile ProfileFiles::checked(const std::string& text, const std::string& path) 
 void ProfileFiles::watch() {
   watch_.reset(inotify_init1(IN_CLOEXEC | IN_NONBLOCK));
   bool good = static_cast<bool>(watch_);
+  int error = errno;
   for (const File& file : files_) {
     // And where a link leads to.
     const fs::path real = fs::weakly_canonical(fs::path(file.folder) / file.name).parent_path();
     for (const fs::path& folder : {fs::path(file.folder), real}) {
-      good = good &&
-             inotify_add_watch(watch_.get(), folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO) >= 0;
+      if (!good) break;
+      good = inotify_add_watch(watch_.get(), folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO) >= 0;
+      error = errno;
     }
   }
   if (!good)
-    throw ConfigError(std::string("profiles: cannot be watched: ") + std::strerror(errno) +
-                      "; raise fs.inotify.max_user_watches, or take ready-made ones");
+    throw ConfigError(
+        "profiles: cannot be watched: {}; {}", std::strerror(error),
+        remedy_for(error, "raise fs.inotify.max_user_watches, or take ready-made ones"));
 }
 
 std::vector<ProfileFiles::Change> ProfileFiles::reread() {

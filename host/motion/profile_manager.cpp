@@ -13,9 +13,27 @@
 #include <sstream>
 
 #include "host/core/config_error.h"
+#include "host/core/os/remedy.h"
 
 namespace tagwrench {
 namespace {
+
+[[noreturn]] void no_descriptor(int error) {
+  throw ConfigError("profiles: no epoll or timer to be had: {}; {}", std::strerror(error),
+                    remedy_for(error, "end other programs"));
+}
+
+UniqueFd event_set() {
+  UniqueFd made(::epoll_create1(EPOLL_CLOEXEC));
+  if (!made) no_descriptor(errno);
+  return made;
+}
+
+UniqueFd lapse_timer() {
+  UniqueFd made(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
+  if (!made) no_descriptor(errno);
+  return made;
+}
 
 void add(const UniqueFd& events, int fd) {
   epoll_event wanted{};
@@ -39,22 +57,19 @@ ProfileManager::ProfileManager(ProfileFiles files, std::optional<ControlSocket> 
     : files_(std::move(files)),
       control_(std::move(control)),
       focus_(std::move(focus)),
-      events_(::epoll_create1(EPOLL_CLOEXEC)),
+      events_(event_set()),
       gesture_options_(profile().gestures),
       gestures_(gesture_options_),
       shaping_(profile().shaping),
       period_(period_of(profile().rate_hz)) {
   add(events_, files_.fd());
   if (control_) {
-    lapse_.reset(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
+    lapse_ = lapse_timer();
     reader_ = std::make_unique<TrialReader>();
     add(events_, reader_->fd());
     add(events_, control_->fd());
     add(events_, lapse_.get());
   }
-  if (!events_ || (control_ && !lapse_))
-    throw ConfigError(std::string("profiles: no epoll or timer to be had: ") +
-                      std::strerror(errno) + "; end other programs");
   if (focus_) {
     add(events_, focus_->fd());
     take_focus();  // what has come already wakes nobody

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/os/remedy.h"
 #include "host/motion/control_socket.h"
 
 namespace tagwrench {
@@ -41,8 +42,8 @@ TrialReader::Reading reading_of(TrialReader::Text given) {
 
 TrialReader::TrialReader() : done_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (!done_)
-    throw ConfigError(std::string("profiles: no event to be had: ") + std::strerror(errno) +
-                      "; end other programs");
+    throw ConfigError("profiles: no event to be had: {}; {}", std::strerror(errno),
+                      remedy_for(errno, "end other programs"));
   sigset_t all;
   sigset_t before;
   sigfillset(&all);

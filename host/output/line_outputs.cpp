@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/os/remedy.h"
 #include "host/core/os/termination.h"
 #include "host/core/os/uninterrupted.h"
 
@@ -75,7 +76,7 @@ TextSink::TextSink(const std::string& path, bool lossless)
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644));
   if (!fd) {
     const char* what = errno == ENXIO ? "start the reader of the named pipe first"
-                                      : "choose a file that can be written";
+                                      : remedy_for(errno, "choose a file that can be written");
     throw ConfigError("{}: cannot be written: {}; {}", path, std::strerror(errno), what);
   }
   adopt(fd.get());
@@ -107,8 +108,8 @@ void TextSink::adopt(int fd) {
   }
   if (!fd_) fd_.reset(fcntl(fd, F_DUPFD_CLOEXEC, 0));
   if (!fd_) {
-    throw ConfigError("{}: cannot be written: {}; redirect it somewhere", label_,
-                      std::strerror(errno));
+    throw ConfigError("{}: cannot be written: {}; {}", label_, std::strerror(errno),
+                      remedy_for(errno, "redirect it somewhere"));
   }
 }
 

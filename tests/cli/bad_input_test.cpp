@@ -89,6 +89,21 @@ TEST_F(BadInput, StandardOutputThatIsClosedIsNotWrittenToInVain) {
   EXPECT_NE(closed.err.find("standard output: is closed"), std::string::npos) << closed.err;
 }
 
+TEST_F(BadInput, WhereDescriptorsRunOutThatIsSaid) {
+  write_file(temporary_ / "mine.yaml", "name: mine\n");
+  for (int limit = 5; limit < 24; ++limit) {
+    const std::string command = "ulimit -n " + std::to_string(limit) +
+                                "; exec \"$0\" run --source sim --frames 2 --fast --profile " +
+                                (temporary_ / "mine.yaml").string() +
+                                " --output jsonl:/dev/null --output web:127.0.0.1:0";
+    const Outcome outcome =
+        Bridge({"-c", command, TAGWRENCH_PROGRAM}, "/dev/null", "/bin/bash").finish();
+    EXPECT_EQ(outcome.err.find("Bad file descriptor"), std::string::npos) << limit << outcome.err;
+    if (outcome.status == 0) break;
+    EXPECT_NE(outcome.err.find("Too many open files"), std::string::npos) << limit << outcome.err;
+  }
+}
+
 TEST_F(BadInput, NodeThatIsNoCamera) {
   expect_refused(run_source("v4l2:/dev/null"), 2, {"/dev/null"});
   EXPECT_FALSE(wrote_output());

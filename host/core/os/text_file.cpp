@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "host/core/config_error.h"
+#include "host/core/os/remedy.h"
 #include "host/core/os/unique_fd.h"
 
 namespace tagwrench {
@@ -17,8 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void cannot_read(const fs::path& path) {
-  throw ConfigError("{}: cannot be read ({}); check the path and its permissions", path.string(),
-                    std::strerror(errno));
+  throw ConfigError("{}: cannot be read ({}); {}", path.string(), std::strerror(errno),
+                    remedy_for(errno, "check the path and its permissions"));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/os/remedy.h"
 
 namespace tagwrench {
 namespace {
@@ -38,8 +39,8 @@ ControlLink::ControlLink(boost::asio::io_context& context, std::string path)
 void ControlLink::open() {
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (fd < 0)
-    throw ConfigError(std::string("web: no socket to be had: ") + std::strerror(errno) +
-                      "; end other programs");
+    throw ConfigError("web: no socket to be had: {}; {}", std::strerror(errno),
+                      remedy_for(errno, "end other programs"));
   socket_.assign(Protocol(), fd);
   socket_.non_blocking(true);
 }

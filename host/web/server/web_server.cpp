@@ -19,6 +19,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/log.h"
+#include "host/core/os/remedy.h"
 #include "host/web/server/peer_user.h"
 
 // Not fuzzed: Boost.Beast parses HTTP; fuzz.web_messages has what it means.
@@ -80,7 +81,8 @@ tcp::acceptor listener(asio::io_context& context, const WebOptions& options) {
                       options.option + ":ADDRESS:PORT");
   if (error)
     throw ConfigError(options.option + ": cannot listen at " + endpoint_text(endpoint) + ": " +
-                      error.message() + "; give an address of this computer");
+                      error.message() + "; " +
+                      remedy_for(error.value(), "give an address of this computer"));
   return acceptor;
 }
 
