@@ -9,8 +9,9 @@
 
 namespace tagwrench {
 
-/// As printable(), on one line. Never throws and hardly waits: a terminal that is closed, or stopped with Ctrl-S, or a pipe that
-/// nobody reads must not end or stall an instrument. What finds no room in 20 ms is lost.
+/// As printable(), on one line. Never throws and hardly waits: a terminal that is closed, or
+/// stopped with Ctrl-S, or a pipe that nobody reads must not end or stall an instrument. What finds
+/// no room in 20 ms is lost.
 void log_info(std::string_view line) noexcept;
 template <typename First, typename... Rest>
 void log_info(fmt::format_string<First, Rest...> text, First&& first, Rest&&... rest) {

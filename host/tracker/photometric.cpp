@@ -206,8 +206,7 @@ bool PhotometricAligner::judge_far(const PhotometricState& state) noexcept {
   }
   bool changed = false;
   for (std::size_t n = 0; n < sums_.size(); ++n) {
-    const bool inlier =
-        candidate(n) && mean[template_.patches[n].tag] <= squared(kWorstTag) * best;
+    const bool inlier = candidate(n) && mean[template_.patches[n].tag] <= squared(kWorstTag) * best;
     changed = changed || inlier != (inlier_[n] != 0);
     inlier_[n] = inlier ? 1 : 0;
   }
