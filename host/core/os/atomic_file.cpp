@@ -76,6 +76,18 @@ bool has_name(int fd) noexcept {
   return ::fstat(fd, &facts) == 0 && facts.st_nlink > 0;
 }
 
+/// False, and errno tells. A file system that cannot refuse by itself (NFS, say) is asked first.
+bool renamed(const fs::path& from, const fs::path& to, bool only_new) noexcept {
+  if (!only_new) return ::rename(from.c_str(), to.c_str()) == 0;
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
+  if (errno != EINVAL && errno != ENOSYS) return false;
+  if (::faccessat(AT_FDCWD, to.c_str(), F_OK, AT_SYMLINK_NOFOLLOW) == 0) {
+    errno = EEXIST;
+    return false;
+  }
+  return ::rename(from.c_str(), to.c_str()) == 0;
+}
+
 std::string name_for(const fs::path& target) {
   return (folder_of(target) / stem_of(target)).string() + std::string(kRandom);
 }
@@ -148,8 +160,7 @@ void NewFile::keep_mode_of_target() {
 void NewFile::take_the_name(Existing existing) {
   keep_mode_of_target();
   if (::fsync(file_.get()) != 0) cannot_write<std::runtime_error>(target_);
-  const unsigned flags = existing == Existing::refused ? RENAME_NOREPLACE : 0;
-  if (::renameat2(AT_FDCWD, name_.c_str(), AT_FDCWD, target_.c_str(), flags) != 0) {
+  if (!renamed(name_, target_, existing == Existing::refused)) {
     if (errno == EEXIST)
       throw std::runtime_error(
           fmt::format("{}: is there already; give another name, or --force", target_.string()));
