@@ -1,6 +1,7 @@
 #include "host/web/server/peer_user.h"
 
 #include <arpa/inet.h>
+#include <fmt/format.h>
 #include <linux/inet_diag.h>
 #include <linux/netlink.h>
 #include <linux/sock_diag.h>
@@ -11,11 +12,14 @@
 
 #include <array>
 #include <cstring>
+#include <fstream>
+#include <sstream>
+#include <string>
 
 #include "host/core/os/uninterrupted.h"
 #include "host/core/os/unique_fd.h"
 
-// Not fuzzed: one message of the kernel's, of fixed size.
+// Not fuzzed: one message of the kernel's, of fixed size, and its table.
 
 namespace tagwrench {
 namespace {
@@ -101,16 +105,26 @@ bool is_connection(const inet_diag_msg& answer, const Endpoint& theirs,
          endpoint_of(answer.idiag_family, id.idiag_dst, id.idiag_dport) == ours;
 }
 
-}  // namespace
+/// Of both ends of a connected socket; of no family, if it is none.
+struct Ends {
+  explicit Ends(int socket) noexcept
+      : theirs(endpoint(socket, ::getpeername)), ours(endpoint(socket, ::getsockname)) {}
+  bool known() const noexcept { return theirs.family != AF_UNSPEC && theirs.family == ours.family; }
+  Endpoint theirs, ours;
+};
 
-std::optional<uid_t> peer_user(int socket) noexcept {
-  const Endpoint theirs = endpoint(socket, ::getpeername);
-  const Endpoint ours = endpoint(socket, ::getsockname);
-  if (theirs.family == AF_UNSPEC || theirs.family != ours.family) return {};
+/// What its program has closed belongs to nobody any more, and reads as if it were root's.
+std::optional<uid_t> holder(std::uint64_t inode, uid_t user) noexcept {
+  if (inode == 0) return {};
+  return user;
+}
+
+/// sock_diag(7). `asked`: the kernel has answered, if only that there is no such connection.
+std::optional<uid_t> user_by_netlink(const Ends& ends, bool& asked) noexcept {
   const UniqueFd kernel(::socket(AF_NETLINK, SOCK_DGRAM | SOCK_CLOEXEC, NETLINK_SOCK_DIAG));
   if (!kernel) return {};
   ::setsockopt(kernel.get(), SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
-  const Request request = request_for(theirs, ours);
+  const Request request = request_for(ends.theirs, ends.ours);
   sockaddr_nl to{};
   to.nl_family = AF_NETLINK;
   if (::sendto(kernel.get(), &request, sizeof request, 0, reinterpret_cast<const sockaddr*>(&to),
@@ -128,10 +142,56 @@ std::optional<uid_t> peer_user(int socket) noexcept {
   if (from.nl_pid != 0 || size < static_cast<ssize_t>(NLMSG_LENGTH(sizeof answer))) return {};
   std::memcpy(&head, bytes.data(), sizeof head);
   std::memcpy(&answer, bytes.data() + NLMSG_HDRLEN, sizeof answer);
-  if (head.nlmsg_type != SOCK_DIAG_BY_FAMILY || !is_connection(answer, theirs, ours)) return {};
-  // What its program has closed belongs to nobody any more, and reads as if it were root's.
-  if (answer.idiag_inode == 0) return {};
-  return answer.idiag_uid;
+  if (head.nlmsg_type != SOCK_DIAG_BY_FAMILY) return {};  // without the module, an error
+  asked = true;
+  if (!is_connection(answer, ends.theirs, ends.ours)) return {};
+  return holder(answer.idiag_inode, answer.idiag_uid);
+}
+
+/// As /proc/net/tcp and tcp6 have it (proc(5)): words of the address as they lie in memory.
+std::string table_text(const Endpoint& at, bool in_six) {
+  std::array<std::uint32_t, 4> words = at.address;
+  std::size_t count = in_six ? 4 : 1;
+  if (in_six && at.family == AF_INET) words = {0, 0, htonl(0xffff), at.address[0]};
+  std::string text;
+  for (std::size_t i = 0; i < count; ++i) text += fmt::format("{:08X}", words[i]);
+  return fmt::format("{}:{:04X}", text, ntohs(at.port));
+}
+
+}  // namespace
+
+std::optional<uid_t> user_in_table(int socket) {
+  const Ends ends(socket);
+  if (!ends.known()) return {};
+  for (const bool six : {false, true}) {
+    if (!six && ends.theirs.family == AF_INET6) continue;
+    const std::string wanted =
+        ' ' + table_text(ends.theirs, six) + ' ' + table_text(ends.ours, six) + ' ';
+    std::ifstream table(six ? "/proc/net/tcp6" : "/proc/net/tcp");
+    for (std::string line; std::getline(table, line);) {
+      if (line.find(wanted) == std::string::npos) continue;
+      std::istringstream fields(line);
+      std::string skipped;
+      uid_t user = 0;
+      std::uint64_t inode = 0;
+      for (int i = 0; i < 7; ++i) fields >> skipped;  // up to retrnsmt
+      if (fields >> user >> skipped >> inode) return holder(inode, user);
+    }
+  }
+  return {};
+}
+
+std::optional<uid_t> peer_user(int socket) noexcept {
+  const Ends ends(socket);
+  if (!ends.known()) return {};
+  bool asked = false;
+  const std::optional<uid_t> user = user_by_netlink(ends, asked);
+  if (asked) return user;
+  try {
+    return user_in_table(socket);
+  } catch (const std::exception&) {  // out of memory
+    return {};
+  }
 }
 
 bool is_our_user(std::optional<uid_t> user) noexcept {

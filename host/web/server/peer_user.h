@@ -13,6 +13,10 @@ namespace tagwrench {
 /// does not tell (sock_diag(7)). Blocks for the time of one look-up, some microseconds.
 std::optional<uid_t> peer_user(int socket) noexcept;
 
+/// The same out of /proc/net/tcp: where the kernel has no sock_diag, and may load no module. Reads
+/// through all connections of the machine.
+std::optional<uid_t> user_in_table(int socket);
+
 /// Whether that is us, or root, who may do as he likes anyway. A user whom a namespace hides (the
 /// kernel's overflow number) is nobody.
 bool is_our_user(std::optional<uid_t> user) noexcept;

@@ -51,6 +51,8 @@ TEST(WebPeer, IsTheUserWhoseProgramHoldsTheOtherEnd) {
     if (!pair.there) GTEST_SKIP() << number << " is not to be had here";
     EXPECT_EQ(peer_user(pair.server.get()), ::geteuid()) << number;
     EXPECT_EQ(peer_user(pair.client.get()), ::geteuid()) << number;
+    EXPECT_EQ(user_in_table(pair.server.get()), ::geteuid()) << number << ", by the table";
+    EXPECT_EQ(user_in_table(pair.client.get()), ::geteuid()) << number << ", by the table";
   }
 }
 
@@ -59,6 +61,7 @@ TEST(WebPeer, ThatHasClosedItsEndIsNobodyAndNotRoot) {
   ASSERT_TRUE(pair.there);
   pair.client.reset();
   EXPECT_EQ(peer_user(pair.server.get()), std::nullopt);
+  EXPECT_EQ(user_in_table(pair.server.get()), std::nullopt);
 }
 
 TEST(WebPeer, OfWhatIsNoConnectionIsNobody) {
