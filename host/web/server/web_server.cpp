@@ -165,7 +165,7 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
     server_.connections_.erase(this);
   }
   bool is_turned_away() const noexcept { return turned_away_; }
-  /// Has not asked for anything, this time.
+  /// Has not asked for anything, this time, or has its answer.
   bool is_idle() const noexcept { return idle_; }
   TimePoint idle_since() const noexcept { return idle_since_; }
   const Peer& peer() const noexcept { return peer_; }
@@ -186,8 +186,9 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
   }
   void handle(const error_code& error) {
     idle_ = false;
-    if (ended_ || error == http::error::end_of_stream || error == asio::error::operation_aborted)
-      return end();
+    const bool cut = error == http::error::partial_message && !parser_->is_header_done();
+    const bool gone = cut || error == http::error::end_of_stream;  // nobody is left to be answered
+    if (ended_ || gone || error == asio::error::operation_aborted) return end();
     if (error) return failed(error);
     handle_request();
   }
@@ -267,7 +268,9 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
   }
   /// Closed at once, what it is still sending would make the kernel throw away the answer.
   void linger() {
-    deadline_ = std::chrono::steady_clock::now() + kLinger;
+    idle_ = true;  // has its answer
+    idle_since_ = std::chrono::steady_clock::now();
+    deadline_ = idle_since_ + kLinger;
     error_code ignored;
     socket_.shutdown(tcp::socket::shutdown_send, ignored);
     outgoing_.resize(kPiece);

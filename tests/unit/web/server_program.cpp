@@ -97,7 +97,8 @@ class MadeUpSensor {
 
 /// What waits for seconds waits a part of it.
 void hurry(WebPatience& patience, int factor) {
-  for (Duration* time : {&patience.request, &patience.unread, &patience.ping, &patience.silence})
+  for (Duration* time :
+       {&patience.header, &patience.request, &patience.unread, &patience.ping, &patience.silence})
     *time /= factor;
 }
 
