@@ -273,7 +273,7 @@ std::string up_command(const GadgetOptions& options) {
   if (node.error == EACCES || node.error == EPERM) {
     throw ConfigError(
         "gadget {}: {}: permission denied; install 70-tagwrench.rules in /etc/udev/rules.d and "
-        "join the group input, or run as root",
+        "join the group tagwrench, or run as root",
         which, node.path);
   }
   throw ConfigError("gadget {}: {}: {}; make it anew: {}", which,

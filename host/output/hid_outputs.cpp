@@ -1,10 +1,9 @@
 #include "host/output/hid_outputs.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <linux/uinput.h>
 #include <poll.h>
 #include <sys/ioctl.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -13,6 +12,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
+#include "host/output/device_service.h"
 
 namespace tagwrench {
 namespace {
@@ -47,6 +47,12 @@ ssize_t write_event(const UniqueFd& uhid, const void* event, std::size_t size) {
   return uninterrupted([&] { return ::write(uhid.get(), event, size); });
 }
 
+std::string no_longer_taken(const std::string& device, int error) {
+  if (error == EPIPE) return device + ": the service of devices has ended; start again";
+  return fmt::format("{}: the kernel no longer takes reports: {}; start again", device,
+                     std::strerror(error));
+}
+
 constexpr std::uint16_t k3dconnexion = 0x256f;
 constexpr std::uint16_t kLogitech = 0x046d;
 
@@ -57,7 +63,6 @@ const UhidIdentity& checked(const UhidIdentity& identity) {
                     "use 256f:c62e or an id of your own");
 }
 
-constexpr const char* kPath = "/dev/uinput";
 constexpr std::uint16_t kAxes[] = {ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ};
 
 // Six absolute axes without any key would be an accelerometer to udev and SDL; these codes mean
@@ -71,53 +76,55 @@ bool order(int fd, unsigned long request, Argument... argument) {
   return uninterrupted([&] { return ::ioctl(fd, request, argument...); }) == 0;
 }
 
-uinput_setup setup_of(const JoystickOptions& options) {
-  uinput_setup setup{};
-  if (options.name.empty() || options.name.size() >= sizeof setup.name || !printable(options.name))
-    throw ConfigError("joystick name: must be 1 to 79 printable bytes; change it");
-  std::memcpy(setup.name, options.name.data(), options.name.size());
-  // Games that look for a bus, vendor and product skip devices without them.
-  setup.id = {BUS_USB, options.vendor, options.product, 0x0100};
-  return setup;
-}
-
 }  // namespace
 
 std::string hex_id(std::uint16_t vendor, std::uint16_t product) {
   return fmt::format("{:04x}:{:04x}", vendor, product);
 }
 
-std::string cannot_open_node(const std::string& path, const char* module, int error) {
-  switch (error) {
-    case EACCES:
-    case EPERM:
-      return fmt::format(
-          "{}: permission denied; install 70-tagwrench.rules in /etc/udev/rules.d and join the "
-          "group input, or run as root",
-          path);
-    case ENOENT:
-    case ENODEV:
-    case ENXIO:
-      return fmt::format("{}: not there; load the kernel module: sudo modprobe {}", path, module);
-    default:
-      return fmt::format("{}: {}; check it with: ls -l {}", path, std::strerror(error), path);
-  }
+std::unique_ptr<uhid_event> uhid_creation(const UhidIdentity& identity,
+                                          std::span<const std::uint8_t> descriptor) {
+  auto event = std::make_unique<uhid_event>();
+  event->type = UHID_CREATE2;
+  uhid_create2_req& request = event->u.create2;
+  if (identity.name.empty()) throw ConfigError("HID name: empty; give the device a name");
+  copy_text(identity.name, request.name, "name");
+  copy_text("tagwrench", request.phys, "location");
+  copy_text(identity.serial, request.uniq, "serial");
+  if (descriptor.size() > sizeof request.rd_data)
+    throw ConfigError(identity.name + ": report descriptor too long; shorten it");
+  std::memcpy(request.rd_data, descriptor.data(), descriptor.size());
+  request.rd_size = static_cast<std::uint16_t>(descriptor.size());
+  // hidapi before 0.16 does not list BUS_VIRTUAL.
+  request.bus = BUS_USB;
+  request.vendor = identity.vendor;
+  request.product = identity.product;
+  request.version = 0x0100;
+  return event;
 }
 
-UniqueFd UhidDevice::open() {
-  UniqueFd fd(::open(kPath, O_RDWR | O_CLOEXEC | O_NONBLOCK));
-  if (!fd) throw ConfigError(cannot_open_node(kPath, "uhid", errno));
-  return fd;
+std::vector<std::uint8_t> uhid_input(std::span<const std::uint8_t> report) {
+  ShortInput input;
+  const std::size_t size = std::min(report.size(), sizeof input.data);
+  input.size = static_cast<std::uint16_t>(size);
+  std::memcpy(input.data, report.data(), size);
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&input);
+  return {bytes, bytes + kInputHeader + size};
 }
+
+UniqueFd UhidDevice::open() { return open_device_node(kUhidNode).fd; }
 
 UhidDevice::UhidDevice(UniqueFd uhid, const UhidIdentity& identity,
                        std::span<const std::uint8_t> descriptor,
                        std::chrono::milliseconds start_timeout)
     : uhid_(std::move(uhid)),
-      label_(fmt::format("{}: {} ({})", kPath, identity.name,
+      label_(fmt::format("{}: {} ({})", kUhidNode.path(), identity.name,
                          hex_id(identity.vendor, identity.product))),
-      event_(std::make_unique<uhid_event>()) {
-  create(identity, descriptor);
+      event_(uhid_creation(identity, descriptor)) {
+  if (write_event(uhid_, event_.get(), sizeof(uhid_event)) < 0) {
+    throw ConfigError("{}: the kernel refused the device: {}; see dmesg", label_,
+                      std::strerror(errno));
+  }
   wait_for_start(identity, start_timeout);
 }
 
@@ -127,33 +134,10 @@ UhidDevice::~UhidDevice() {
   [[maybe_unused]] const ssize_t written = write_event(uhid_, &destroy, sizeof destroy);
 }
 
-void UhidDevice::create(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor) {
-  *event_ = {};
-  event_->type = UHID_CREATE2;
-  uhid_create2_req& request = event_->u.create2;
-  if (identity.name.empty()) throw ConfigError("HID name: empty; give the device a name");
-  copy_text(identity.name, request.name, "name");
-  copy_text("tagwrench", request.phys, "location");
-  copy_text(identity.serial, request.uniq, "serial");
-  if (descriptor.size() > sizeof request.rd_data)
-    throw ConfigError(label_ + ": report descriptor too long; shorten it");
-  std::memcpy(request.rd_data, descriptor.data(), descriptor.size());
-  request.rd_size = static_cast<std::uint16_t>(descriptor.size());
-  // hidapi before 0.16 does not list BUS_VIRTUAL.
-  request.bus = BUS_USB;
-  request.vendor = identity.vendor;
-  request.product = identity.product;
-  request.version = 0x0100;
-  if (write_event(uhid_, event_.get(), sizeof(uhid_event)) < 0) {
-    throw ConfigError("{}: the kernel refused the device: {}; see dmesg", label_,
-                      std::strerror(errno));
-  }
-}
-
 void UhidDevice::wait_for_start(const UhidIdentity& identity, std::chrono::milliseconds timeout) {
   using Clock = std::chrono::steady_clock;
   const auto give_up = Clock::now() + timeout;
-  while (true) {
+  while (!service_gone_) {
     while (read_event()) {
       if (event_->type == UHID_START) return;
       if (event_->type == UHID_GET_REPORT) answer_get_report();
@@ -163,6 +147,12 @@ void UhidDevice::wait_for_start(const UhidIdentity& identity, std::chrono::milli
     pollfd waiting{uhid_.get(), POLLIN, 0};
     if (::poll(&waiting, 1, static_cast<int>(left.count())) < 0 && errno != EINTR) break;
     if ((waiting.revents & POLLIN) == 0 && (waiting.revents & (POLLHUP | POLLERR)) != 0) break;
+  }
+  if (service_gone_) {
+    throw ConfigError(
+        "{}: the service of devices does not make one of this id; use 256f:c62e or one of vendor "
+        "1209, or open /dev/uhid to yourself (71-tagwrench-direct.rules)",
+        label_);
   }
   throw ConfigError(
       "{}: the kernel did not start a device with id {}; load its driver: sudo modprobe "
@@ -185,13 +175,11 @@ SendStatus UhidDevice::send(std::span<const std::uint8_t> report) noexcept {
   return SendStatus::ok;
 }
 
-std::string UhidDevice::failure() const {
-  return fmt::format("{}: the kernel no longer takes reports: {}; start again", label_,
-                     std::strerror(error_));
-}
+std::string UhidDevice::failure() const { return no_longer_taken(label_, error_); }
 
 bool UhidDevice::read_event() noexcept {
   const ssize_t got = ::read(uhid_.get(), event_.get(), sizeof(uhid_event));
+  if (got == 0) service_gone_ = true;
   if (got < static_cast<ssize_t>(sizeof event_->type)) return false;
   // A short event leaves no bytes of the one before it.
   std::memset(reinterpret_cast<char*>(event_.get()) + got, 0,
@@ -247,14 +235,8 @@ WatchdogDevice UhidDevice::watchdog_device(
     std::initializer_list<std::span<const std::uint8_t>> neutral) const {
   WatchdogDevice device;
   device.fd = uhid_.get();
-  for (const std::span<const std::uint8_t> report : neutral) {
-    ShortInput input;
-    const std::size_t size = std::min(report.size(), sizeof input.data);
-    input.size = static_cast<std::uint16_t>(size);
-    std::memcpy(input.data, report.data(), size);
-    const auto* bytes = reinterpret_cast<const std::uint8_t*>(&input);
-    device.neutral.emplace_back(bytes, bytes + kInputHeader + size);
-  }
+  for (const std::span<const std::uint8_t> report : neutral)
+    device.neutral.push_back(uhid_input(report));
   const std::uint32_t destroy = UHID_DESTROY;
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(&destroy);
   device.destroy.assign(bytes, bytes + sizeof destroy);
@@ -328,30 +310,51 @@ JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noe
   return events;
 }
 
-JoystickOutput::JoystickOutput(const JoystickOptions& options) {
-  uinput_setup setup = setup_of(options);
-  uinput_.reset(::open(kPath, O_WRONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!uinput_) throw ConfigError(cannot_open_node(kPath, "uinput", errno));
-  const int fd = uinput_.get();
-  bool good = order(fd, UI_SET_EVBIT, EV_KEY) && order(fd, UI_SET_EVBIT, EV_ABS);
-  for (const int button : kButtons) good = good && order(fd, UI_SET_KEYBIT, button);
+uinput_setup joystick_setup(const JoystickOptions& options) {
+  uinput_setup setup{};
+  if (options.name.empty() || options.name.size() >= sizeof setup.name || !printable(options.name))
+    throw ConfigError("joystick name: must be 1 to 79 printable bytes; change it");
+  std::memcpy(setup.name, options.name.data(), options.name.size());
+  // Games that look for a bus, vendor and product skip devices without them.
+  setup.id = {BUS_USB, options.vendor, options.product, 0x0100};
+  return setup;
+}
+
+bool make_joystick(int uinput, const uinput_setup& setup) noexcept {
+  bool good = order(uinput, UI_SET_EVBIT, EV_KEY) && order(uinput, UI_SET_EVBIT, EV_ABS);
+  for (const int button : kButtons) good = good && order(uinput, UI_SET_KEYBIT, button);
   for (const std::uint16_t axis : kAxes) {
     uinput_abs_setup abs{};
     abs.code = axis;
     abs.absinfo.minimum = -kJoystickLimit_counts;
     abs.absinfo.maximum = kJoystickLimit_counts;
-    good = good && order(fd, UI_ABS_SETUP, &abs);
+    good = good && order(uinput, UI_ABS_SETUP, &abs);
   }
-  good = good && order(fd, UI_DEV_SETUP, &setup) && order(fd, UI_DEV_CREATE);
-  if (!good) {
-    throw ConfigError(std::string(kPath) + ": the kernel refused " + options.name + ": " +
-                      std::strerror(errno) + "; it needs Linux 4.5 or later");
+  return good && order(uinput, UI_DEV_SETUP, &setup) && order(uinput, UI_DEV_CREATE);
+}
+
+JoystickOutput::JoystickOutput(const JoystickOptions& options) {
+  const uinput_setup setup = joystick_setup(options);
+  OpenedNode node = open_device_node(kUinputNode);
+  uinput_ = std::move(node.fd);
+  const int fd = uinput_.get();
+  if (node.lent) {
+    errno = ::send(fd, &setup, sizeof setup, MSG_NOSIGNAL) < 0 ? errno : device_answer(fd);
+  } else {
+    errno = make_joystick(fd, setup) ? 0 : errno;
+  }
+  if (errno != 0) {
+    throw ConfigError("{}: {} is refused: {}; it needs Linux 4.5 or later", kUinputNode.path(),
+                      options.name, std::strerror(errno));
   }
 }
 
 JoystickOutput::~JoystickOutput() {
   JoystickOutput::move(Sample{});
-  order(uinput_.get(), UI_DEV_DESTROY);  // the watchdog's duplicate of the fd would keep it alive
+  // The watchdog's duplicate of the fd would keep it alive. The node knows one, a connection to the
+  // service the other.
+  order(uinput_.get(), UI_DEV_DESTROY);
+  ::shutdown(uinput_.get(), SHUT_RDWR);
 }
 
 SendStatus JoystickOutput::move(const Sample& sample) noexcept {
@@ -364,10 +367,7 @@ SendStatus JoystickOutput::move(const Sample& sample) noexcept {
   return SendStatus::failed;
 }
 
-std::string JoystickOutput::failure() const {
-  return fmt::format("{}: the kernel no longer takes events: {}; start again", kPath,
-                     std::strerror(error_));
-}
+std::string JoystickOutput::failure() const { return no_longer_taken(kUinputNode.path(), error_); }
 
 void JoystickOutput::add_to(std::vector<WatchdogDevice>& devices) const {
   const JoystickEvents neutral = joystick_events({}, 0);

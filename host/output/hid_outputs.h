@@ -1,10 +1,12 @@
 // Virtual devices of this computer: a SpaceMouse and a sensor in newtons through /dev/uhid (Linux
 // Documentation/hid/uhid.rst), with evdev node, hidraw node and LED back-channel as real USB
-// devices have them; a joystick through /dev/uinput.
+// devices have them; a joystick through /dev/uinput. Or through the service that stands for these
+// nodes, see device_service.h.
 #pragma once
 
 #include <linux/input.h>
 #include <linux/uhid.h>
+#include <linux/uinput.h>
 
 #include <array>
 #include <chrono>
@@ -37,17 +39,24 @@ struct HidOutputReport {
   std::size_t size = 0;
 };
 
+/// The event that creates the device on BUS_USB. Throws ConfigError: a text or the descriptor does
+/// not fit.
+std::unique_ptr<uhid_event> uhid_creation(const UhidIdentity& identity,
+                                          std::span<const std::uint8_t> descriptor);
+
+/// The event of one input report, report id first, at most 64 bytes.
+std::vector<std::uint8_t> uhid_input(std::span<const std::uint8_t> report);
+
 class UhidDevice {
  public:
-  static constexpr const char* kPath = "/dev/uhid";
   /// With its driver loaded, the kernel takes milliseconds; the rest is for a slow machine.
   static constexpr std::chrono::milliseconds kStartTimeout{3000};
 
-  /// Opens /dev/uhid. Throws ConfigError: it is not there, no permission.
+  /// Opens /dev/uhid or what stands for it. Throws ConfigError, see open_device_node().
   static UniqueFd open();
 
-  /// Creates the device on BUS_USB and waits until the kernel has started it. Throws ConfigError:
-  /// refused by the kernel, not started in time.
+  /// Creates the device and waits until the kernel has started it. Throws ConfigError: refused by
+  /// the kernel or the service, not started in time.
   UhidDevice(UniqueFd uhid, const UhidIdentity& identity, std::span<const std::uint8_t> descriptor,
              std::chrono::milliseconds start_timeout = kStartTimeout);
 
@@ -62,8 +71,8 @@ class UhidDevice {
   /// Answers what the kernel asks, and returns the next output report of a client, if any.
   std::optional<HidOutputReport> next_output() noexcept;
 
-  /// Readable when next_output() has something to do.
-  int fd() const noexcept { return uhid_.get(); }
+  /// Readable when next_output() has something to do; -1 after the service has gone.
+  int fd() const noexcept { return service_gone_ ? -1 : uhid_.get(); }
 
   /// One line about the last failed send().
   std::string failure() const;
@@ -73,7 +82,6 @@ class UhidDevice {
       std::initializer_list<std::span<const std::uint8_t>> neutral) const;
 
  private:
-  void create(const UhidIdentity& identity, std::span<const std::uint8_t> descriptor);
   void wait_for_start(const UhidIdentity& identity, std::chrono::milliseconds timeout);
   bool read_event() noexcept;
   void answer_get_report() noexcept;
@@ -82,14 +90,12 @@ class UhidDevice {
   std::string label_;  ///< of messages: "/dev/uhid: tagwrench SpaceMouse (256f:c62e)"
   std::unique_ptr<uhid_event> event_;  ///< 4380 bytes, read again and again
   HidOutputReport last_input_;         ///< what GET_REPORT is answered with
+  bool service_gone_ = false;
   int error_ = 0;
 };
 
 /// "256f:c62e"
 std::string hex_id(std::uint16_t vendor, std::uint16_t product);
-
-/// One line about a node (/dev/uhid, /dev/uinput) that does not open: path, cause, remedy.
-std::string cannot_open_node(const std::string& path, const char* module, int error);
 
 // A virtual SpaceMouse: spacenavd, hidapi programs and browsers take it for 3Dconnexion's Wireless.
 
@@ -186,6 +192,12 @@ inline constexpr std::size_t kJoystickButtons = 8;
 /// them one frame.
 using JoystickEvents = std::array<input_event, 6 + kJoystickButtons + 1>;
 JoystickEvents joystick_events(const Counts6& counts, std::uint32_t pressed) noexcept;
+
+/// What uinput is told of the joystick. Throws ConfigError: the name does not fit.
+uinput_setup joystick_setup(const JoystickOptions& options);
+
+/// Makes the joystick of a node of uinput; false: refused by the kernel, see errno.
+bool make_joystick(int uinput, const uinput_setup& setup) noexcept;
 
 /// Sends Sample::deflection as +-32767, and the buttons. No dither: games read states, not events.
 class JoystickOutput : public Output {

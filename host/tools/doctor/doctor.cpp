@@ -22,6 +22,7 @@
 #include "host/core/os/user_folders.h"
 #include "host/core/parse.h"
 #include "host/motion/control_socket.h"
+#include "host/output/device_service.h"
 #include "host/output/spnav_daemon.h"
 #include "host/source/v4l2_device.h"
 
@@ -30,7 +31,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kGroup = "input";  // of 70-tagwrench.rules
 constexpr std::string_view kUnit = "tagwrench.service";
 
 bool present(const fs::path& path) {
@@ -147,33 +147,23 @@ void say_rule(Report& report) {
     report.line(Mark::ok, "udev rule {}", rule.string());
     return;
   }
-  report.line(::getuid() == 0 ? Mark::absent : Mark::missing,
-              "no udev rule, so only root can make devices: install the package, or sudo cmake "
-              "--install build, then sudo udevadm control --reload && sudo udevadm trigger");
+  report.line(
+      ::getuid() == 0 ? Mark::absent : Mark::missing,
+      "no udev rule, so only root can make or read devices: install the package, or sudo cmake "
+      "--install build, then sudo udevadm control --reload && sudo udevadm trigger");
 }
 
-bool say_device_node(Report& report, const fs::path& node, const char* module, const char* use) {
-  const UniqueFd fd(::open(node.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
-  if (fd) {
-    report.line(Mark::ok, "{} can be opened ({})", node.string(), use);
+bool say_device_node(Report& report, const DeviceNode& node, const char* use) {
+  try {
+    report.line(Mark::ok, "{} {} ({})", node.path(),
+                open_device_node(node).lent ? "need not be opened: the service makes its devices"
+                                            : "can be opened",
+                use);
     return true;
+  } catch (const ConfigError& e) {
+    report.line(Mark::missing, "{}; needed for {}", e.what(), use);
+    return false;
   }
-  const int error = errno;
-  // The node may be a promise of a module that opening it would load.
-  if (error == ENOENT || error == ENODEV || error == ENXIO) {
-    const bool loaded = present(fs::path("/sys/module") / module);
-    report.line(
-        Mark::missing, "{}: {}; needed for {}: sudo modprobe {}", node.string(),
-        loaded ? "the module is loaded but there is no device node" : "the module is not loaded",
-        use, module);
-  } else if (error == EACCES || error == EPERM) {
-    report.line(Mark::missing, "{}: no permission; needed for {}: {}", node.string(), use,
-                access_advice(look_at_access(node)));
-  } else {
-    report.line(Mark::missing, "{}: cannot be opened: {}; needed for {}", node.string(),
-                std::strerror(error), use);
-  }
-  return false;
 }
 
 void say_hidraw(Report& report) {
@@ -325,17 +315,17 @@ std::string access_advice(const NodeAccess& access) {
            "trigger";
   }
   if (access.member && !access.member_now)
-    return "you are in group input since after you logged in: log out and in again";
-  return "only who sits at this computer, logged in, may, and the group input; over ssh, or "
-         "without a desktop: sudo usermod -aG input $USER, then log in again";
+    return "you are in group tagwrench since after you logged in: log out and in again";
+  return "only who sits at this computer, logged in, may, and the group tagwrench; over ssh, or "
+         "without a desktop: sudo usermod -aG tagwrench $USER, then log in again";
 }
 
 NodeAccess look_at_access(const fs::path& node) {
   NodeAccess access;
   access.rule_installed = !installed_rule().empty();
-  const group* input = ::getgrnam(kGroup);
-  if (input == nullptr) return access;
-  const gid_t id = input->gr_gid;
+  const group* readers = ::getgrnam(kDeviceGroup);
+  if (readers == nullptr) return access;
+  const gid_t id = readers->gr_gid;
   struct stat found {};
   constexpr mode_t kBoth = S_IRGRP | S_IWGRP;
   access.rule_applied =
@@ -471,9 +461,8 @@ int run_doctor(std::ostream& out) {
   say_groups(report);
   say_cameras(report);
   say_serial_ports(report);
-  const bool uhid =
-      say_device_node(report, "/dev/uhid", "uhid", "the outputs spacemouse and wrench");
-  const bool uinput = say_device_node(report, "/dev/uinput", "uinput", "the output joystick");
+  const bool uhid = say_device_node(report, kUhidNode, "the outputs spacemouse and wrench");
+  const bool uinput = say_device_node(report, kUinputNode, "the output joystick");
   say_rule(report);
   say_hidraw(report);
   say_bridges(report);

@@ -21,7 +21,7 @@ namespace tagwrench {
 
 /// Writes one line a finding: "ok" works, "--" is not there and not needed, "!!" is missing, with
 /// the remedy behind it. Returns 0 when everything that a virtual device needs is in place
-/// (/dev/uhid and /dev/uinput can be opened), else 1: the simulated sensor stands in for a camera.
+/// (/dev/uhid and /dev/uinput, or the service that stands for them), else 1: the simulated sensor stands in for a camera.
 int run_doctor(std::ostream& out);
 
 /// An input device that clients of spacenavd take for a 6-DOF one.
@@ -59,13 +59,13 @@ class Report {
   std::ostream& out_;
 };
 
-// May this user open the nodes that virtual devices need, and if not, why not.
+// May this user open the nodes of virtual devices, and if not, why not.
 
-/// What decides whether a node that the udev rule gives to group `input` can be opened.
+/// What decides whether a node that the udev rule gives to group `tagwrench` can be opened.
 struct NodeAccess {
   bool rule_installed = false;
-  bool rule_applied = false;  ///< the node belongs to `input`, which may read and write it
-  bool member = false;        ///< the user is in `input`, by the system's list of groups
+  bool rule_applied = false;  ///< the node belongs to the group, which may read and write it
+  bool member = false;        ///< the user is in it, by the system's list of groups
   bool member_now = false;    ///< and this login knows it
 };
 

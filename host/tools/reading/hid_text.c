@@ -40,7 +40,7 @@ static void say_rule(const char* path, uint16_t vendor, uint16_t product, char* 
   if (ours) {
     snprintf(why, size,
              "%s: no permission; install 70-tagwrench.rules in /etc/udev/rules.d (it lets in the "
-             "user at the seat and the group input), or run as root",
+             "user at the seat and the group tagwrench), or run as root",
              path);
     return;
   }

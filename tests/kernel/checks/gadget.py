@@ -78,7 +78,7 @@ def check_before(setup):
     rig.check("a gadget of somebody else is as it was", open(f"{FOREIGN}/idVendor", encoding="utf-8").read() == "0x1d6b\n"
               and open(f"{FOREIGN}/UDC", encoding="utf-8").read() == "\n")
     mode = rig.wait_until(lambda: os.path.exists("/dev/hidg0") and os.stat("/dev/hidg0").st_mode & 0o777 == 0o660)
-    rig.check("our udev rule lets group input write to the node", mode)
+    rig.check("our udev rule lets group tagwrench write to the node", mode)
 
 
 def bridge_on(setup, feeder, *more):

@@ -1,4 +1,4 @@
-"""An ordinary user of the groups input and video, our udev rule, and a real systemd-udevd run the whole of it."""
+"""An ordinary user of the groups tagwrench and video, our udev rules, that for opening the nodes too, and a real systemd-udevd run the whole of it."""
 import os
 
 import rig
@@ -21,9 +21,9 @@ def body(setup):
                   status == 2 and len(refused.err) == 1 and node in refused.err[0], refused.state())
 
     os.chmod("/dev/video0", 0o600)
-    rig.start_udevd(setup.project + "/host/output/70-tagwrench.rules")
+    rig.start_udevd(setup.project + "/host/output/70-tagwrench.rules", setup.project + "/host/output/71-tagwrench-direct.rules")
     bridge = setup.bridge("spacemouse", "wrench", "joystick", "jsonl:/tmp/ordinary.jsonl", user=USER)
-    rig.check("with the udev rule an ordinary user's bridge runs", bridge.wait_error("rest pose learned"), bridge.state())
+    rig.check("with the udev rules an ordinary user's bridge runs", bridge.wait_error("rest pose learned"), bridge.state())
     spnav = setup.client("spnav_client", user=USER)
     spnav.wait_line("connected")
     hid = setup.client("hid_client", "256f:c62e", "1209:7a6e", user=USER)

@@ -8,12 +8,14 @@ import glob
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 
 PATIENCE = 90.0  # s; for anything that a healthy system does at once
+SERVICE_ID = 900  # user and group of the service of devices, as sysusers makes them
 
 _failed = []
 _checks = 0
@@ -133,9 +135,10 @@ class Program:
         return self.process.returncode
 
 
-def as_user(user):
-    """Drops from root to an ordinary user of the groups input and video, as `useradd -G input,video` makes one."""
-    return ["setpriv", f"--reuid={user}", f"--regid={user}", "--groups", "input,video", "--inh-caps=-all",
+def as_user(user, groups=f"{SERVICE_ID},input,video"):
+    """Drops from root to an ordinary user of the groups tagwrench and video, as `useradd -G tagwrench,video` makes one; the group
+    input stands for the seat, whose user may read joysticks."""
+    return ["setpriv", f"--reuid={user}", f"--regid={user}", "--groups", groups, "--inh-caps=-all",
             "--bounding-set=-all", "--no-new-privs"]
 
 
@@ -153,8 +156,21 @@ def load(*modules):
             raise GaveUp(f"modprobe {module}: {err.strip()}")
 
 
-def start_udevd(rules):
-    shutil.copy(rules, "/etc/udev/rules.d/70-tagwrench.rules")
+def add_service_user():
+    """What tagwrench-sysusers.conf makes; once."""
+    for file, line in (("/etc/passwd", f"tagwrench:x:{SERVICE_ID}:{SERVICE_ID}::/:/usr/sbin/nologin"),
+                       ("/etc/group", f"tagwrench:x:{SERVICE_ID}:")):
+        with open(file, "r+", encoding="utf-8") as lines:
+            if line not in lines.read():
+                lines.write(line + "\n")
+
+
+def start_udevd(*rules):
+    """With these files of rules; one that is called otherwise gets the place of our own."""
+    add_service_user()
+    for path in rules:
+        name = os.path.basename(path)
+        shutil.copy(path, "/etc/udev/rules.d/" + (name if name.startswith("7") else "70-tagwrench.rules"))
     os.makedirs("/run/udev", exist_ok=True)
     for command in (["/lib/systemd/systemd-udevd", "--daemon"], ["udevadm", "trigger", "--action=add"],
                     ["udevadm", "settle", "-t", "60"]):
@@ -203,6 +219,26 @@ def open_to_all(path):
         if wanted != mode:
             os.chmod(path, wanted)
         path = os.path.dirname(path)
+
+
+def serve_devices(program, folder="/run/tagwrench"):
+    """What systemd does for the service of devices: listens at its sockets, and starts it for each connection as its user."""
+    os.makedirs(folder, exist_ok=True)
+    open_to_all(program)
+
+    def accept(listener):
+        while True:
+            connection, _ = listener.accept()
+            with connection:
+                service = subprocess.Popen(["setpriv", f"--reuid={SERVICE_ID}", f"--regid={SERVICE_ID}", "--clear-groups", "--inh-caps=-all",
+                                            "--bounding-set=-all", "--no-new-privs", program], stdin=connection)
+            threading.Thread(target=service.wait, daemon=True).start()
+    for node in ("uhid", "uinput"):
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        listener.bind(f"{folder}/{node}")
+        os.chmod(f"{folder}/{node}", 0o666)
+        listener.listen()
+        threading.Thread(target=accept, args=(listener,), daemon=True).start()
 
 
 class Setup:

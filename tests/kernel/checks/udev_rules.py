@@ -7,7 +7,7 @@ import stat
 import nodes
 import rig
 
-OWN_ID_RULE = 'SUBSYSTEM=="hidraw", KERNELS=="0003:1209:7A70.*", GROUP="input", MODE="0660", TAG+="uaccess"\n'
+OWN_ID_RULE = 'SUBSYSTEM=="hidraw", KERNELS=="0003:1209:7A70.*", GROUP="tagwrench", MODE="0660", TAG+="uaccess"\n'
 RULES = "/run/70-tagwrench.rules"
 PUCK, WRENCH, OWN, FOREIGN = "0003:0000256F:0000C62E", "0003:00001209:00007A6E", "0003:00001209:00007A70", "0003:0000256F:0000C635"
 
@@ -18,22 +18,22 @@ def properties(path):
 
 
 def check_opened(what, path):
-    """To the group input, and by the tag to the user at the seat (logind gives it; the guest of the package has one)."""
+    """To the group tagwrench, and by the tag to the user at the seat (logind gives it; the guest of the package has one)."""
     if not rig.check(f"{what} has a node", path):
         return
     found = os.stat(path)
     given = oct(stat.S_IMODE(found.st_mode)), found.st_uid, grp.getgrgid(found.st_gid).gr_name
-    rig.check(f"{what} is open to the group input and to nobody else", given == ("0o660", 0, "input"), given)
+    rig.check(f"{what} is open to the group tagwrench and to nobody else", given == ("0o660", 0, "tagwrench"), given)
     tags = properties(path).get("CURRENT_TAGS", "")
     rig.check(f"{what} is tagged for the user at the seat", ":uaccess:" in tags, properties(path))
 
 
-def check_closed(what, path):
+def check_closed(what, path, owner=0):
     if not rig.check(f"{what} has a node", path):
         return
     found = os.stat(path)
     given = oct(stat.S_IMODE(found.st_mode)), found.st_uid, found.st_gid
-    rig.check(f"{what} stays root's alone", given == ("0o600", 0, 0), given)
+    rig.check(f"{what} is open to {'its service' if owner else 'root'} alone", given == ("0o600", owner, 0), given)
     tags = properties(path).get("TAGS", "")
     rig.check(f"{what} has no tag of ours", ":uaccess:" not in tags, tags)
 
@@ -51,8 +51,8 @@ def main(setup):
     status, _, err = rig.run("udevadm", "test", "/sys/devices/virtual/misc/uhid")
     faults = [line for line in err.splitlines() if "70-tagwrench.rules:" in line and not re.search(r" (GROUP|MODE) \w+$", line)]
     rig.check("udevadm finds no fault in the rules", status == 0 and not faults, faults or err[-500:])
-    check_opened("/dev/uhid", "/dev/uhid")
-    check_opened("/dev/uinput", "/dev/uinput")
+    check_closed("/dev/uhid", "/dev/uhid", rig.SERVICE_ID)
+    check_closed("/dev/uinput", "/dev/uinput", rig.SERVICE_ID)
 
     source = f"sim:{setup.clip('rest')}.yaml"
     bridge = setup.bridge("spacemouse", "wrench", "joystick", source=source)
