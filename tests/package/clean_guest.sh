@@ -93,16 +93,21 @@ listing > /tmp/before
 uhid_before=$(access /dev/uhid)
 
 check "dpkg installs it" dpkg -i "$deb"
-check "the rule gives /dev/uhid to the group input" same "$(access /dev/uhid)" "660 root input"
-check "the module of uinput is loaded, and its node has the rule" same "$(access /dev/uinput)" "660 root input"
+check "the rule gives /dev/uhid to the service's user and to nobody else" same "$(access /dev/uhid)" "600 tagwrench root"
+check "the module of uinput is loaded, and its node has the rule" same "$(access /dev/uinput)" "600 tagwrench root"
+check "systemd listens for who wants devices" systemctl is-active --quiet tagwrench-devices.socket
+check "and will after the next start" systemctl is-enabled --quiet tagwrench-devices.socket
 check "nothing is enabled for everybody" same "$(find /etc/systemd/user -name 'tagwrench*')" ""
-check "nobody may make devices who is not at the seat" bash -c '! setpriv --reuid=alice --regid=alice --init-groups test -w /dev/uhid'
-
+has_devices() { setpriv --reuid="$1" --regid="$1" --init-groups tagwrench doctor 2> /dev/null | grep -q '^ok.*/dev/uhid'; }
+check "nobody has devices made who is not at the seat" eval '! has_devices alice'
+check "and is told who may" eval 'setpriv --reuid=alice --regid=alice --init-groups tagwrench doctor | grep -q "usermod -aG tagwrench"'
 check "an ordinary user logs in at the first terminal" log_in
 check "he is of no group but his own" same "$(id -Gn alice)" alice
-check "the seat gives him /dev/uhid" wait_for at_the_seat test -w /dev/uhid
-check "the seat gives him /dev/uinput" at_the_seat test -w /dev/uinput
-check "and nobody else" bash -c '! setpriv --reuid=bob --regid=bob --init-groups test -w /dev/uhid'
+check "the seat lets him have devices made" wait_for has_devices alice
+check "without letting him type" bash -c '! setpriv --reuid=alice --regid=alice --init-groups test -w /dev/uhid -o -w /dev/uinput'
+check "and nobody else" eval '! has_devices bob'
+usermod -aG tagwrench bob
+check "but a member of the group, who may not type either" eval 'has_devices bob && ! setpriv --reuid=bob --regid=bob --init-groups test -w /dev/uhid -o -w /dev/uinput'
 
 wait_for at_the_seat systemctl --user is-active default.target
 check "he enables the service; without a camera it waits" at_the_seat systemctl --user enable --now --quiet tagwrench
@@ -118,6 +123,10 @@ check "it starts with options of his" at_the_seat systemctl --user restart tagwr
 plug_camera_in
 check "it takes the camera that is plugged in, by his sensor.yaml" wait_for camera_taken
 check "it makes what he asked for" wait_for test -e /dev/hidraw1
+mapfile -t lenders < <(grep -lx tagwrench-devic /proc/[0-9]*/comm)
+check "by a process of the service's for each device" same "$(stat -c %U "${lenders[@]}" | xargs)" "tagwrench tagwrench"
+# shellcheck disable=SC2016  # awk's
+check "which has no capabilities" awk '/^Cap(Prm|Eff|Bnd)/ {bad += $2 !~ /^0*$/} END {exit bad}' "${lenders[0]%comm}status"
 install -m 755 "$programs/spnav_client" /tmp/ # the project may lie where only its owner can go
 at_the_seat /tmp/spnav_client > /home/alice/motion 2>&1 &
 wait_for grep -q connected /home/alice/motion
@@ -144,6 +153,7 @@ check "and makes the devices again" wait_for test -e /dev/hidraw1
 check "dpkg removes it while it runs" dpkg -r tagwrench
 check "nothing of it runs" wait_for bash -c '! cat /proc/[0-9]*/comm | grep -E "^(tagwrench|tw-)"'
 check "its devices are gone" wait_for bash -c '! ls /sys/class/hidraw/hidraw0'
+check "nobody listens" bash -c '! ls /run/tagwrench/uhid'
 check "what it gave is taken back" same "$(access /dev/uhid)" "$uhid_before"
 check "also from the user at the seat" bash -c '! setpriv --reuid=alice --regid=alice --init-groups test -w /dev/uhid'
 check "dpkg purges it" dpkg -P tagwrench

@@ -10,6 +10,12 @@ list=$(dpkg-deb -c "$folder"/tagwrench_*.deb)
 has() { grep -q " \./$1\$" <<< "$list" || wrong "there is no $1"; }
 has usr/bin/tagwrench
 has usr/lib/udev/rules.d/70-tagwrench.rules
+! grep 'rules.d/71-' <<< "$list" || wrong "the rule that lets people type is in force"
+has usr/share/doc/tagwrench/examples/71-tagwrench-direct.rules
+has usr/lib/sysusers.d/tagwrench.conf
+has usr/lib/systemd/system/tagwrench-devices.socket
+has usr/lib/systemd/system/tagwrench-devices@.service
+has usr/libexec/tagwrench-devices
 has usr/lib/modules-load.d/tagwrench.conf
 has usr/lib/systemd/user/tagwrench.service
 has usr/lib/systemd/user/tagwrench-desktop.service
@@ -51,6 +57,10 @@ if command -v systemd-analyze > /dev/null; then
     sed "s|ExecStart=tagwrench|ExecStart=$unpacked/usr/bin/tagwrench|" "$unit" > "$unpacked/units/$(basename "$unit")"
   done
   said=$(XDG_RUNTIME_DIR=$unpacked systemd-analyze --user --man=no verify "$unpacked"/units/*.service 2>&1 || echo "status $?")
+  [ -z "$said" ] || wrong "systemd-analyze verify: $said"
+  sed "s|ExecStart=/usr|ExecStart=$unpacked/usr|" "$unpacked/usr/lib/systemd/system/tagwrench-devices@.service" > "$unpacked/units/tagwrench-devices@.service"
+  cp "$unpacked/usr/lib/systemd/system/tagwrench-devices.socket" "$unpacked/units/"
+  said=$(systemd-analyze --man=no verify "$unpacked"/units/tagwrench-devices.socket 2>&1 || echo "status $?")
   [ -z "$said" ] || wrong "systemd-analyze verify: $said"
 fi
 [ "$failed" -eq 0 ] && echo "the packages are as they should be"

@@ -3,7 +3,8 @@
 
 The program shows the simulated sensor, pushed about, in real time, with load cells of the emulated board where that was built; a page
 records, pages and CAD programs come and go, some of them badly behaved. Faults come at random: the program killed or stopped, the
-board gone, no room for a recording, floods of requests. What is reported: memory and descriptors, latency, samples that were lost
+board gone, no room for a recording, the time of day set, floods of requests. A camera that is unplugged takes
+a real driver: the kernel test `cameras` has one. What is reported: memory and descriptors, latency, samples that were lost
 and whether the program said so, how soon everything was at rest after a kill, and which recordings can be read. Status 1: something
 was lost without a word, did not come to rest within 80 ms, grew, or ended by itself.
 """
@@ -17,6 +18,7 @@ import resource
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -140,6 +142,11 @@ class Soak:
         (self.folder / "runtime").mkdir(mode=0o700)
         self.spnav = self.folder / "spnav.sock"
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder / "runtime"), "XDG_CONFIG_HOME": str(self.folder)}
+        self.clock = self.folder / "clock"
+        self.clock.write_bytes(bytes(8))
+        library = self.folder / "time_of_day.so"
+        subprocess.run(["cc", "-shared", "-fPIC", "-O2", "-o", library, pathlib.Path(__file__).with_name("time_of_day.c")], check=True)
+        self.environment |= {"LD_PRELOAD": str(library.resolve()), "TIME_OF_DAY_FILE": str(self.clock.resolve())}
         self.board = Board(options.board, self.folder)
         self.messages, self.notes, self.faults = collections.Counter(), collections.Counter(), collections.Counter()
         self.rest_ms = {"kill -9": [], "SIGSTOP": []}
@@ -193,6 +200,11 @@ class Soak:
         time.sleep(self.random.uniform(1, 4))
         resource.prlimit(self.life.process.pid, resource.RLIMIT_FSIZE, everything)
 
+    def clock_set(self):
+        """The time of day jumps by hours, forward or back, as at a first contact with a time server."""
+        with open(self.clock, "r+b") as file:
+            file.write(struct.pack("q", self.random.randrange(-86400, 86400)))
+
     def flood_of_requests(self):
         try:
             pages = [Page(self.life.port) for _ in range(8)]
@@ -245,7 +257,8 @@ class Soak:
         self.crowd.clear()
 
     def run(self, hours):
-        faults = [self.killed, self.stopped, self.without_board, self.no_room, self.flood_of_requests, self.half_open, self.deaf]
+        faults = [self.killed, self.stopped, self.without_board, self.no_room, self.flood_of_requests, self.half_open, self.deaf,
+                  self.clock_set]
         end = time.monotonic() + 3600 * hours
         self.begin()
         fault_at = time.monotonic() + 10
