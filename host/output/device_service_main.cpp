@@ -31,6 +31,8 @@ constexpr int kFirstWord_ms = 10'000;  // who wants no device has none
 /// Longer than any event, so that one that is too long is seen to be.
 using Buffer = std::array<std::uint8_t, sizeof(uhid_event) + 1>;
 
+// Not fuzzed: fuzz.device_requests has what judges the messages.
+
 /// The next message of the client; empty: he has gone, or sends nothing in time.
 std::span<const std::uint8_t> next_message(Buffer& buffer) {
   const ssize_t got =

@@ -49,7 +49,7 @@ def main(setup):
         copy.write(ours.read() + OWN_ID_RULE)
     rig.start_udevd(RULES)
     status, _, err = rig.run("udevadm", "test", "/sys/devices/virtual/misc/uhid")
-    faults = [line for line in err.splitlines() if "70-tagwrench.rules:" in line and not re.search(r" (GROUP|MODE) \w+$", line)]
+    faults = [line for line in err.splitlines() if "70-tagwrench.rules:" in line and not re.search(r" (OWNER|GROUP|MODE) \w+$", line)]
     rig.check("udevadm finds no fault in the rules", status == 0 and not faults, faults or err[-500:])
     check_closed("/dev/uhid", "/dev/uhid", rig.SERVICE_ID)
     check_closed("/dev/uinput", "/dev/uinput", rig.SERVICE_ID)
