@@ -129,11 +129,5 @@ int main() {
   const DeviceNode& wanted = uinput ? kUinputNode : kUhidNode;
   const UniqueFd node(::open(wanted.path().c_str(), O_RDWR | O_CLOEXEC | O_NONBLOCK));
   answer(node ? 0 : errno);
-  if (!node) return 0;
-  if (uinput) {
-    lend_uinput(node.get());
-  } else {
-    lend_uhid(node.get());
-  }
-  return 0;
+  if (node) uinput ? lend_uinput(node.get()) : lend_uhid(node.get());
 }
