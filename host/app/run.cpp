@@ -26,7 +26,7 @@
 #include "host/core/os/uninterrupted.h"
 #include "host/core/os/unique_fd.h"
 #include "host/core/os/user_folders.h"
-#include "host/output/gadget_tree.h"
+#include "host/output/hid_outputs.h"
 #include "host/sensor/sensor_config.h"
 #include "host/source/v4l2_device.h"
 #include "host/source/v4l2_source.h"
@@ -218,7 +218,7 @@ int run(const RunOptions& given) {
   const UniqueFd caught = termination_fd();  // what comes while it is set up ends it in order, too
   const std::vector<OutputSpec> asked = parse_outputs(given.outputs);  // refused before anything
   check_board(given, asked);                                           // is opened or lit
-  check_gadget_name(given.name);
+  check_sensor_name(given.name);
   const bool pages = has_web(given, asked);
   RunSession session{with_own_sensor(given), asked};
   if (session.options.record) check_recording(*session.options.record);

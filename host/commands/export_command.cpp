@@ -23,6 +23,7 @@
 #include "host/core/count_text.h"
 #include "host/core/log.h"
 #include "host/core/os/atomic_file.h"
+#include "host/core/printable.h"
 #include "host/output/line_outputs.h"
 #include "host/recording/reader.h"
 #include "host/source/replay.h"
@@ -144,7 +145,7 @@ std::string in_quotes(const std::string& text) {
 std::string event_line(const record::EventRecord& e) {
   return fmt::format("{},{},{},{},{},{}\n", e.id, ns(e.time), name(e.kind),
                      e.step < 0 ? std::string() : std::to_string(e.step), e.value,
-                     e.text.empty() ? std::string() : in_quotes(e.text));
+                     e.text.empty() ? std::string() : in_quotes(printable(e.text)));
 }
 
 // A recording as the program of Ouyang and Howe (ICRA 2020) would have written it, so that whoever

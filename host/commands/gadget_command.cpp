@@ -72,7 +72,7 @@ int bring_up(const GadgetCommandOptions& o) {
   GadgetFiles files;
   GadgetTree tree(files, o.places.gadgets());
   GadgetSpec spec = spec_of(o);
-  check_gadget_name(o.name);
+  check_sensor_name(o.name);
   const std::string ours = std::string(kGadgetPrefix) + o.name;
   choose_controller(controllers(files, o.places, tree.all()), o.udc, ours);
   prepare_kernel(files, o.places, run_program);

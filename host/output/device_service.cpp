@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <string_view>
+#include <utility>
 
 #include "host/core/config_error.h"
 #include "host/core/os/uninterrupted.h"
@@ -48,6 +49,13 @@ std::unique_ptr<Event> as(std::span<const std::uint8_t> bytes) {
   auto event = std::make_unique<Event>();
   std::memcpy(event.get(), bytes.data(), std::min(bytes.size(), sizeof *event));
   return event;
+}
+
+/// Whether it is `before` and the name of a sensor. Throws ConfigError: another name.
+bool names_sensor(std::string_view text, std::string_view before) {
+  if (!text.starts_with(before)) return false;
+  check_sensor_name(text.substr(before.size()));
+  return true;
 }
 
 }  // namespace
@@ -130,7 +138,7 @@ bool UhidGate::is_ours(const uhid_create2_req& asked) try {
   const UhidIdentity identity{text_of(asked.name), text_of(asked.uniq),
                               static_cast<std::uint16_t>(asked.vendor),
                               static_cast<std::uint16_t>(asked.product)};
-  if (!lent_id(asked.vendor, asked.product) || !identity.serial.starts_with("tagwrench-"))
+  if (!lent_id(asked.vendor, asked.product) || !names_sensor(identity.serial, "tagwrench-"))
     return false;
   const auto is = [&](std::span<const std::uint8_t> descriptor) {
     const auto ours = uhid_creation(identity, descriptor);
@@ -150,11 +158,10 @@ std::optional<uinput_setup> lent_joystick(std::span<const std::uint8_t> bytes) n
   if (bytes.size() != sizeof(uinput_setup)) return std::nullopt;
   const auto asked = as<uinput_setup>(bytes);
   JoystickOptions options;
-  const std::string prefix = options.name;
-  options.name = text_of(asked->name);
+  const std::string usual = std::exchange(options.name, text_of(asked->name));
   const uinput_setup ours = joystick_setup(options);
-  if (!options.name.starts_with(prefix) || std::memcmp(&ours, asked.get(), sizeof ours) != 0)
-    return std::nullopt;
+  const bool named = options.name == usual || names_sensor(options.name, usual + " ");
+  if (!named || std::memcmp(&ours, asked.get(), sizeof ours) != 0) return std::nullopt;
   return ours;
 } catch (const ConfigError&) {
   return std::nullopt;

@@ -28,7 +28,7 @@ struct DeviceNode {
 inline constexpr DeviceNode kUhidNode{"uhid"};
 inline constexpr DeviceNode kUinputNode{"uinput"};
 
-inline constexpr const char* kDeviceServiceFolder = "/run/tagwrench";
+inline constexpr const char* kDeviceServiceFolder = "/run/tagwrench-devices";
 /// Its members may have devices made without sitting at the computer.
 inline constexpr const char* kDeviceGroup = "tagwrench";
 

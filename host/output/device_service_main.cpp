@@ -33,10 +33,14 @@ using Buffer = std::array<std::uint8_t, sizeof(uhid_event) + 1>;
 
 // Not fuzzed: fuzz.device_requests has what judges the messages.
 
-/// The next message of the client; empty: he has gone, or sends nothing in time.
+/// The next message of the client; empty: he has gone, sends nothing in time, or sends files, whose
+/// closing might take for ever (and does not as this process ends).
 std::span<const std::uint8_t> next_message(Buffer& buffer) {
-  const ssize_t got =
-      uninterrupted([&] { return ::recv(kClient, buffer.data(), buffer.size(), 0); });
+  alignas(cmsghdr) std::array<std::uint8_t, CMSG_SPACE(253 * sizeof(int))> files;  // SCM_MAX_FD
+  iovec place{buffer.data(), buffer.size()};
+  msghdr message{nullptr, 0, &place, 1, files.data(), files.size(), 0};
+  const ssize_t got = uninterrupted([&] { return ::recvmsg(kClient, &message, MSG_CMSG_CLOEXEC); });
+  if (message.msg_controllen > 0) return {};
   return {buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0))};
 }
 
@@ -128,6 +132,6 @@ int main() {
   ::fcntl(kClient, F_SETFL, ::fcntl(kClient, F_GETFL) & ~O_NONBLOCK);
   const DeviceNode& wanted = uinput ? kUinputNode : kUhidNode;
   const UniqueFd node(::open(wanted.path().c_str(), O_RDWR | O_CLOEXEC | O_NONBLOCK));
-  answer(node ? 0 : errno);
+  answer(node ? 0 : errno == EACCES ? EIO : errno);  // EACCES would mean the client's
   if (node) uinput ? lend_uinput(node.get()) : lend_uhid(node.get());
 }

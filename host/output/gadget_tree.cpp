@@ -20,6 +20,7 @@
 
 #include "host/core/config_error.h"
 #include "host/core/parse.h"
+#include "host/output/hid_outputs.h"
 #include "host/output/hid_report.h"
 
 namespace tagwrench {
@@ -141,7 +142,7 @@ GadgetTree::GadgetTree(GadgetFiles& files, std::string root)
     : files_(files), root_(std::move(root)) {}
 
 std::string GadgetTree::path(std::string_view name) const {
-  check_gadget_name(name);
+  check_sensor_name(name);
   return fmt::format("{}/{}{}", root_, kGadgetPrefix, name);
 }
 
@@ -282,15 +283,6 @@ void GadgetTree::down(std::string_view name) {
         "gadget {}: cannot be taken away: {}; {}", gadget, std::strerror(error),
         denied ? "run it as root: sudo tagwrench gadget down" : "end what uses it and try again");
   }
-}
-
-void check_gadget_name(std::string_view name) {
-  const bool usable = !name.empty() && name.size() <= 32 &&
-                      std::all_of(name.begin(), name.end(), [](unsigned char c) {
-                        return std::isalnum(c) != 0 || c == '-' || c == '_';
-                      });
-  if (usable) return;
-  throw ConfigError("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name);
 }
 
 std::optional<UsbId> parse_usb_id(std::string_view text) noexcept {

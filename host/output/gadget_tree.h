@@ -116,10 +116,6 @@ class GadgetTree {
   std::string root_;
 };
 
-/// Throws ConfigError unless it can be the name of a sensor, a gadget's too: 1 to 32 letters,
-/// digits, - and _.
-void check_gadget_name(std::string_view name);
-
 /// "256f:c62e"
 std::optional<UsbId> parse_usb_id(std::string_view text) noexcept;
 

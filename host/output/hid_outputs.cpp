@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -77,6 +78,15 @@ bool order(int fd, unsigned long request, Argument... argument) {
 }
 
 }  // namespace
+
+void check_sensor_name(std::string_view name) {
+  const bool usable = !name.empty() && name.size() <= 32 &&
+                      std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                        return std::isalnum(c) != 0 || c == '-' || c == '_';
+                      });
+  if (usable) return;
+  throw ConfigError("--name {}: must be 1 to 32 letters, digits, - and _; choose another", name);
+}
 
 std::string hex_id(std::uint16_t vendor, std::uint16_t product) {
   return fmt::format("{:04x}:{:04x}", vendor, product);

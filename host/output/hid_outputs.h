@@ -17,6 +17,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host/core/os/unique_fd.h"
@@ -25,6 +26,10 @@
 #include "host/output/watchdog.h"
 
 namespace tagwrench {
+
+/// Throws ConfigError unless it can be the name of a sensor, which stands in serial numbers of
+/// devices: 1 to 32 letters, digits, - and _.
+void check_sensor_name(std::string_view name);
 
 struct UhidIdentity {
   std::string name;    ///< HID_NAME, 1..127 bytes, printable

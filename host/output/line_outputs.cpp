@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "host/core/config_error.h"
+#include "host/core/os/atomic_file.h"
 #include "host/core/os/remedy.h"
 #include "host/core/os/termination.h"
 #include "host/core/os/uninterrupted.h"
@@ -71,6 +72,7 @@ TextSink::TextSink(const std::string& path, bool lossless)
     adopt(STDOUT_FILENO);
     return;
   }
+  refuse_foreign_link(path);
   // Non-blocking, so that a named pipe without a reader is an error and not a wait.
   UniqueFd fd(
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644));

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -111,11 +113,11 @@ void put(Statement& statement, const auto&... values) {
   statement.execute();
 }
 
-/// The file must be new: nobody's data is overwritten, and of two writers one is refused. What a
-/// camera saw is for its owner alone.
-std::filesystem::path created(const std::filesystem::path& path) {
+constexpr std::array<const char*, 3> kParts = {"-wal", "-shm", "-journal"};
+
+void make_for_owner(const std::filesystem::path& path) {
   const UniqueFd file(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
-  if (file) return path;
+  if (file) return;
   if (errno == EEXIST) {
     throw ConfigError("{}: exists, and a recording replaces nothing; choose another name",
                       path.string());
@@ -124,10 +126,39 @@ std::filesystem::path created(const std::filesystem::path& path) {
                     std::strerror(errno));
 }
 
+/// The file must be new: nobody's data is overwritten, and of two writers one is refused. What a
+/// camera saw is for its owner alone, so nothing of another user's may lie at the names of the
+/// parts that SQLite puts beside it, either.
+std::filesystem::path created(const std::filesystem::path& path) {
+  make_for_owner(path);
+  for (const char* part : kParts) {
+    struct stat facts {};
+    const std::string beside = path.string() + part;
+    if (::lstat(beside.c_str(), &facts) != 0) continue;
+    ::unlink(path.c_str());
+    throw ConfigError("{}: was left over beside a recording; remove it, or choose another name",
+                      beside);
+  }
+  return path;
+}
+
+/// Again when SQLite has opened them, for somebody may have been quick. Throws ConfigError.
+void check_parts(const std::filesystem::path& path) {
+  for (const char* part : kParts) {
+    struct stat facts {};
+    const std::string beside = path.string() + part;
+    if (::lstat(beside.c_str(), &facts) != 0) continue;
+    if (facts.st_uid == ::geteuid() && S_ISREG(facts.st_mode) && (facts.st_mode & 0077) == 0)
+      continue;
+    throw ConfigError("{}: is another user's; record into a folder of yours", beside);
+  }
+}
+
 Database prepared(const std::filesystem::path& path) {
   Database database(created(path), Database::Mode::write);
   database.run(fmt::format("PRAGMA page_size = {}", kPageBytes).c_str());
   database.run("PRAGMA journal_mode = WAL");
+  check_parts(path);
   database.run("PRAGMA synchronous = FULL");  // on the disk with the commit, not some time later
   database.run(fmt::format("PRAGMA wal_autocheckpoint = {}", kLogBytes / kPageBytes).c_str());
   database.run(fmt::format("PRAGMA journal_size_limit = {}", kLogBytes).c_str());
@@ -141,10 +172,9 @@ Database prepared(const std::filesystem::path& path) {
 /// What was made of a file that cannot be written goes, so that its name is free again.
 ConfigError not_begun(const std::filesystem::path& path, const DatabaseError& error) {
   const std::string line = write_trouble(path, error, "nothing was recorded");
-  for (const char* part : {"", "-wal", "-shm", "-journal"}) {
-    std::error_code ignored;
-    std::filesystem::remove(path.string() + part, ignored);
-  }
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  for (const char* part : kParts) std::filesystem::remove(path.string() + part, ignored);
   return ConfigError(line);
 }
 

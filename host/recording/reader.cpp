@@ -364,6 +364,18 @@ void RecordingReader::open() {
         "made it",
         path_.string(), version, kSchemaVersion);
   }
+  // A generated column, a constraint or an index may hold an expression that runs for ever. All of
+  // them need parentheses of their own.
+  constexpr const char* kOthers =
+      "SELECT count(*) FROM sqlite_schema WHERE sql IS NOT NULL AND (type <> 'table' OR sql NOT "
+      "LIKE "
+      "'CREATE TABLE %' OR length(sql) - length(replace(sql, '(', '')) <> 1)";
+  if (database.number(kOthers) != 0) {
+    throw ConfigError(
+        "{}: holds more than the tables of a recording; give a file as `tagwrench record --out` "
+        "made it",
+        path_.string());
+  }
 }
 
 /// SQLite notices missing pages only when it comes to them. Those in a log are not in the file yet.

@@ -92,7 +92,9 @@ void read_lens(YamlReader& root, CameraModel& camera) {
 
 fs::path linked_to(const fs::path& sensor) {
   std::error_code error;
-  return fs::is_symlink(sensor, error) ? fs::weakly_canonical(sensor) : sensor;
+  if (!fs::is_symlink(sensor, error)) return sensor;
+  const fs::path real = fs::weakly_canonical(sensor, error);
+  return error ? sensor : real;  // a link to itself, say: whoever reads it says so
 }
 
 [[noreturn]] void no_pose(const YamlReader& node) {

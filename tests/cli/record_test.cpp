@@ -237,6 +237,16 @@ TEST_F(Record, ThePapersColumnsHoldTheMotionOfBothTags) {
   EXPECT_GT(rows, 20U);
 }
 
+TEST_F(Record, ExportedEventsHaveNothingThatATerminalWouldObey) {
+  ASSERT_EQ(record(small(), {"--frames", "40", "--keep", "none"}).status, 0);
+  record::Database(file("r.twr"), record::Database::Mode::write)
+      .run("UPDATE events SET text = 'a' || char(27) || ']0;b' || char(8238) WHERE kind = 'note'");
+  const Outcome got = run_bridge({"export", file("r.twr"), "--events", "-"});
+  EXPECT_EQ(got.status, 0) << got.err;
+  EXPECT_NE(got.out.find("a\\x1b]0;b\\xe2\\x80\\xae"), std::string::npos) << got.out;
+  EXPECT_EQ(got.out.find('\x1b'), std::string::npos);
+}
+
 TEST_F(Record, ARecordingIsNotOverwrittenAndNonsenseIsRefused) {
   write_file(folder_ / "r.twr", "somebody's");
   const Outcome refused = record(small(), {"--frames", "3"});

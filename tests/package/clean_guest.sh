@@ -153,7 +153,7 @@ check "and makes the devices again" wait_for test -e /dev/hidraw1
 check "dpkg removes it while it runs" dpkg -r tagwrench
 check "nothing of it runs" wait_for bash -c '! cat /proc/[0-9]*/comm | grep -E "^(tagwrench|tw-)"'
 check "its devices are gone" wait_for bash -c '! ls /sys/class/hidraw/hidraw0'
-check "nobody listens" bash -c '! ls /run/tagwrench/uhid'
+check "nobody listens" bash -c '! ls /run/tagwrench-devices/uhid'
 check "what it gave is taken back" same "$(access /dev/uhid)" "$uhid_before"
 check "also from the user at the seat" bash -c '! setpriv --reuid=alice --regid=alice --init-groups test -w /dev/uhid'
 check "dpkg purges it" dpkg -P tagwrench

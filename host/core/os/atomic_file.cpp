@@ -24,8 +24,10 @@ constexpr std::string_view kMark = ".tagwrench-";  // of temporary names, which 
 constexpr std::string_view kRandom = "XXXXXX";
 constexpr std::size_t kMostOfName = 200;  // of the target's: a name has at most 255 bytes
 
-/// What the path means after symbolic links; the path itself where there is nothing yet.
+/// What the path means after symbolic links; the path itself where there is nothing yet. Throws
+/// ConfigError: it is a link of somebody else's.
 fs::path resolved(const fs::path& path) {
+  refuse_foreign_link(path);
   std::error_code error;
   const fs::path real = fs::weakly_canonical(path, error);
   return error ? path : real;
@@ -46,6 +48,14 @@ template <class Error>
       fmt::format("{}: cannot be written ({}); the old file is as it was: free some space, mend "
                   "the permissions, or name another file with --out",
                   path.string(), std::strerror(errno)));
+}
+
+/// A device or a pipe would not be written to, it would be gone. Throws ConfigError.
+void refuse_other_than_file(const fs::path& path, const fs::path& real) {
+  std::error_code error;
+  const fs::file_status status = fs::status(real, error);
+  if (fs::exists(status) && !fs::is_regular_file(status))
+    throw ConfigError("{}: is not a regular file; name another file with --out", path.string());
 }
 
 bool is_locked_by_us(int fd) noexcept { return ::flock(fd, LOCK_EX | LOCK_NB) == 0; }
@@ -103,13 +113,18 @@ void write_all(int fd, std::string_view bytes, const fs::path& target) {
 
 }  // namespace
 
+void refuse_foreign_link(const fs::path& path) {
+  struct stat facts {};
+  if (::lstat(path.c_str(), &facts) != 0 || !S_ISLNK(facts.st_mode)) return;
+  if (facts.st_uid == 0 || facts.st_uid == ::geteuid()) return;
+  throw ConfigError("{}: is a link that another user has put there; name another file",
+                    path.string());
+}
+
 void check_replaceable(const fs::path& path) {
   const fs::path real = resolved(path);
-  std::error_code error;
-  const fs::file_status status = fs::status(real, error);
-  if (fs::exists(status) && !fs::is_regular_file(status))
-    throw ConfigError("{}: is not a regular file; name another file with --out", path.string());
-  if (fs::exists(status) && ::access(real.c_str(), W_OK) != 0) {
+  refuse_other_than_file(path, real);
+  if (::access(real.c_str(), F_OK) == 0 && ::access(real.c_str(), W_OK) != 0) {
     throw ConfigError("{}: is write-protected ({}); chmod u+w it, or name another file with --out",
                       path.string(), std::strerror(errno));
   }
@@ -120,6 +135,7 @@ void check_replaceable(const fs::path& path) {
 }
 
 NewFile::NewFile(const fs::path& path) : target_(resolved(path)) {
+  refuse_other_than_file(path, target_);
   remove_left_over(target_);
   while (!file_) {
     std::string name = name_for(target_);
@@ -145,11 +161,16 @@ NewFile::~NewFile() {
 void NewFile::write(std::string_view bytes) { write_all(file_.get(), bytes, target_); }
 
 void NewFile::keep_mode_of_target() {
-  struct stat old {};
-  if (::stat(target_.c_str(), &old) == 0) {
-    // Another's file stays another's where we may; the mode comes last, chown clears bits of it.
+  struct stat old {
+  }, folder{};
+  const bool there =
+      ::stat(target_.c_str(), &old) == 0 && ::stat(folder_of(target_).c_str(), &folder) == 0;
+  // Who has put a file of his there chose its mode, to get at what comes. In his own folder root
+  // leaves it his: there he could take it anyway.
+  const bool of_a_user = there && ::geteuid() == 0 && old.st_uid == folder.st_uid;
+  if (of_a_user || (there && old.st_uid == ::geteuid())) {
     [[maybe_unused]] const int ignored = ::fchown(file_.get(), old.st_uid, old.st_gid);
-    if (::fchmod(file_.get(), old.st_mode & 07777) != 0) cannot_write<std::runtime_error>(target_);
+    if (::fchmod(file_.get(), old.st_mode & 0777) != 0) cannot_write<std::runtime_error>(target_);
     return;
   }
   const mode_t mask = ::umask(0);

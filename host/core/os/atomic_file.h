@@ -16,6 +16,9 @@ namespace tagwrench {
 /// or a new name in a folder that can be written.
 void check_replaceable(const std::filesystem::path& path);
 
+/// Throws ConfigError if there is a symbolic link at the path, neither one's own nor root's.
+void refuse_foreign_link(const std::filesystem::path& path);
+
 /// What is to stand at a path, written beside it under a name that nobody can foresee: a reader
 /// sees the old file or the new one, never a part, and a link that somebody has put there leads
 /// nowhere. What writers of the same path left that were killed is removed first.
@@ -24,7 +27,8 @@ class NewFile {
   /// Whether a file that is there already gives way.
   enum class Existing : std::uint8_t { replaced, refused };
 
-  /// Follows a symbolic link at `path`. Throws ConfigError if the folder takes no file.
+  /// Follows a symbolic link at `path`, unless it is another user's. Throws ConfigError: it is,
+  /// something else than a file is there (/dev/null, say), or the folder takes no file.
   explicit NewFile(const std::filesystem::path& path);
   NewFile(NewFile&& other) noexcept;
   NewFile& operator=(NewFile&&) = delete;
@@ -36,7 +40,7 @@ class NewFile {
   void write(const void* bytes, std::size_t size) {
     write({static_cast<const char*>(bytes), size});
   }
-  /// On disk, with the mode and the owner of the file that it replaces, or as the umask has it. The
+  /// On disk, with the mode of the file of one's own that it replaces, or as the umask has it. The
   /// folder too. Throws std::runtime_error, and leaves what was there: no room, or it is refused.
   void take_the_name(Existing existing = Existing::replaced);
   /// Where it stands until then.

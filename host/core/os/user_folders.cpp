@@ -37,7 +37,12 @@ std::string runtime_folder() {
   struct stat found {};
   const bool ours = ::lstat(folder.c_str(), &found) == 0 && S_ISDIR(found.st_mode) &&
                     found.st_uid == ::getuid() && (found.st_mode & 0022) == 0;
-  if (!ours) throw ConfigError(folder + ": is not a folder that only you can write to; remove it");
+  if (!ours) {
+    throw ConfigError(folder +
+                      ": is not a folder that only you can write to; remove it, or set "
+                      "XDG_RUNTIME_DIR to a folder of yours");
+  }
+  ::chmod(folder.c_str(), 0700);  // an older version, or somebody's umask, may have made it
   return folder;
 }
 

@@ -29,7 +29,7 @@ def report(data):
 def connect(node):
     """As root, whom the service serves, so that its own judgement of the bytes is all that stands between."""
     client = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    client.connect(f"/run/tagwrench/{node}")
+    client.connect(f"/run/tagwrench-devices/{node}")
     client.settimeout(rig.PATIENCE)
     rig.check(f"the service lends {node} to root", client.recv(4) == bytes(4))
     return client
@@ -59,6 +59,7 @@ def check_hostile(descriptor):
             ("a keyboard behind the length of our descriptor", creation(descriptor=descriptor)[:280 + len(descriptor)]
              + KEYBOARD + bytes(EVENT_SIZE - 280 - len(descriptor) - len(KEYBOARD))),
             ("a puck of somebody's name", creation(name=b"3Dconnexion SpaceMouse", descriptor=descriptor)),
+            ("a puck whose serial number is no name", creation(serial=b"tagwrench-\xc2\x9b", descriptor=descriptor)),
             ("a puck of no sensor's serial number", creation(serial=b"0", descriptor=descriptor)),
             ("a puck of a keyboard's id", creation(vendor=0x046D, product=0xC31C, descriptor=descriptor)),
             ("a puck of an id that is cut off to ours", creation(vendor=0x1256F, descriptor=descriptor)),
@@ -93,6 +94,10 @@ def check_reports(descriptor):
         client.send(report(bytes([1]) + struct.pack("<6h", 350, 0, 0, 0, 0, 0)))
         client.send(event)
         rig.check(f"a device is made; {what} ends it", hung_up(client))
+    client = made(b"tagwrench-test")
+    with open("/dev/null", "rb") as file:  # of a kind whose closing takes its time, a stranger would choose
+        socket.send_fds(client, [report(bytes([1]) + bytes(12))], [file.fileno()] * 3)
+    rig.check("files that come along with a report end it", hung_up(client))
     client = made(b"tagwrench-test")
     client.send(struct.pack("<I", DESTROY))
     rig.check("after a device's end nothing more is taken", hung_up(client))

@@ -221,7 +221,7 @@ def open_to_all(path):
         path = os.path.dirname(path)
 
 
-def serve_devices(program, folder="/run/tagwrench"):
+def serve_devices(program, folder="/run/tagwrench-devices"):
     """What systemd does for the service of devices: listens at its sockets, and starts it for each connection as its user."""
     os.makedirs(folder, exist_ok=True)
     open_to_all(program)

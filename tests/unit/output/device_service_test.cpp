@@ -61,6 +61,7 @@ TEST(UhidGate, PassesNoOtherIdentity) {
   EXPECT_FALSE(with([](auto& puck) { puck.vendor = 0x046d; }));
   EXPECT_FALSE(with([](auto& puck) { puck.name = "3Dconnexion SpaceMouse"; }));
   EXPECT_FALSE(with([](auto& puck) { puck.serial = "another"; }));
+  EXPECT_FALSE(with([](auto& puck) { puck.serial = "tagwrench-a\u202eb"; }));
   EXPECT_FALSE(is_made(SpacemouseOptions{}, wrench_descriptor()));
   EXPECT_FALSE(is_made(WrenchHidOptions{}, spacemouse_descriptor()));
 }
@@ -126,6 +127,8 @@ TEST(Joystick, IsLentUnderItsOwnNamesAndIdAlone) {
   EXPECT_TRUE(lent_joystick(bytes_of(joystick_setup(options))));
   JoystickOptions other;
   other.name = "keyboard";
+  EXPECT_FALSE(lent_joystick(bytes_of(joystick_setup(other))));
+  other.name = "tagwrench joystick \u202e";
   EXPECT_FALSE(lent_joystick(bytes_of(joystick_setup(other))));
   other = {};
   other.product = 1;

@@ -273,6 +273,16 @@ TEST_F(Text, LosslessWaitEndsWithATerminationThatAnotherThreadTakes) {
   EXPECT_EQ(WEXITSTATUS(state), 7);
 }
 
+TEST_F(Text, ALinkOfAnotherUserLeadsNowhere) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can make a link of another user";
+  const test::TemporaryFolder folder;
+  const std::string link = folder.path() + "/out.jsonl";
+  std::filesystem::create_symlink("precious", link);
+  ASSERT_EQ(::lchown(link.c_str(), 1501, 1501), 0);
+  EXPECT_THROW(TextSink(link, false), ConfigError);
+  EXPECT_FALSE(std::filesystem::exists(folder.path() + "/precious"));
+}
+
 TEST_F(Text, TheReadersOwnFlagsAreLeftAlone) {
   const int before = fcntl(writer_.get(), F_GETFL);
   TextSink sink(writer_.get(), "pipe", false);

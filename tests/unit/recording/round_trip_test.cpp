@@ -116,6 +116,27 @@ TEST_F(RoundTrip, AFileThatExistsIsNotTouched) {
   EXPECT_EQ(std::filesystem::file_size(path()), 10U);
 }
 
+TEST_F(RoundTrip, NobodysFilesLieBesideIt) {
+  for (const char* part : {"-wal", "-shm", "-journal"}) {
+    const std::string beside = path().string() + part;
+    std::ofstream(beside).flush();  // of somebody who wants to read along
+    EXPECT_NE(refusal([&] { RecordingWriter writer({.path = path()}, head()); }).find(beside),
+              std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(path()));
+    std::filesystem::remove(beside);
+  }
+}
+
+TEST_F(RoundTrip, WhatIsWrittenIsForItsOwnerAlone) {
+  RecordingWriter writer({.path = path()}, head());
+  write_frames(writer, 0, 3);
+  for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+    EXPECT_EQ(entry.status().permissions() & std::filesystem::perms(0077),
+              std::filesystem::perms::none)
+        << entry.path();
+  }
+}
+
 TEST_F(RoundTrip, OfTwoWritersTheSecondIsRefused) {
   RecordingWriter writer({.path = path()}, head());
   EXPECT_NE(refusal([&] { RecordingWriter second({.path = path()}, head()); }).find("exists"),

@@ -48,6 +48,55 @@ TEST_F(AtomicFile, BehindASymbolicLinkIsReplacedThere) {
   EXPECT_EQ(read_text(folder_ / "real" / "a.yaml"), "new");
 }
 
+TEST_F(AtomicFile, APipeOrADeviceIsNotReplaced) {
+  const fs::path pipe = folder_ / "pipe";  // as root, /dev/null would be gone
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THROW(write_atomically(pipe, "new"), ConfigError);
+  EXPECT_TRUE(fs::is_fifo(pipe));
+  EXPECT_EQ(files(), 1U);
+}
+
+constexpr uid_t kAnother = 1501;
+
+TEST_F(AtomicFile, ThatAnotherUserHasPutThereGivesTheNewOneNeitherItsModeNorItsOwner) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can make a file of another user";
+  const fs::path file = folder_ / "sensor.yaml";
+  write_atomically(file, "his");
+  ASSERT_EQ(::chown(file.c_str(), kAnother, kAnother), 0);
+  ::chmod(file.c_str(), 06777);
+  write_atomically(file, "new");
+  struct stat now {};
+  ::stat(file.c_str(), &now);
+  EXPECT_EQ(now.st_uid, ::geteuid());
+  EXPECT_EQ(now.st_mode & 07022, 0U) << "no set-id bits, and nobody else writes to it";
+}
+
+TEST_F(AtomicFile, OfAUserInHisOwnFolderStaysHisWhenRootReplacesIt) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can make a file of another user";
+  const fs::path home = folder_ / "home", file = home / "sensor.yaml";
+  fs::create_directory(home);
+  write_atomically(file, "old");
+  ASSERT_EQ(::chown(home.c_str(), kAnother, kAnother), 0);
+  ASSERT_EQ(::chown(file.c_str(), kAnother, kAnother), 0);
+  ::chmod(file.c_str(), 04640);
+  write_atomically(file, "new");
+  struct stat now {};
+  ::stat(file.c_str(), &now);
+  EXPECT_EQ(now.st_uid, kAnother);
+  EXPECT_EQ(now.st_mode & 07777, 0640U);
+}
+
+TEST_F(AtomicFile, BehindALinkOfAnotherUserIsNotTouched) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can make a link of another user";
+  write_atomically(folder_ / "precious", "old");
+  const fs::path link = folder_ / "sensor.yaml";
+  fs::create_symlink("precious", link);
+  ASSERT_EQ(::lchown(link.c_str(), kAnother, kAnother), 0);
+  EXPECT_THROW(write_atomically(link, "new"), ConfigError);
+  EXPECT_THROW(check_replaceable(link), ConfigError);
+  EXPECT_EQ(read_text(folder_ / "precious"), "old");
+}
+
 TEST_F(AtomicFile, StaysWhenTheDiskIsFull) {
   const fs::path file = folder_ / "sensor.yaml";
   write_atomically(file, "old");
