@@ -19,6 +19,7 @@ CALLS = {
     'ifstream': 'reads a file',
     '::recv(': 'reads a socket',
     '::recvfrom(': 'reads a socket',
+    '::recvmsg(': 'reads a socket',
     'jpeg_read_header(': 'decodes JPEG',
     'tjDecompress': 'decodes JPEG',
     'spng_': 'decodes PNG',
