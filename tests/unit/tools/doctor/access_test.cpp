@@ -16,7 +16,7 @@ TEST(DoctorAccess, NamesTheFirstThingThatIsInTheWay) {
   access.rule_installed = true;
   EXPECT_NE(access_advice(access).find("udevadm control --reload"), std::string::npos);
   access.rule_applied = true;
-  EXPECT_NE(access_advice(access).find("sudo usermod -aG input"), std::string::npos);
+  EXPECT_NE(access_advice(access).find("sudo usermod -aG tagwrench"), std::string::npos);
   access.member = true;
   EXPECT_NE(access_advice(access).find("log out and in"), std::string::npos);
   EXPECT_EQ(access_advice(access).find("usermod"), std::string::npos);
