@@ -15,7 +15,7 @@ has usr/share/doc/tagwrench/examples/71-tagwrench-direct.rules
 has usr/lib/sysusers.d/tagwrench.conf
 has usr/lib/systemd/system/tagwrench-devices.socket
 has usr/lib/systemd/system/tagwrench-devices@.service
-has usr/libexec/tagwrench-devices
+has usr/lib/tagwrench/tagwrench-devices
 has usr/lib/modules-load.d/tagwrench.conf
 has usr/lib/systemd/user/tagwrench.service
 has usr/lib/systemd/user/tagwrench-desktop.service
