@@ -21,7 +21,8 @@ namespace tagwrench {
 
 /// Writes one line a finding: "ok" works, "--" is not there and not needed, "!!" is missing, with
 /// the remedy behind it. Returns 0 when everything that a virtual device needs is in place
-/// (/dev/uhid and /dev/uinput, or the service that stands for them), else 1: the simulated sensor stands in for a camera.
+/// (/dev/uhid and /dev/uinput, or the service that stands for them), else 1: the simulated sensor
+/// stands in for a camera.
 int run_doctor(std::ostream& out);
 
 /// An input device that clients of spacenavd take for a 6-DOF one.
