@@ -83,9 +83,9 @@ void lend_uhid(int node) {
       log_info("refused: not a device of tagwrench, or not a report of it");
       break;
     }
+    if (gate.ended()) break;  // at rest first; closing the node is the end
     uninterrupted([&] { return ::write(node, event.data(), event.size()); });
   }
-  if (gate.ended()) return;
   for (const std::vector<std::uint8_t>& report : gate.neutral())
     uninterrupted([&] { return ::write(node, report.data(), report.size()); });
 }

@@ -150,6 +150,7 @@ void check_parts(const std::filesystem::path& path) {
     if (::lstat(beside.c_str(), &facts) != 0) continue;
     if (facts.st_uid == ::geteuid() && S_ISREG(facts.st_mode) && (facts.st_mode & 0077) == 0)
       continue;
+    ::unlink(path.c_str());
     throw ConfigError("{}: is another user's; record into a folder of yours", beside);
   }
 }
@@ -158,7 +159,6 @@ Database prepared(const std::filesystem::path& path) {
   Database database(created(path), Database::Mode::write);
   database.run(fmt::format("PRAGMA page_size = {}", kPageBytes).c_str());
   database.run("PRAGMA journal_mode = WAL");
-  check_parts(path);
   database.run("PRAGMA synchronous = FULL");  // on the disk with the commit, not some time later
   database.run(fmt::format("PRAGMA wal_autocheckpoint = {}", kLogBytes / kPageBytes).c_str());
   database.run(fmt::format("PRAGMA journal_size_limit = {}", kLogBytes).c_str());
@@ -166,6 +166,7 @@ Database prepared(const std::filesystem::path& path) {
   database.run(fmt::format("PRAGMA application_id = {}", kApplicationId).c_str());
   database.run(fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str());
   database.run(kSchema);
+  check_parts(path);
   return database;
 }
 

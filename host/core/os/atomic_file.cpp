@@ -161,8 +161,8 @@ NewFile::~NewFile() {
 void NewFile::write(std::string_view bytes) { write_all(file_.get(), bytes, target_); }
 
 void NewFile::keep_mode_of_target() {
-  struct stat old {
-  }, folder{};
+  struct stat old {};
+  struct stat folder {};
   const bool there =
       ::stat(target_.c_str(), &old) == 0 && ::stat(folder_of(target_).c_str(), &folder) == 0;
   // Who has put a file of his there chose its mode, to get at what comes. In his own folder root
