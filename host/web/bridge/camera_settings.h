@@ -76,7 +76,8 @@ class PictureFigures {
   /// Throws ConfigError for a target that cannot be tracked.
   PictureFigures(const CameraModel& camera, const TargetDescription& target);
 
-  /// Twice a second at most something is measured, and the width of one tag's edges each time.
+  /// Twice a second and an eighth of the time at most something is measured, and the width of one
+  /// tag's edges each time.
   /// `corners`: where the tags were, about then.
   void look(const ImageView& picture, std::span<const TagCorners> corners);
   /// {"white","black","clipped_part","edges_px":[{"id","px"}]}; null before the first picture.
@@ -93,7 +94,7 @@ class PictureFigures {
   bool mirrored_;
   std::vector<Edges> edges_;
   std::size_t next_ = 0;
-  TimePoint last_{};
+  TimePoint next_look_{};
   nlohmann::json figures_ = nullptr;
 };
 

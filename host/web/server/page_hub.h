@@ -91,6 +91,7 @@ class PageHub {
   static constexpr Duration kTick = std::chrono::milliseconds(34);
   static constexpr Duration kPictureEvery = std::chrono::milliseconds(100);
   static constexpr Duration kWatchEvery = std::chrono::milliseconds(500);
+  static constexpr Duration kLongestRest = std::chrono::seconds(1);  ///< from pictures
   static constexpr Duration kGoodBye = std::chrono::milliseconds(500);
 
   PageHub(boost::asio::io_context& context, const WebPatience& patience);
@@ -140,6 +141,7 @@ class PageHub {
   Text hello_;
   std::function<void(const ImageView&)> watcher_;
   std::atomic<bool> pictures_wanted_{false};
+  Duration picture_took_{};  ///< the last one, by the clock on the wall
   std::map<std::uint64_t, std::shared_ptr<Page>> pages_;
   std::uint64_t next_page_ = 1;
 };

@@ -12,8 +12,8 @@ namespace tagwrench {
 
 /// How long is waited for what a page, or whoever connects, owes.
 struct WebPatience {
-  Duration header = std::chrono::seconds(4);  ///< for a request, once it has begun or is the first
-  Duration request = std::chrono::seconds(10);  ///< for the next request, and for a piece of an
+  Duration header = std::chrono::seconds(4);    ///< for a request, once it has begun
+  Duration request = std::chrono::seconds(10);  ///< for a request to begin, and for a piece of an
                                                 ///< answer to be taken
   Duration unread = std::chrono::seconds(10);   ///< for a page's message to be taken
   Duration ping = std::chrono::seconds(5);      ///< from one ping to the next

@@ -145,7 +145,7 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
   Connection(tcp::socket socket, Peer peer, WebServer& server)
       : socket_(std::move(socket)), peer_(std::move(peer)), server_(server) {}
 
-  void serve() { read_request(server_.patience_.header); }
+  void serve() { await_request(); }
   /// One answer to whatever it asks, and good-bye.
   void turn_away(Refusal refusal) {
     turned_away_ = true;
@@ -173,10 +173,19 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
  private:
   using Parser = http::request_parser<http::empty_body>;
 
-  void read_request(Duration patience) {
+  void await_request() {
     idle_ = true;
     idle_since_ = std::chrono::steady_clock::now();
-    deadline_ = idle_since_ + patience;
+    deadline_ = idle_since_ + server_.patience_.request;
+    if (incoming_.size() > 0) return read_request();
+    socket_.async_wait(tcp::socket::wait_read,
+                       [self = shared_from_this()](const error_code& error) {
+                         if (error || self->ended_) return self->end();
+                         self->read_request();
+                       });
+  }
+  void read_request() {
+    deadline_ = std::chrono::steady_clock::now() + server_.patience_.header;
     parser_.emplace();
     parser_->header_limit(kMaxHeader);
     http::async_read(socket_, incoming_, *parser_,
@@ -263,7 +272,7 @@ class WebServer::Connection : public std::enable_shared_from_this<Connection> {
     if (file_left_ > 0) return send_file();
     file_ = {};
     outgoing_ = {};
-    if (keep_) return read_request(server_.patience_.request);
+    if (keep_) return await_request();
     linger();
   }
   /// Closed at once, what it is still sending would make the kernel throw away the answer.
