@@ -154,9 +154,10 @@ class Lines(threading.Thread):
     def __init__(self, stream):
         super().__init__(daemon=True)
         self.stream = stream
-        self.samples = self.dropped = self.gaps = 0
+        self.samples = self.dropped = 0
         self.latencies_us, self.statuses = [], {}
-        self.last = None
+        self.last, self.said = None, 0  # number of the last sample that had one; what was said to be lost since
+        self.gaps = []  # (ns, number before, number after, said to be lost between them)
         self.last_ns = monotonic_ns()
         self.start()
 
@@ -169,9 +170,10 @@ class Lines(threading.Thread):
             self.samples += 1
             self.last_ns = monotonic_ns()
             self.dropped += sample["dropped"]
-            if self.last is not None and sample["status"] != "lost":
-                self.gaps += max(0, sample["seq"] - self.last - 1 - sample["dropped"])
-            if sample["status"] != "lost":
-                self.last = sample["seq"]
+            self.said += sample["dropped"]
+            if self.last is None or sample["seq"] > self.last:  # else there was no picture in time
+                if self.last is not None and sample["seq"] - self.last - 1 > self.said:
+                    self.gaps.append((self.last_ns, self.last, sample["seq"], self.said))
+                self.last, self.said = sample["seq"], 0
             self.latencies_us.append(sample["latency_us"])
             self.statuses[sample["status"]] = self.statuses.get(sample["status"], 0) + 1

@@ -3,10 +3,10 @@
 
 The program shows the simulated sensor, pushed about, in real time, with load cells of the emulated board where that was built; a page
 records, pages and CAD programs come and go, some of them badly behaved. Faults come at random: the program killed or stopped, the
-board gone, no room for a recording, the time of day set, floods of requests. A camera that is unplugged takes
-a real driver: the kernel test `cameras` has one. What is reported: memory and descriptors, latency, samples that were lost
-and whether the program said so, how soon everything was at rest after a kill, and which recordings can be read. Status 1: something
-was lost without a word, did not come to rest within 80 ms, grew, or ended by itself.
+board gone, no room for a recording, the time of day set, floods of requests; nobody kills it in the second half. A camera that is
+unplugged takes a real driver: the kernel test `cameras` has one. What is reported: memory and descriptors, latency, samples that
+were lost and whether the program said so, how soon everything was at rest after a kill, and which recordings can be read. Status 1:
+something was lost without a word, did not come to rest within 80 ms, grew, or ended by itself.
 """
 import argparse
 import collections
@@ -28,7 +28,10 @@ from clients import CadProgram, Lines, Page, monotonic_ns
 
 REST_MS = 80            # what is promised after a kill
 GROWTH_KB_PER_H = 2048  # of memory, beyond which it is a leak
-WARM_S = 30             # before memory counts
+WARM_S = 60             # before memory counts
+LONG_S = 600            # a life that tells whether memory grows
+CROWD_S = 60            # how long those stay who do not read or do not finish
+FAULTS = ["killed", "stopped", "without_board", "no_room", "flood_of_requests", "half_open", "deaf", "clock_set"]
 SCENARIO = "trajectory: {motion: desk}\n"
 
 
@@ -78,7 +81,7 @@ class Instrument:
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=soak.environment)
         self.started = time.monotonic()
         self.lines = Lines(self.process.stdout)
-        self.memory = []  # (s, kB)
+        self.memory = []  # (s, kB, whether a crowd was there)
         self.descriptors = 0
         threading.Thread(target=self._said, daemon=True).start()
         self.page = None
@@ -103,7 +106,7 @@ class Instrument:
         except OSError:
             return
         kb = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
-        self.memory.append((time.monotonic() - self.started, kb))
+        self.memory.append((time.monotonic() - self.started, kb, bool(self.soak.crowd)))
 
     def record(self):
         """Begins a recording from a page, and ends the one before."""
@@ -122,9 +125,9 @@ class Instrument:
             self.page = self.recording = None
 
     def growth(self):
-        """kB an hour by least squares after the first half minute; None: it did not live long enough to tell."""
-        points = [(t, kb) for t, kb in self.memory if t > WARM_S]
-        if len(points) < 20 or points[-1][0] - points[0][0] < 300:
+        """kB an hour by least squares, after the first minute and while no crowd is there; None: too short a life to tell."""
+        points = [(t, kb) for t, kb, crowd in self.memory if t > WARM_S and not crowd]
+        if len(points) < 20 or points[-1][0] - points[0][0] < LONG_S:
             return None
         t_mean = sum(t for t, _ in points) / len(points)
         kb_mean = sum(kb for _, kb in points) / len(points)
@@ -135,6 +138,7 @@ class Instrument:
 class Soak:
     def __init__(self, options):
         self.program, self.random = options.program, random.Random(options.seed)
+        self.kinds, self.every_s = options.only.split(",") if options.only else FAULTS, options.every
         self.folder = pathlib.Path(options.out)
         shutil.rmtree(self.folder, ignore_errors=True)
         (self.folder / "recordings").mkdir(parents=True)
@@ -153,7 +157,8 @@ class Soak:
         self.lives, self.bad = [], []
         self.names = self.recordings = self.readable = self.cad_closed = 0
         self.cad = None
-        self.crowd = []
+        self.crowd = []    # (until, who)
+        self.history = []  # (ns, fault)
 
     # ---- Faults; each leaves the instrument running
 
@@ -219,7 +224,7 @@ class Soak:
             try:
                 half = socket.create_connection(("127.0.0.1", self.life.port), 5)
                 half.sendall(b"GET / HTTP/1.1\r\nHost:")
-                self.crowd.append(half)
+                self._join(half)
             except OSError:
                 break
         try:
@@ -230,10 +235,20 @@ class Soak:
         except OSError as error:
             self.bad.append(f"a hundred half-open connections starved one that was whole: {error}")
 
+    def _join(self, one):
+        self.crowd.append((time.monotonic() + CROWD_S, one))
+
+    def _let_go(self, all_of_them=False):
+        now = time.monotonic()
+        for until, one in self.crowd:
+            if all_of_them or now > until:
+                one.close()
+        self.crowd = [] if all_of_them else [(until, one) for until, one in self.crowd if now <= until]
+
     def deaf(self):
         for make in (lambda: Page(self.life.port, reads=False), lambda: CadProgram(str(self.spnav), reads=False)):
             try:
-                self.crowd.append(make())
+                self._join(make())
             except OSError:
                 self.notes["one that does not read was not let in"] += 1
 
@@ -252,19 +267,17 @@ class Soak:
 
     def _end_account(self):
         self.life.lines.join(10)
-        for one in self.crowd:
-            one.close()
-        self.crowd.clear()
+        self._let_go(all_of_them=True)
 
     def run(self, hours):
-        faults = [self.killed, self.stopped, self.without_board, self.no_room, self.flood_of_requests, self.half_open, self.deaf,
-                  self.clock_set]
-        end = time.monotonic() + 3600 * hours
+        half = time.monotonic() + 1800 * hours
+        end = half + 1800 * hours
         self.begin()
         fault_at = time.monotonic() + 10
         record_at = told_at = time.monotonic() + 60
         while time.monotonic() < end:
             time.sleep(1)
+            self._let_go()
             self.life.measure()
             if self.life.process.poll() is not None:
                 self.bad.append(f"it ended by itself with status {self.life.process.returncode}")
@@ -279,10 +292,13 @@ class Soak:
                 self.life.record()
                 record_at = time.monotonic() + self.random.uniform(20, 90)
             if time.monotonic() > fault_at:
-                fault = self.random.choice(faults)
-                self.faults[fault.__name__.replace("_", " ")] += 1
-                fault()
-                fault_at = time.monotonic() + self.random.expovariate(1 / 25)
+                # In the second half nobody kills it, so that it shows whether it grows.
+                kinds = [kind for kind in self.kinds if kind != "killed" or time.monotonic() < half]
+                name = self.random.choice(kinds).replace("_", " ")
+                self.faults[name] += 1
+                self.history.append((monotonic_ns(), name))
+                getattr(self, name.replace(" ", "_"))()
+                fault_at = time.monotonic() + self.random.expovariate(1 / self.every_s)
             if time.monotonic() > told_at:
                 say(f"{(end - time.monotonic()) / 60:.0f} min to go, {sum(self.faults.values())} faults, {len(self.bad)} bad")
                 told_at += 300
@@ -318,11 +334,16 @@ class Soak:
         for part in ("", "-wal", "-shm"):
             pathlib.Path(f"{file}{part}").unlink(missing_ok=True)
 
+    def _before(self, at_ns):
+        past = [(at_ns - began_ns, name) for began_ns, name in self.history if began_ns <= at_ns]
+        return f"{past[-1][0] / 1e9:.1f} s after: {past[-1][1]}" if past else "before any fault"
+
     def report(self, hours, seed):
         latencies = sorted(value for life in self.lives for value in life.lines.latencies_us)
         samples = sum(life.lines.samples for life in self.lives)
         dropped = sum(life.lines.dropped for life in self.lives)
-        gaps = sum(life.lines.gaps for life in self.lives)
+        gaps = [gap for life in self.lives for gap in life.lines.gaps]
+        missing = sum(after - before - 1 - said for _, before, after, said in gaps)
         growth = [g for g in (life.growth() for life in self.lives) if g is not None]
 
         def at(share, values):
@@ -331,8 +352,8 @@ class Soak:
         def rest(what):
             values = sorted(self.rest_ms[what])
             return f"{at(0.5, values):.0f} {values[-1]:.0f} of {len(values)}" if values else "never"
-        if gaps:
-            self.bad.append(f"{gaps} samples are missing that no `dropped` counts")
+        for at_ns, before, after, said in gaps:
+            self.bad.append(f"between samples {before} and {after} {said} are said to be lost ({self._before(at_ns)})")
         if growth and max(growth) > GROWTH_KB_PER_H:
             self.bad.append(f"memory grew by {max(growth):.0f} kB an hour")
         late = [r for values in self.rest_ms.values() for r in values if r > REST_MS]
@@ -343,11 +364,11 @@ class Soak:
             ("lives of the program", len(self.lives)),
             ("faults", ", ".join(f"{name} {count}" for name, count in sorted(self.faults.items())) or "none"),
             ("the board", "emulated" if self.board.process else "not there"),
-            ("samples; lost and said; lost without a word", f"{samples}; {dropped}; {gaps}"),
+            ("samples; lost and said; lost without a word", f"{samples}; {dropped}; {missing}"),
             ("picture to line, ms: median, p99, most", " ".join(f"{at(s, latencies) / 1e3:.1f}" for s in (0.5, 0.99, 1))),
             ("kill -9 to rest in a CAD program, ms: median, most", rest("kill -9")),
             ("SIGSTOP to rest in a CAD program, ms: median, most", rest("SIGSTOP")),
-            ("memory, MB: most; growth of lives of 5 min and more, kB/h", f"{max((kb for life in self.lives for _, kb in life.memory), default=0) / 1024:.0f}; "
+            ("memory, MB: most; growth of lives of 10 min and more, kB/h", f"{max((kb for life in self.lives for _, kb, _ in life.memory), default=0) / 1024:.0f}; "
              + (f"{sum(growth) / len(growth):.0f} (most {max(growth):.0f}, of {len(growth)})" if growth else "none lived so long")),
             ("descriptors, most", max(life.descriptors for life in self.lives)),
             ("recordings that can be read", f"{self.readable} of {self.recordings}"),
@@ -367,6 +388,8 @@ def main():
     parser.add_argument("--out", required=True, help="a folder, which is emptied first")
     parser.add_argument("--hours", type=float, required=True)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", help=f"these faults: of {', '.join(FAULTS)}")
+    parser.add_argument("--every", type=float, default=25, help="seconds from one to the next, about")
     options = parser.parse_args()
     soak = Soak(options)
     soak.run(options.hours)
