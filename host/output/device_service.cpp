@@ -91,8 +91,8 @@ std::string cannot_open_node(const DeviceNode& node, int error) {
     case EACCES:
     case EPERM:
       return fmt::format(
-          "{}: permission denied, and no service makes devices; install the package, or "
-          "71-tagwrench-direct.rules in /etc/udev/rules.d, or run as root",
+          "{}: permission denied, and no service makes devices; install the package, or, where it "
+          "is, sudo systemctl start tagwrench-devices.socket; or run as root",
           path);
     case ENOENT:
     case ENODEV:

@@ -354,8 +354,9 @@ JoystickOutput::JoystickOutput(const JoystickOptions& options) {
     errno = make_joystick(fd, setup) ? 0 : errno;
   }
   if (errno != 0) {
-    throw ConfigError("{}: {} is refused: {}; it needs Linux 4.5 or later", kUinputNode.path(),
-                      options.name, std::strerror(errno));
+    throw ConfigError(
+        "{}: {} is refused: {}; {}", kUinputNode.path(), options.name, std::strerror(errno),
+        node.lent ? "see: systemctl status 'tagwrench-devices*'" : "it needs Linux 4.5 or later");
   }
 }
 

@@ -149,8 +149,9 @@ void say_rule(Report& report) {
   }
   report.line(
       ::getuid() == 0 ? Mark::absent : Mark::missing,
-      "no udev rule, so only root can make or read devices: install the package, or sudo cmake "
-      "--install build, then sudo udevadm control --reload && sudo udevadm trigger");
+      "no udev rule, so only root can make or read devices: install the package, or copy the rules "
+      "of host/output to /etc/udev/rules.d, then sudo udevadm control --reload && sudo udevadm "
+      "trigger");
 }
 
 bool say_device_node(Report& report, const DeviceNode& node, const char* use) {
