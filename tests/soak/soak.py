@@ -391,6 +391,8 @@ def main():
     parser.add_argument("--only", help=f"these faults: of {', '.join(FAULTS)}")
     parser.add_argument("--every", type=float, default=25, help="seconds from one to the next, about")
     options = parser.parse_args()
+    # Started in the background of a shell, we have Ctrl-C ignored, which children would inherit.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     soak = Soak(options)
     soak.run(options.hours)
     report = soak.report(options.hours, options.seed)
