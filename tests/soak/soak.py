@@ -292,9 +292,9 @@ class Soak:
             if time.monotonic() > record_at:
                 self.life.record()
                 record_at = time.monotonic() + self.random.uniform(20, 90)
-            if time.monotonic() > fault_at:
-                # In the second half nobody kills it, so that it shows whether it grows.
-                kinds = [kind for kind in self.kinds if kind != "killed" or time.monotonic() < half]
+            # In the second half nobody kills it, so that it shows whether it grows.
+            kinds = [kind for kind in self.kinds if kind != "killed" or time.monotonic() < half]
+            if kinds and time.monotonic() > fault_at:
                 name = self.random.choice(kinds).replace("_", " ")
                 self.faults[name] += 1
                 self.history.append((monotonic_ns(), name))
