@@ -281,14 +281,19 @@ describe('crowds', { skip }, () => {
   });
 
   // A browser connects before it has anything to ask.
-  test('a connection that says a little at a time is closed, later one that says nothing', async () => {
-    const slow = await connection(web.port);
-    slow.write('a');
+  test('a connection that says a little at a time is closed, later one that says nothing', async (t) => {
+    const unhurried = await Server.start('--hurry', '2');
+    t.after(() => unhurried.stop());
+    const asks = await connection(unhurried.port);
+    const slow = await connection(unhurried.port); // later than the other, and yet gone before it
     const dribble = setInterval(() => slow.write('a'), 50);
     slow.on('error', () => {});
-    const silent = await connection(web.port);
-    assert.equal(await Promise.race([silent.ended.then(() => 'silent'), slow.ended.then(() => 'slow')]), 'slow');
+    await slow.ended;
     clearInterval(dribble);
+    asks.write(`GET / HTTP/1.1\r\nHost: ${unhurried.host}\r\nConnection: close\r\n\r\n`);
+    await asks.ended;
+    assert.equal(status(asks.heard), 200);
+    const silent = await connection(unhurried.port);
     await silent.ended;
     assert.equal(silent.heard, '');
   });
