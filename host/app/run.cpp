@@ -122,16 +122,20 @@ std::vector<Output*> beside(RunSession& session) {
 }
 
 /// Whether the source shows the sensor's tags within `patience`. A signal ends the search; the loop
-/// then sees it too.
-bool sees_tags(Input& input, Duration patience) {
+/// then sees it too. systemd, if any, gets signs of life: many cameras take longer than it waits.
+bool sees_tags(Input& input, Duration patience, ServiceWatch* watch) {
   Tracker tracker = make_tracker(input.sensor);
   const UniqueFd stop = termination_fd();
   const TimePoint until = std::chrono::steady_clock::now() + patience;
   for (TimePoint now; (now = std::chrono::steady_clock::now()) < until;) {
-    pollfd fds[2] = {{input.source->poll_fd(), POLLIN, 0}, {stop.get(), POLLIN, 0}};
+    pollfd fds[3] = {{input.source->poll_fd(), POLLIN, 0},
+                     {stop.get(), POLLIN, 0},
+                     {watch != nullptr ? watch->poll_fd() : -1, POLLIN, 0}};
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - now);
-    if (::poll(fds, 2, static_cast<int>(left.count()) + 1) <= 0) continue;
+    if (::poll(fds, 3, static_cast<int>(left.count()) + 1) <= 0) continue;
     if (fds[1].revents != 0) return true;
+    if (fds[2].revents != 0) watch->service();
+    if (fds[0].revents == 0) continue;
     Frame frame;
     if (input.source->read(frame) != ReadStatus::frame) continue;
     const Track track = tracker.track(frame);
@@ -141,7 +145,7 @@ bool sees_tags(Input& input, Duration patience) {
 }
 
 /// The first camera that sees the tags, and how many cameras there are.
-std::optional<Input> find_camera(const RunOptions& options, int& cameras) {
+std::optional<Input> find_camera(const RunOptions& options, ServiceWatch* watch, int& cameras) {
   constexpr Duration kPatience = std::chrono::seconds(2);
   for (const CameraNode& node : list_camera_nodes()) {
     if (!node.captures) continue;
@@ -149,7 +153,7 @@ std::optional<Input> find_camera(const RunOptions& options, int& cameras) {
       Input input = open_input({options.sensor, "v4l2:" + node.path, options.fast});
       ++cameras;
       if (input.source->format().width == input.sensor.camera.width_px &&
-          sees_tags(input, kPatience))
+          sees_tags(input, kPatience, watch))
         return input;
     } catch (const ConfigError& e) {
       log_info(e.what());
@@ -159,9 +163,9 @@ std::optional<Input> find_camera(const RunOptions& options, int& cameras) {
 }
 
 /// That camera; the simulated sensor where there is none.
-Input find_input(const RunOptions& options) {
+Input find_input(const RunOptions& options, ServiceWatch* watch) {
   int cameras = 0;
-  if (std::optional<Input> input = find_camera(options, cameras)) return std::move(*input);
+  if (std::optional<Input> input = find_camera(options, watch, cameras)) return std::move(*input);
   log_info(cameras == 0 ? "no camera found: showing the simulated sensor (--source "
                           "v4l2:/dev/videoN picks a camera)"
                         : "no camera sees the tags: showing the simulated sensor (--source "
@@ -170,9 +174,9 @@ Input find_input(const RunOptions& options) {
 }
 
 /// The camera that was asked for, if it can be had now.
-std::optional<Input> try_camera(const RunOptions& options) {
+std::optional<Input> try_camera(const RunOptions& options, ServiceWatch* watch) {
   int cameras = 0;
-  if (options.source.empty()) return find_camera(options, cameras);
+  if (options.source.empty()) return find_camera(options, watch, cameras);
   try {
     return open_input({options.sensor, options.source, options.fast});
   } catch (const ConfigError& e) {
@@ -250,9 +254,9 @@ std::optional<Input> open_run_input(const RunOptions& options, ServiceWatch* wat
     load_sensor(options.sensor);  // a mistake in it must not look like a missing camera
   if (options.wait && wants_camera(options)) {
     if (!options.source.empty()) parse_v4l2_spec(parse_source(options.source).argument);
-    return wait_for_camera([&] { return try_camera(options); }, watch);
+    return wait_for_camera([&] { return try_camera(options, watch); }, watch);
   }
-  if (options.source.empty()) return find_input(options);
+  if (options.source.empty()) return find_input(options, watch);
   InputOptions input{options.sensor, options.source, options.fast};
   input.if_damaged = if_damaged(options.despite_damage);
   return open_input(input);
