@@ -14,7 +14,8 @@
 import { chromiumPath, nodePackage, screenshotPath } from './environment.mjs';
 
 // Chromium loses a frame of its own when a track ends before the worker reads the stream that it was handed, as on a busy machine.
-// A page that kept its frames open would stand still after a few: the camera has no more of them.
+// A page that keeps the frames that it has measured stands still, for the camera has no more of them; that those left out are closed,
+// sensor_newest.test.mjs sees.
 const kFrameOnItsWay = /^A VideoFrame was garbage collected without being closed/;
 
 const kPatience_ms = 120_000; // of a busy machine; nothing is judged by time
