@@ -29,8 +29,9 @@ constexpr int kAttempts = 3;
 constexpr milliseconds kStartTime{10'000};  // of a daemon on a busy machine
 constexpr milliseconds kLookEvery{500};     // whether it is stopped
 constexpr Duration kBetweenAttempts = std::chrono::seconds(1);
-// As the pipeline has them: a move that is so late is missing, a camera that is so slow is lost.
-constexpr Duration kGrace = milliseconds(60);
+// A move that is so late is missing: with the 8 ms between moves, time is left of the 80 ms until
+// rest. As the pipeline has it: a camera that is so slow is lost.
+constexpr Duration kGrace = milliseconds(45);
 constexpr Duration kMinInterval = milliseconds(8);
 constexpr Duration kSlowestInterval = milliseconds(250);
 

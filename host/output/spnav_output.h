@@ -29,7 +29,7 @@ struct SpnavOptions {
 
 /// Sends Sample::deflection as +-500 counts in spnav's axes: an event for every move off-centre,
 /// one for the return to zero, none at rest. FreeCAD turns by counts times events, so moves at a
-/// steady rate make its speed. Should the bridge hang or die, the daemon goes neutral 60 ms after
+/// steady rate make its speed. Should the bridge hang or die, the daemon goes neutral 45 ms after
 /// the move that should have come. Should the daemon die, another one is started; programs do not
 /// connect to it by themselves.
 class SpnavOutput : public Output {
