@@ -1,6 +1,8 @@
 """Cameras as they come: absent, busy, wrong, broken, unplugged; a second driver; Ctrl-C at any moment."""
 import json
+import os
 import signal
+import socket
 import time
 
 import page
@@ -159,6 +161,27 @@ def settings_from_a_page(setup):
     rig.check("the gain is automatic again", controls().get("gain_automatic") == "value=1", controls())
 
 
+def signs_of_life(setup):
+    """A search through cameras takes longer than systemd may wait for a sign of life."""
+    notify = "/run/cameras.notify"
+    systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    systemd.bind(notify)
+    systemd.settimeout(60)
+    bridge = rig.Program("tagwrench", [setup.tagwrench, "run", "--wait", "--output", "terminal"],
+                         env={"NOTIFY_SOCKET": notify, "WATCHDOG_USEC": "1000000"})
+    before = []
+    try:
+        while not before or not before[-1].startswith("READY=1"):
+            before.append(systemd.recv(1024).decode())
+    except TimeoutError:
+        pass
+    rig.check("a camera without tags is waited past", before and "waiting" in before[-1], f"{before}; {bridge.state()}")
+    rig.check("systemd hears of the search every second", before.count("WATCHDOG=1") >= 2, f"{before}; {bridge.state()}")
+    rig.check("SIGTERM ends the waiting with status 0", bridge.stop() == 0, bridge.state())
+    systemd.close()
+    os.remove(notify)
+
+
 def body(setup):
     rig.load("v4l2loopback devices=2 video_nr=0,1 exclusive_caps=1,1",
              "vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0x00 vid_cap_nr=2")
@@ -167,6 +190,7 @@ def body(setup):
     broken_jpeg(setup)
     reconnection(setup)
     second_driver(setup)
+    signs_of_life(setup)
     settings_from_a_page(setup)
     interruptions(setup)
 
