@@ -28,8 +28,8 @@ from clients import CadProgram, Lines, Page, monotonic_ns
 
 REST_MS = 80            # what is promised after a kill
 GROWTH_KB_PER_H = 2048  # of memory, beyond which it is a leak
-WARM_S = 60             # before memory counts
-LONG_S = 1800           # a life that tells whether memory grows: in ten minutes, noise of 1 MB reads as 6 MB an hour
+WARM_S = 900            # before memory counts: what the first crowd takes comes once
+LONG_S = 1800           # that tells whether memory grows: in ten minutes, noise of 1 MB reads as 6 MB an hour
 CROWD_S = 60            # how long those stay who do not read or do not finish
 FAULTS = ["killed", "stopped", "without_board", "no_room", "flood_of_requests", "half_open", "deaf", "clock_set"]
 SCENARIO = "trajectory: {motion: desk}\n"
@@ -126,7 +126,7 @@ class Instrument:
             self.page = self.recording = None
 
     def growth(self):
-        """kB an hour by least squares, after the first minute and while no crowd is there; None: too short a life to tell."""
+        """kB an hour by least squares, after a quarter of an hour and while no crowd is there; None: too short a life to tell."""
         points = [(t, kb) for t, kb, crowd in self.memory if t > WARM_S and not crowd]
         if len(points) < 20 or points[-1][0] - points[0][0] < LONG_S:
             return None
@@ -369,7 +369,7 @@ class Soak:
             ("picture to line, ms: median, p99, most", " ".join(f"{at(s, latencies) / 1e3:.1f}" for s in (0.5, 0.99, 1))),
             ("kill -9 to rest in a CAD program, ms: median, most", rest("kill -9")),
             ("SIGSTOP to rest in a CAD program, ms: median, most", rest("SIGSTOP")),
-            ("memory, MB: most; growth of lives of 30 min and more, kB/h", f"{max((kb for life in self.lives for _, kb, _ in life.memory), default=0) / 1024:.0f}; "
+            ("memory, MB: most; growth of lives of 45 min and more, kB/h", f"{max((kb for life in self.lives for _, kb, _ in life.memory), default=0) / 1024:.0f}; "
              + (f"{sum(growth) / len(growth):.0f} (most {max(growth):.0f}, of {len(growth)})" if growth else "none lived so long")),
             ("descriptors, most", max(life.descriptors for life in self.lives)),
             ("recordings that can be read", f"{self.readable} of {self.recordings}"),
