@@ -160,6 +160,34 @@ TEST_F(SpnavOutputTest, AKilledBridgeIsNeutralAndTheNextOneMovesTheSameConnectio
   EXPECT_TRUE(program->wait_for_motion({-500, 0, 0, 0, 0, 0}));
 }
 
+TEST_F(SpnavOutputTest, OfThe80MsUntilAHungBridgeRestsAThirdIsLeftToWakeUp) {
+  std::optional<SpnavSockets> sockets = listen_spnav(folder_.socket());
+  ASSERT_TRUE(sockets);
+  UniqueFd link;
+  std::thread daemon([&] {
+    link.reset(::accept(sockets->bridge.get(), nullptr, nullptr));
+    EXPECT_TRUE(send_spnav(link.get(), SpnavGreeting{}));
+  });
+  std::uint32_t least_ms = 1000;  // a busy machine's moves are farther apart, and hold longer
+  {
+    SpnavOutput output(options_at(folder_.socket()));
+    daemon.join();
+    std::array<std::uint8_t, kSpnavLongestMessage> buffer;
+    for (int i = 0; i < 20; ++i) {
+      EXPECT_EQ(output.move(pushed(0.5)), SendStatus::ok);
+      std::optional<SpnavUpdate> update;
+      while (!update) {  // a hello comes first
+        ASSERT_TRUE(test::readable(link.get()));
+        update = spnav_message<SpnavUpdate>(receive_spnav(link.get(), buffer).bytes);
+      }
+      least_ms = std::min(least_ms, update->valid_ms);
+    }
+  }
+  sockets->remove();
+  EXPECT_GT(least_ms, 40U) << "ms: a loop may be busy for that long";
+  EXPECT_LE(least_ms, 54U) << "ms";
+}
+
 TEST_F(SpnavOutputTest, AStoppedBridgeIsNeutralUntilItGoesOn) {
   const PushingProcess bridge(folder_.socket());
   const auto program = connect_when_served(folder_.socket());
